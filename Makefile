@@ -1,0 +1,71 @@
+PYTHON ?= python3
+BIN := .venv/bin
+STAMP := .venv/.installed
+
+# Another ROS may be sourced in this shell. Its libraries, packages and settings stay out.
+unexport PYTHONPATH PYTHONHOME PYTHONUSERBASE PYTHONSAFEPATH PYTHONSTARTUP LD_LIBRARY_PATH
+unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH AMENT_CURRENT_PREFIX
+unexport COLCON_CURRENT_PREFIX COLCON_DEFAULTS_FILE COLCON_HOME COLCON_PYTHON_EXECUTABLE
+unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION ROS_PACKAGE_PATH ROS_ETC_DIR ROS_ROOT
+unexport RMW_IMPLEMENTATION CYCLONEDDS_URI FASTRTPS_DEFAULT_PROFILES_FILE
+unexport FASTDDS_DEFAULT_PROFILES_FILE RMW_FASTRTPS_USE_QOS_FROM_XML RMW_FASTRTPS_PUBLICATION_MODE
+unexport ROS_DISCOVERY_SERVER ROS_SUPER_CLIENT ROS_LOCALHOST_ONLY ROS_STATIC_PEERS
+unexport ROS_SECURITY_ENABLE ROS_SECURITY_STRATEGY ROS_SECURITY_KEYSTORE
+unexport ROS_SECURITY_ENCLAVE_OVERRIDE
+# With this one leaked, the rclpy wheels believe that their library path is set already.
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+# These send pip's or Python's eyes out of the environment made here.
+unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_DEPS MYPYPATH
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test bench lint format clean
+
+help:
+	@echo 'make demo    run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
+	@echo 'make test    lint, then all tests'
+	@echo 'make bench   measure'
+	@echo 'make lint    ruff and mypy'
+	@echo 'make format  let ruff put right what it can'
+	@echo 'make clean   remove what make and colcon have built; recorded runs stay'
+	@echo 'PYTHON=...   the Python to build .venv with, 3.10 or newer (now: $(PYTHON))'
+
+$(STAMP): setup.py
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || { \
+	  echo '$(PYTHON): not Python 3.10 or newer; install one and name it: make PYTHON=python3.12' >&2; \
+	  exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	  echo '$(PYTHON): cannot make virtual environments; on Debian and Ubuntu: apt install python3-venv' >&2; \
+	  exit 1; }
+	@$(BIN)/python -c 'import pip' 2>/dev/null || $(PYTHON) -m venv --clear .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+# One simple command: make starts it without a shell between, so that Ctrl-C reaches it and make
+# waits until it has ended by itself. SECONDS counts only from the command line: a shell may
+# export its own.
+demo: $(STAMP)
+	@$(BIN)/linkage demo $(if $(filter command,$(origin SECONDS)),--seconds $(SECONDS))
+
+# The tests run even when lint finds something, so that one run tells all.
+test: $(STAMP)
+	@status=0; \
+	$(MAKE) --no-print-directory lint || status=$$?; \
+	$(BIN)/python -m pytest || status=$$?; \
+	exit $$status
+
+bench: $(STAMP)
+	@$(BIN)/python -m bench
+
+lint: $(STAMP)
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+format: $(STAMP)
+	$(BIN)/ruff check --fix --exit-zero --quiet
+	$(BIN)/ruff format
+
+clean:
+	rm -rf .venv build install log dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,84 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Start linkage_node, and robot_state_publisher beside it where a URDF is given.
+
+``ros2 launch linkage_ros linkage.launch.py scene:=/path/to/scene.yaml``
+
+Not run in CI, for want of a launch that pip can install: a test there runs it against stubs.
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+SHARE = Path(get_package_share_directory('linkage_ros'))
+
+ARGUMENTS = {
+    'scene': ('', "Scene file; '' takes the one that params_file names."),
+    'params_file': (str(SHARE / 'config' / 'linkage_node.yaml'), 'Parameters of linkage_node.'),
+    'namespace': ('', 'Namespace of both nodes and their relative topics.'),
+    'use_sim_time': ('false', 'Tick on /clock instead of the steady clock.'),
+    'crank_states': (
+        'crank_states',
+        'Topic that brings the crank; joint_states where joint_state_broadcaster publishes it.',
+    ),
+    'robot_description_file': ('', "URDF for robot_state_publisher; '' does not start it."),
+}
+
+
+def nodes(context):
+    """Return the nodes to start; only now are the values of the arguments known."""
+    value = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
+    clock = {'use_sim_time': value['use_sim_time'].lower() in ('true', '1')}
+    # Later parameters go before earlier ones: an empty argument must not hide the file's scene.
+    scene = {'scene': value['scene']} if value['scene'] else {}
+    yield Node(
+        package='linkage_ros',
+        executable='linkage_node',
+        name='linkage_node',
+        namespace=value['namespace'],
+        parameters=[value['params_file'], {**clock, **scene}],
+        remappings=[('crank_states', value['crank_states'])],
+        output='screen',
+    )
+    if value['robot_description_file']:
+        urdf = Path(value['robot_description_file']).read_text(encoding='utf-8')
+        yield Node(
+            package='robot_state_publisher',
+            executable='robot_state_publisher',
+            name='robot_state_publisher',
+            namespace=value['namespace'],
+            parameters=[{**clock, 'robot_description': urdf}],
+            output='screen',
+        )
+
+
+def generate_launch_description():
+    """Return what `ros2 launch` asks a launch file for."""
+    return LaunchDescription(
+        [
+            *(
+                DeclareLaunchArgument(name, default_value=default, description=text)
+                for name, (default, text) in ARGUMENTS.items()
+            ),
+            OpaqueFunction(function=lambda context: list(nodes(context))),
+        ]
+    )

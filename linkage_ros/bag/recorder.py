@@ -1,0 +1,269 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Record from the hot path: hand over and forget.
+
+``offer`` is a length check and an append. A thread of the recorder's own does the rest, and a disk
+that stalls or fills stops that thread only: the queue fills, and further messages are counted.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import count
+import json
+from pathlib import Path
+import threading
+import time
+
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import RecordingError
+
+_POLL = 0.02  # [s]
+# Messages between two naps of the thread, about 0.3 ms of work, and the nap [s]. It is not 0:
+# with a nap of 0 the thread often takes the interpreter back before a waiting tick wakes up.
+_BATCH = 50
+_NAP = 50e-6
+
+
+@dataclass(frozen=True, slots=True)
+class TopicCounts:
+    """
+    What became of one topic's messages.
+
+    ``received == recorded + dropped + waiting``, at every instant.
+    """
+
+    name: str
+    received: int
+    recorded: int
+    dropped: int
+    waiting: int
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingSummary:
+    """
+    How a recording went.
+
+    Parameters
+    ----------
+    folder
+        The bag.
+    topics
+        Counts for each topic, in the order of their numbers; nothing waits any more, so
+        ``received == recorded + dropped``.
+    size
+        Size of the MCAP file [bytes].
+    failure
+        Why it ended early, on one line; None if it did not.
+
+    """
+
+    folder: Path
+    topics: tuple[TopicCounts, ...]
+    size: int
+    failure: str | None
+
+
+class Recorder:
+    """
+    A bag that is written on a thread of its own.
+
+    Parameters
+    ----------
+    writer
+        The open bag, the recorder's from here on.
+    capacity
+        Messages that may wait. The default is 16 s of two topics at 2 kHz, about 25 MB.
+    flush_period
+        What a power cut may cost [s].
+
+    """
+
+    def __init__(
+        self, writer: BagWriter, *, capacity: int = 65536, flush_period: float = 1.0
+    ) -> None:
+        self.failure: RecordingError | None = None
+        self.folder = writer.folder
+        self._writer = writer
+        self._capacity = capacity
+        self._flush_period = flush_period
+        self._queue: deque[tuple[int, int, int, bytes]] = deque()
+        self._open = True
+        self._received = [_Tally() for _ in writer.topics]
+        self._add_received = [tally.add for tally in self._received]
+        self._overflowed = [_Tally() for _ in writer.topics]
+        self._add_overflowed = [tally.add for tally in self._overflowed]
+        # The thread's own: what the writer took, and what did not get there. One tuple, so that
+        # another thread never sees a message in both, or in neither.
+        self._done = ([0] * len(writer.topics), [0] * len(writer.topics))
+        self._safe = (0,) * len(writer.topics)
+        self._custom: dict[str, str] = {}
+        self._summary: RecordingSummary | None = None
+        self._stopping = threading.Event()
+        # A daemon: a disk that never answers must not keep the process from ending.
+        self._thread = threading.Thread(target=self._run, name='bag recorder', daemon=True)
+        self._thread.start()
+
+    def offer(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
+        """
+        Hand over one message, from any thread; never blocks, never raises for the disk's sake.
+
+        Parameters
+        ----------
+        topic
+            The topic's number.
+        log_time, publish_time
+            When it was received, and when its source made it [ns].
+        data
+            The CDR bytes. They are kept, not copied: a buffer that is reused must be given as
+            ``bytes(buffer)``.
+
+        """
+        self._add_received[topic]()
+        if self._open and len(self._queue) < self._capacity:
+            self._queue.append((topic, log_time, publish_time, data))
+        else:
+            self._add_overflowed[topic]()
+
+    def inspect(self) -> tuple[TopicCounts, ...]:
+        """Return the counts as they are now; after a failure, ``recorded`` is what was kept."""
+        counts = []
+        taken, lost = self._done
+        for number, topic in enumerate(self._writer.topics):
+            recorded = taken[number]
+            dropped = self._overflowed[number].value() + lost[number]
+            # Last, so that a message on its way is waiting, and never gone twice.
+            received = self._received[number].value()
+            waiting = received - recorded - dropped
+            counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting))
+        return tuple(counts)
+
+    def stop(
+        self, custom: Mapping[str, str] | None = None, *, timeout: float = 10.0
+    ) -> RecordingSummary:
+        """
+        Write what waits, close the bag and say how it went; raises nothing.
+
+        Parameters
+        ----------
+        custom
+            Goes to ``custom_data`` of the bag's metadata, beside the dropped messages.
+        timeout
+            How long a disk that does not answer is waited for [s]. After that the summary counts
+            as recorded only what a flush has brought to the disk.
+
+        """
+        if self._summary:
+            return self._summary
+        self._custom = dict(custom or {})
+        self._open = False
+        self._stopping.set()
+        self._thread.join(timeout)
+        stuck = self._thread.is_alive()
+        if stuck:
+            self.failure = RecordingError(
+                self._writer.folder,
+                f'the disk has not answered for {timeout:g} s',
+                'what was flushed before is readable; check the disk',
+            )
+        topics = []
+        for number, counts in enumerate(self.inspect()):
+            recorded = self._safe[number] if stuck else counts.recorded
+            dropped = counts.received - recorded
+            topics.append(TopicCounts(counts.name, counts.received, recorded, dropped, 0))
+        self._summary = RecordingSummary(
+            folder=self._writer.folder,
+            topics=tuple(topics),
+            size=self._writer.size,
+            failure=str(self.failure) if self.failure else None,
+        )
+        return self._summary
+
+    def _run(self) -> None:
+        try:
+            due = time.monotonic() + self._flush_period
+            stopping = False
+            while not stopping:
+                # Asked before the queue is emptied: what was offered until then is written.
+                stopping = self._stopping.wait(_POLL)
+                more = True
+                while more:
+                    more = self._write_batch()
+                    if time.monotonic() >= due:
+                        self._writer.flush()
+                        self._safe = tuple(self._done[0])
+                        due = time.monotonic() + self._flush_period
+                    if more:
+                        time.sleep(_NAP)
+            dropped = {counts.name: counts.dropped for counts in self.inspect()}
+            self._writer.close({**self._custom, 'linkage_ros.dropped': json.dumps(dropped)})
+        except Exception as error:  # noqa: BLE001 (nothing may end the thread in silence)
+            self._fail(error)
+
+    def _write_batch(self) -> bool:
+        """Write up to a batch of messages; return whether there may be more."""
+        queue, write, (taken, lost) = self._queue, self._writer.write, self._done
+        for _ in range(min(_BATCH, len(queue))):
+            message = queue.popleft()
+            # Lost until proven otherwise: a write that raises needs no case of its own.
+            lost[message[0]] += 1
+            if write(*message):
+                lost[message[0]] -= 1
+                taken[message[0]] += 1
+        return bool(queue)
+
+    def _fail(self, error: Exception) -> None:
+        """Keep the failure, and count as recorded only what the writer could keep."""
+        self._open = False
+        if not isinstance(error, RecordingError):
+            reason = f'the recording ended early: {type(error).__name__}: {error}'
+            error = RecordingError(self._writer.folder, reason, 'please report this')
+        kept: tuple[int, ...] = self._safe
+        with suppress(Exception):
+            kept = self._writer.close().counts
+        taken, lost = self._done
+        lost = [gone + had - has for gone, had, has in zip(lost, taken, kept, strict=True)]
+        while self._queue:
+            lost[self._queue.popleft()[0]] += 1
+        self._done = (list(kept), lost)
+        self.failure = error
+
+
+class _Tally:
+    """
+    A counter that several threads count up without a lock.
+
+    Stepping an `itertools.count` is one C call, which threads cannot tear apart as they can
+    ``n += 1``. It can only be read by stepping it, so the steps made for reading are taken off.
+    """
+
+    __slots__ = ('_reading', '_readings', 'add')
+
+    def __init__(self) -> None:
+        self.add = count().__next__
+        self._readings = 0
+        self._reading = threading.Lock()
+
+    def value(self) -> int:
+        with self._reading:
+            steps = self.add() - self._readings
+            self._readings += 1
+            return steps

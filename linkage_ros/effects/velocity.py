@@ -1,0 +1,56 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Velocity: the rates of the published joints, from the loop's velocity equation.
+
+At a toggle the position is valid and no rate exists: the rates stay empty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from linkage_ros.effects.stage import Motion, Stage
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.status import Status
+from linkage_ros.scene.yaml_file import Section
+
+
+NEEDS_CRANK_RATE = True
+
+
+@dataclass(frozen=True, slots=True)
+class VelocityParameters:
+    """Velocity has none."""
+
+
+def read(content: Section) -> VelocityParameters:
+    """Read the parameters."""
+    content.finish()
+    return VelocityParameters()
+
+
+def build(_parameters: VelocityParameters, closure: Closure) -> Stage:
+    """Build the stage."""
+    toggle, rates = Status.TOGGLE, closure.rates
+
+    def velocity(motion: Motion) -> Motion:
+        crank, position, joints, _ = motion
+        if position.status is toggle:
+            return motion
+        return Motion(crank, position, joints, rates(position, crank.rate))
+
+    return velocity

@@ -1,0 +1,92 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Every error that a user can meet: one root, and one line of text each.
+
+``str(error)`` is exactly what the user reads: where (file, key or topic), what is wrong with the
+value, and the remedy.
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import Any
+
+_LONGEST_VALUE = 80
+
+
+class LinkageError(Exception):
+    """
+    The root of all errors that this package raises on purpose.
+
+    Parameters
+    ----------
+    where
+        The file, key, folder or topic that is at fault.
+    reason
+        What is wrong, with the value.
+    remedy
+        What would help.
+    """
+
+    def __init__(self, where: str | PathLike[str], reason: str, remedy: str) -> None:
+        self.where = str(where)
+        self.reason = reason
+        self.remedy = remedy
+        super().__init__(' '.join(f'{self.where}: {reason}; {remedy}'.split()))
+
+
+class DefinitionError(LinkageError):
+    """A linkage or scene that cannot be built; ``where`` is the dotted key within its file."""
+
+
+class FileError(LinkageError):
+    """
+    A file that cannot be used as it stands.
+
+    Parameters
+    ----------
+    file
+        The file as the user named it.
+    key
+        Dotted key of the offending value, '' for the file as a whole.
+    reason, remedy
+        As in `LinkageError`.
+    line
+        Line of the key in the file, counted from 1; 0 where there is none.
+    """
+
+    def __init__(
+        self, file: str | PathLike[str], key: str, reason: str, remedy: str, line: int = 0
+    ) -> None:
+        self.file = str(file)
+        self.key = key
+        self.line = line
+        place = f'{self.file}:{line}' if line else self.file
+        super().__init__(f'{place}: {key}' if key else place, reason, remedy)
+
+
+class RecordingError(LinkageError):
+    """A recording that could not be started or could not go on; ``where`` is the bag's folder."""
+
+
+class BagError(LinkageError):
+    """A bag that cannot be read; ``where`` is its folder or file."""
+
+
+def quoted(value: Any) -> str:
+    """Return a value as an error message shows it: on one line, and not without end."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_VALUE else f'{text[: _LONGEST_VALUE - 1]}…'

@@ -1,0 +1,106 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What a linkage is: links with named points, pins, sliders, the input and the joints to publish.
+
+Lengths are in metres, angles in radians. A point named on two links is a pin between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+Point = tuple[float, float]
+
+GROUND = 'ground'
+"""The name of the link that does not move; its frame is the frame of the linkage."""
+
+Side = Literal['left', 'right', 'ahead', 'behind']
+
+
+@dataclass(frozen=True, slots=True)
+class Slider:
+    """
+    A point of one link that stays on a line of another (a pin in a slot, a rod in a swivel).
+
+    Attributes
+    ----------
+    point
+        Name of the point; it is named on one link only.
+    along
+        Name of the link that carries the line.
+    through
+        Name of a point of ``along`` on the line; the slide is measured from it, in [m].
+    direction
+        Direction of the line in the frame of ``along``, any length but zero.
+    """
+
+    point: str
+    along: str
+    through: str
+    direction: Point
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """The driven joint: the angle of ``child`` less that of ``parent``, named ``joint``."""
+
+    joint: str
+    parent: str
+    child: str
+
+
+@dataclass(frozen=True, slots=True)
+class RevoluteJoint:
+    """A published angle: that of ``child`` less that of ``parent``, in [rad], as URDF has it."""
+
+    parent: str
+    child: str
+
+
+@dataclass(frozen=True, slots=True)
+class SlideJoint:
+    """A published slide: the position of a slider's point along its line, in [m]."""
+
+    slider: str
+
+
+@dataclass(frozen=True, slots=True)
+class Linkage:
+    """
+    A planar linkage, as a linkage file says it.
+
+    Attributes
+    ----------
+    links
+        For each link its points, by name, in the link's own frame, in [m].
+    input
+        The driven joint.
+    assembly
+        For the pin or slider that closes a dyad, the side on which it lies.
+    joints
+        What is published, in this order.
+    sliders
+        The sliders, by name.
+    """
+
+    links: Mapping[str, Mapping[str, Point]]
+    input: Input
+    assembly: Mapping[str, Side]
+    joints: Mapping[str, RevoluteJoint | SlideJoint]
+    sliders: Mapping[str, Slider]

@@ -1,0 +1,131 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+From a scene to its tick: drive, closure, the stages that the scene calls for, and the message.
+
+Building puts in only what the scene names; a tick asks no scene.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import NamedTuple
+
+from linkage_ros.drives.topic import TopicDrive
+from linkage_ros.effects.stage import EFFECTS, Motion, Stage
+from linkage_ros.effects.turns import Continuous, Wrapped
+from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
+from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.scene.scene import Scene
+
+
+class Tick(NamedTuple):
+    """
+    What a tick came to.
+
+    Attributes
+    ----------
+    position
+        The loop at the tick; nothing where there is no crank.
+    motion
+        What is published; nothing where nothing is.
+    message
+        The JointState, serialized; empty where nothing is published.
+    """
+
+    position: Position | None
+    motion: Motion | None
+    message: bytes
+
+
+_SILENT = Tick(None, None, b'')
+
+
+class Pipeline:
+    """
+    A scene at work. To reset it, build it again.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+
+    Raises
+    ------
+    FileError
+        Where the scene names an effect that does not exist, or gives it a wrong parameter.
+    DefinitionError
+        Where the linkage does not close.
+    """
+
+    __slots__ = ('_drive', '_reader', '_stages', '_writer', 'closure')
+
+    def __init__(self, scene: Scene) -> None:
+        self.closure = Closure(scene.linkage)
+        self._reader = JointStateReader(scene.linkage.input.joint)
+        self._writer = JointStateWriter(list(scene.linkage.joints))
+        effects = {name: import_module(EFFECTS[name]) for name in EFFECTS if name in scene.effects}
+        stages: list[Stage] = [
+            effect.build(effect.read(scene.effects.section(name)), self.closure)
+            for name, effect in effects.items()
+        ]
+        scene.effects.finish(tuple(EFFECTS))
+        turns = Wrapped if scene.wrapped else Continuous
+        self._stages = (*stages, turns(self.closure.turning))
+        self._drive = TopicDrive(
+            scene.drive, needs_rate=any(e.NEEDS_CRANK_RATE for e in effects.values())
+        )
+
+    def offer(self, message: bytes, now: int) -> Rejection | None:
+        """
+        Take a crank message, serialized, or say why not.
+
+        Parameters
+        ----------
+        message
+            A ``sensor_msgs/msg/JointState`` in CDR.
+        now
+            The time, in [ns].
+        """
+        sample = self._reader.read(message)
+        if isinstance(sample, Rejection):
+            return sample
+        return self._drive.offer(sample, now)
+
+    def tick(self, now: int) -> Tick:
+        """
+        Return the linkage at a time.
+
+        Parameters
+        ----------
+        now
+            The time, and the stamp of the message, in [ns].
+        """
+        crank = self._drive.state(now)
+        if crank is None:
+            return _SILENT
+        position = self.closure.position(crank.angle)
+        if not position.joints:
+            return Tick(position, None, b'')
+        motion = Motion(crank, position, position.joints, ())
+        for stage in self._stages:
+            motion = stage(motion)
+        return Tick(position, motion, self._writer.write(now, motion.joints, motion.rates))
+
+    @property
+    def newest_stamp(self) -> int:
+        """Stamp of the newest good sample, in [ns]; 0 before the first."""
+        return self._drive.stamp

@@ -1,0 +1,111 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a bag needs to know of a topic, from the installed message packages and the graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import json
+import os
+from pathlib import Path
+import re
+import sys
+from typing import Any
+
+from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.errors import RecordingError
+from rclpy.qos import QoSProfile
+
+_FIELD = re.compile(r'^\s*(?P<type>[A-Za-z]\w*(?:/\w+)*)(?:<=\d+)?(?:\[[^\]]*\])?\s+[a-z]\w*')
+_PRIMITIVES = frozenset(
+    'bool byte char float32 float64 int8 uint8 int16 uint16 int32 uint32 int64 uint64 string '
+    'wstring'.split()
+)
+_SEPARATOR = f'\n{"=" * 80}\n'
+
+
+def bag_topic(name: str, message_type: Any, qos: QoSProfile) -> Topic:
+    """
+    Describe a topic for a bag.
+
+    Parameters
+    ----------
+    name
+        Resolved name.
+    message_type
+        The message's class.
+    qos
+        What is offered on the topic.
+
+    Raises
+    ------
+    RecordingError
+        Where the message's definition is not installed.
+    """
+    package, _, kind = message_type.__module__.split('.')[0], None, message_type.__name__
+    texts: dict[str, str] = {}
+    _collect(package, kind, texts)
+    first, *others = texts
+    definition = texts[first] + ''.join(
+        f'{_SEPARATOR}MSG: {other}\n{texts[other]}' for other in others
+    )
+    return Topic(
+        name, f'{package}/msg/{kind}', definition, _type_hash(package, kind), _qos(qos)
+    )
+
+
+def _collect(package: str, kind: str, texts: dict[str, str]) -> None:
+    """Collect the text of a type and, behind it, of all that it needs."""
+    if f'{package}/{kind}' in texts:
+        return
+    text = texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
+    for needed in _types(text):
+        needed_package, _, needed_kind = needed.rpartition('/')
+        _collect(needed_package or package, needed_kind, texts)
+
+
+def _types(text: str) -> Iterator[str]:
+    for line in text.splitlines():
+        field = _FIELD.match(line.split('#')[0])
+        if field and field['type'] not in _PRIMITIVES:
+            yield field['type']
+
+
+def _type_hash(package: str, kind: str) -> str:
+    described = json.loads(_share(package, f'{kind}.json').read_text('utf-8'))
+    hashes = {entry['type_name']: entry['hash_string'] for entry in described['type_hashes']}
+    return str(hashes[f'{package}/msg/{kind}'])
+
+
+def _share(package: str, file: str) -> Path:
+    # A robot's packages lie under the prefixes of its environment, the wheels' under the interpreter.
+    prefixes = [*filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)), sys.prefix]
+    for prefix in prefixes:
+        path = Path(prefix, 'share', package, 'msg', file)
+        if path.is_file():
+            return path
+    raise RecordingError(
+        f'{package}/msg/{file}', 'is not installed', f'install the ROS package {package}'
+    )
+
+
+def _qos(profile: QoSProfile) -> QosProfile:
+    return QosProfile(
+        history=profile.history.name.lower(),
+        depth=profile.depth,
+        reliability=profile.reliability.name.lower(),
+        durability=profile.durability.name.lower(),
+    )

@@ -1,0 +1,219 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What the node says of its health: ``diagnostic_msgs/DiagnosticArray``, once a period."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.kinematics.mobility import describe
+from linkage_ros.kinematics.status import Status
+from linkage_ros.ros.tick_loop import Counts, TickLoop
+
+OK, WARN, ERROR, STALE = (
+    DiagnosticStatus.OK,
+    DiagnosticStatus.WARN,
+    DiagnosticStatus.ERROR,
+    DiagnosticStatus.STALE,
+)
+
+_RATE_TOLERANCE = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Counts at one instant, of which two make a window."""
+
+    time: int = 0
+    ticks: int = 0
+    lost: int = 0
+    rejected: int = 0
+    toggles: int = 0
+    unclosed: int = 0
+
+    @classmethod
+    def of(cls, counts: Counts, time: int) -> Snapshot:
+        """Return the counts at a time, in [ns] of the steady clock."""
+        return cls(
+            time,
+            counts.ticks,
+            counts.lost,
+            sum(counts.rejected.values()),
+            counts.unclosed[Status.TOGGLE],
+            counts.unclosed[Status.OPEN] + counts.unclosed[Status.INDETERMINATE],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """
+    All that the diagnostics tell.
+
+    Attributes
+    ----------
+    node
+        Name of the node.
+    rate
+        Ticks wanted a second; 0 for one for every sample.
+    max_age
+        Age beyond which a sample is no crank, in [ns].
+    crank_topic
+        Resolved name of the crank's topic.
+    publishers
+        Who publishes on it.
+    loop
+        The tick.
+    before, now
+        Its counts at the beginning and the end of the window.
+    recording_failure
+        Why there is no recording although one was wanted; '' where there is none to tell.
+    """
+
+    node: str
+    scene: str
+    rate: float
+    max_age: int
+    crank_topic: str
+    publishers: Sequence[str]
+    loop: TickLoop
+    before: Snapshot
+    now: Snapshot
+    recording_failure: str
+
+    def statuses(self) -> list[DiagnosticStatus]:
+        """Return the statuses, one for each task."""
+        return [self._tick(), self._crank(), self._closure(), self._recording()]
+
+    def _tick(self) -> DiagnosticStatus:
+        window = max(self.now.time - self.before.time, 1) / NANOSECONDS
+        ticks = self.now.ticks - self.before.ticks
+        lost = self.now.lost - self.before.lost
+        actual = ticks / window
+        lowest = self.rate * (1.0 - _RATE_TOLERANCE)
+        level, message = OK, 'Ticking'
+        if actual < lowest:
+            level, message = WARN, f'{actual:.1f} ticks a second, {self.rate:g} wanted'
+        elif lost:
+            level, message = WARN, f'{lost} ticks lost'
+        # The keys of diagnostic_updater's FrequencyStatus, then our own.
+        values: dict[str, object] = {
+            'Events in window': ticks,
+            'Events since startup': self.loop.counts.ticks,
+            'Duration of window (s)': f'{window:.3f}',
+            'Actual frequency (Hz)': f'{actual:.3f}',
+        }
+        if self.rate:
+            lateness = self.loop.counts.lateness
+            values |= {
+                'Target frequency (Hz)': f'{self.rate:g}',
+                'Minimum acceptable frequency (Hz)': f'{lowest:g}',
+                'Maximum acceptable frequency (Hz)': f'{self.rate * (1 + _RATE_TOLERANCE):g}',
+                'Lost ticks': self.loop.counts.lost,
+                'Late by more than a period': self.loop.counts.late,
+                'Lateness p50 (us)': f'{lateness.percentile(50) / 1e3:.1f}',
+                'Lateness p99 (us)': f'{lateness.percentile(99) / 1e3:.1f}',
+                'Lateness max (us)': f'{lateness.longest / 1e3:.1f}',
+            }
+        values |= {
+            'Joint states published': self.loop.counts.published,
+            'Clock jumps back': self.loop.counts.clock_jumps,
+            'Resets': self.loop.counts.resets,
+        }
+        return self._status('tick', level, message, values)
+
+    def _crank(self) -> DiagnosticStatus:
+        counts = self.loop.counts
+        age = (self.now.time - counts.sample_at) / NANOSECONDS if counts.sample_at else inf
+        rejected = self.now.rejected - self.before.rejected
+        level, message = OK, 'Samples arriving'
+        if age * NANOSECONDS > self.max_age:
+            level = STALE
+            message = f'No crank for {age:.1f} s' if counts.sample_at else 'No crank yet'
+        elif len(self.publishers) > 1:
+            level, message = WARN, f'Several publishers: {", ".join(self.publishers)}'
+        elif rejected:
+            level, message = WARN, f'{rejected} samples rejected'
+        values: dict[str, object] = {
+            'Topic': self.crank_topic,
+            'Publishers': ', '.join(self.publishers),
+            'Samples received': counts.received,
+            'Samples used': counts.used,
+            'Samples rejected': self.now.rejected,
+            'Newest sample taken before (s)': f'{age:.3f}',
+        }
+        values |= {f'Rejected: {why.value}': n for why, n in counts.rejected.items() if n}
+        return self._status('crank', level, message, values)
+
+    def _closure(self) -> DiagnosticStatus:
+        counts = self.loop.counts
+        level, message = OK, 'Closed'
+        reachable = describe(self.loop.closure.crank_ranges)
+        last = counts.last_unclosed
+        if last is not None and self.now.unclosed > self.before.unclosed:
+            level = ERROR
+            message = (
+                f'Open by {last.gap:.6g} m; reachable: {reachable}'
+                if last.status is Status.OPEN
+                else 'Two pins coincide: the pose cannot be told'
+            )
+        elif self.now.toggles > self.before.toggles:
+            level, message = WARN, 'At a toggle: position valid, velocity not'
+        values: dict[str, object] = {
+            'Scene': self.scene,
+            'Reachable crank angles': reachable,
+            'Ticks at a toggle': counts.unclosed[Status.TOGGLE],
+            'Ticks open': counts.unclosed[Status.OPEN],
+            'Ticks indeterminate': counts.unclosed[Status.INDETERMINATE],
+            'Gap when last open (m)': f'{last.gap:.6g}' if last is not None else '0',
+        }
+        tick = counts.last
+        if tick is not None and tick.motion is not None:
+            values['Crank angle (rad)'] = f'{tick.motion.crank.angle:.6f}'
+            values['Residual (m)'] = f'{self.loop.closure.residual(tick.motion.position):.3g}'
+        return self._status('loop closure', level, message, values)
+
+    def _recording(self) -> DiagnosticStatus:
+        level, message = OK, 'Not recording'
+        values: dict[str, object] = {}
+        recorder = self.loop.recorder
+        if recorder is not None:
+            level, message = OK, 'Recording'
+            topics = recorder.inspect()
+            for topic in topics:
+                values[f'Recorded: {topic.name}'] = topic.recorded
+                values[f'Dropped: {topic.name}'] = topic.dropped
+            if any(topic.dropped for topic in topics):
+                level, message = WARN, 'The disk does not keep up: messages dropped'
+            if recorder.failure is not None:
+                level, message = ERROR, str(recorder.failure)
+        elif self.recording_failure:
+            level, message = ERROR, self.recording_failure
+        return self._status('recording', level, message, values)
+
+    def _status(
+        self, task: str, level: bytes, message: str, values: dict[str, object]
+    ) -> DiagnosticStatus:
+        return DiagnosticStatus(
+            level=level,
+            name=f'{self.node}: {task}',
+            message=message,
+            hardware_id=self.scene,
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )

@@ -1,0 +1,370 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The node: crank samples in, joint states of the dependent joints out.
+
+A lifecycle node. The tick has a thread of its own (`tick_loop`); what is here runs on the executor:
+transitions, services, parameters, diagnostics, and all that is logged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial, wraps
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from linkage_ros.bag.recorder import RecordingSummary
+from linkage_ros.errors import LinkageError, RecordingError
+from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.ros import pacing
+from linkage_ros.ros.bag_topics import bag_topic
+from linkage_ros.ros.diagnostics import Health, Snapshot
+from linkage_ros.ros.parameters import declare_parameters
+from linkage_ros.ros.run_recording import counted, start_recording
+from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
+from linkage_ros.ros.warnings import Warnings
+from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.scene import Scene
+from rclpy.callback_groups import CallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+CRANK_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Sensor data, but deeper: at a slow tick every sample still gets into the bag."""
+
+OUTPUT_QOS = QoSProfile(depth=10)
+"""Reliable, volatile, as robot_state_publisher and RViz take it."""
+
+_CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+_DIAGNOSTICS_QOS = QoSProfile(depth=1)
+_WATCH_PERIOD = 0.2
+
+Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
+
+
+def _reporting(transition: Transition) -> Transition:
+    """Log what a transition raises: rclpy would swallow it."""
+
+    @wraps(transition)
+    def reported(node: LinkageNode, state: LifecycleState) -> TransitionCallbackReturn:
+        try:
+            return transition(node, state)
+        except Exception as error:
+            node.get_logger().error(f'{transition.__name__}: {type(error).__name__}: {error}')
+            return TransitionCallbackReturn.ERROR
+
+    return reported
+
+
+class LinkageNode(LifecycleNode):
+    """Solves a linkage for a crank; the README lists topics, parameters and services."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('linkage_node', **options)
+        declare_parameters(self)
+        self.failure: LinkageError | None = None
+        """Why the node could not be configured."""
+        self.recording_failure = ''
+        """Why a recording could not be started or ended early; '' where none did."""
+        self.recordings: list[RecordingSummary] = []
+        """The recordings that have ended."""
+        self.scene: Scene | None = None
+        self.loop: TickLoop | None = None
+        """The tick of this run, or of the last; nothing before the first."""
+
+        overridable = QoSOverridingOptions.with_default_policies()
+        self._joint_states = self.create_publisher(
+            JointState, 'joint_states', OUTPUT_QOS, qos_overriding_options=overridable
+        )
+        self._diagnostics = self.create_publisher(
+            DiagnosticArray, '/diagnostics', _DIAGNOSTICS_QOS
+        )
+        taken_by_tick = _TakenByTick()
+        self._crank = self.create_subscription(
+            JointState,
+            'crank_states',
+            _never_called,
+            CRANK_QOS,
+            callback_group=taken_by_tick,
+            qos_overriding_options=overridable,
+        )
+        self._simulation = self.create_subscription(
+            ClockMessage, '/clock', _never_called, _CLOCK_QOS, callback_group=taken_by_tick
+        )
+        self.create_service(Trigger, '~/reset', self._on_reset)
+        self.create_service(Trigger, '~/start_recording', self._on_start_recording)
+        self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
+        # Not by the node's clock, which stands still where the simulation does.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_WATCH_PERIOD, self._watch, clock=steady)
+        self._warnings = Warnings(self.get_logger())
+        self._before = Snapshot()
+
+    @property
+    def crank_topic(self) -> str:
+        """Resolved name of the topic from which the crank comes."""
+        return str(self._crank.topic_name)
+
+    # Transitions.
+
+    @_reporting
+    def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Load the scene and build what it calls for."""
+        file = self.get_parameter('scene').value
+        try:
+            if not file:
+                raise LinkageError(
+                    'parameter scene', "'' names no file", 'start with --ros-args -p scene:=FILE'
+                )
+            scene = load_scene(file)
+            loop = self._build_loop(scene)
+        except LinkageError as error:
+            self.failure = error
+            self.get_logger().error(str(error))
+            return TransitionCallbackReturn.FAILURE
+        self.failure, self.scene, self.loop = None, scene, loop
+        return TransitionCallbackReturn.SUCCESS
+
+    @_reporting
+    def on_activate(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Start to tick, and to record where the scene says so."""
+        assert self.scene is not None
+        self.loop = self._build_loop(self.scene)
+        while self._crank.handle.take_message(JointState, True) is not None:
+            pass  # what came before this moment is not of this run
+        self._before = Snapshot.of(self.loop.counts, time.monotonic_ns())
+        if self.scene.record is not None:
+            self._start_recording()
+        self.loop.start(self._pace(self.scene.rate))
+        rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
+        self.get_logger().info(
+            f'{self.scene.name}: ticking {rate}; '
+            f'crank {self.scene.linkage.input.joint} from {self.crank_topic}; '
+            f'{", ".join(self.scene.linkage.joints)} to {self._joint_states.topic_name}'
+        )
+        return TransitionCallbackReturn.SUCCESS
+
+    @_reporting
+    def on_deactivate(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Stop ticking and close the bag."""
+        self.end()
+        return TransitionCallbackReturn.SUCCESS
+
+    @_reporting
+    def on_cleanup(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Forget the scene."""
+        self.scene = None
+        return TransitionCallbackReturn.SUCCESS
+
+    @_reporting
+    def on_shutdown(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """End, from any state."""
+        self.end()
+        return TransitionCallbackReturn.SUCCESS
+
+    @_reporting
+    def on_error(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Return to unconfigured."""
+        self.get_logger().error('a transition failed; the node is unconfigured now')
+        self.end()
+        return TransitionCallbackReturn.SUCCESS
+
+    def _build_loop(self, scene: Scene) -> TickLoop:
+        shared = self.crank_topic == self._joint_states.topic_name
+        return TickLoop(
+            partial(Pipeline, scene),
+            partial(self._crank.handle.take_message, JointState, True),
+            self._joint_states.handle.publish_raw,
+            JointStateWriter(list(scene.linkage.joints)).names if shared else b'',
+        )
+
+    def _pace(self, rate: float) -> Pace:
+        simulated = self.get_parameter('use_sim_time').value
+        if rate and simulated:
+            return pacing.on_clock(self.context, self._simulation, rate)
+        if rate:
+            return pacing.steady(rate)
+        clock = self.get_clock()
+        now = (lambda: int(clock.now().nanoseconds)) if simulated else time.time_ns
+        return pacing.on_samples(self.context, self._crank, now)
+
+    def end(self) -> None:
+        """Stop ticking and close the bag; where nothing runs, do nothing."""
+        if self.loop is not None and self.loop.running:
+            self.loop.stop()
+            self._diagnose()
+            self._stop_recording()
+
+    # Recording.
+
+    def _start_recording(self) -> str:
+        """Start a bag and return what came of it, as one line."""
+        assert self.scene is not None and self.loop is not None
+        offered = [
+            info.qos_profile for info in self.get_publishers_info_by_topic(self.crank_topic)
+        ]
+        try:
+            self.loop.recorder = start_recording(
+                self.scene,
+                self.get_parameter('runs_directory').value,
+                [
+                    bag_topic(self.crank_topic, JointState, [*offered, CRANK_QOS][0]),
+                    bag_topic(
+                        self._joint_states.topic_name, JointState, self._joint_states.qos_profile
+                    ),
+                    bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS),
+                ],
+            )
+        except RecordingError as error:
+            self.recording_failure = f'not recording: {error}'
+            self.get_logger().error(self.recording_failure)
+            return self.recording_failure
+        self.recording_failure = ''
+        line = f'recording to {self.loop.recorder.folder}'
+        self.get_logger().info(line)
+        return line
+
+    def _stop_recording(self) -> str:
+        """Close the bag and return what came of it, as one line."""
+        if self.loop is None or self.loop.recorder is None:
+            return 'not recording'
+        recorder, self.loop.recorder = self.loop.recorder, None
+        summary = recorder.stop()
+        self.recordings.append(summary)
+        if summary.failure:
+            self.recording_failure = f'recording ended early: {summary.failure}'
+            line = f'{self.recording_failure}: {counted(summary)}'
+            self.get_logger().error(line)
+        else:
+            line = f'recorded {summary.folder}: {counted(summary)}'
+            self.get_logger().info(line)
+        return line
+
+    # Services.
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self.loop is None or not self.loop.running:
+            return _answer(response, False, 'not active: nothing to reset')
+        self.loop.reset_requested = True
+        return _answer(response, True, 'crank and turns are forgotten before the next tick')
+
+    def _on_start_recording(
+        self, _: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        if self.loop is None or not self.loop.running:
+            return _answer(response, False, 'not active: nothing to record')
+        if self.loop.recorder is not None:
+            return _answer(response, False, f'already recording to {self.loop.recorder.folder}')
+        line = self._start_recording()
+        return _answer(response, self.loop.recorder is not None, line)
+
+    def _on_stop_recording(
+        self, _: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        recording = self.loop is not None and self.loop.recorder is not None
+        line = self._stop_recording()
+        return _answer(response, recording and not self.recordings[-1].failure, line)
+
+    # Watching.
+
+    def _watch(self) -> None:
+        """Log what the tick has counted, and publish the diagnostics when they are due."""
+        loop = self.loop
+        if loop is None or not loop.running:
+            return
+        period = self.get_parameter('warning_period').value
+        self._warnings.look(loop.counts, loop.closure, self.crank_topic, period)
+        if loop.failure:
+            self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
+        if loop.recorder is not None and loop.recorder.failure is not None:
+            self._stop_recording()
+        due = self._before.time + self.get_parameter('diagnostics_period').value * NANOSECONDS
+        if time.monotonic_ns() >= due - 0.5 * _WATCH_PERIOD * NANOSECONDS:
+            self._diagnose()
+
+    def _diagnose(self) -> None:
+        assert self.loop is not None and self.scene is not None
+        publishers = self._crank_publishers()
+        if len(publishers) > 1:
+            self._warnings.say(
+                'publishers',
+                f'{self.crank_topic}: several publishers, {" and ".join(publishers)}; '
+                'stop all but one',
+                self.get_parameter('warning_period').value,
+            )
+        simulated = self.get_parameter('use_sim_time').value
+        now = Snapshot.of(self.loop.counts, time.monotonic_ns())
+        health = Health(
+            node=self.get_name(),
+            scene=self.scene.name,
+            rate=0.0 if simulated else self.scene.rate,
+            max_age=self.scene.drive.max_age,
+            crank_topic=self.crank_topic,
+            publishers=publishers,
+            loop=self.loop,
+            before=self._before,
+            now=now,
+            recording_failure=self.recording_failure,
+        )
+        self._before = now
+        message = DiagnosticArray(status=health.statuses())
+        message.header.stamp = self.get_clock().now().to_msg()
+        data = serialize_message(message)
+        self._diagnostics.publish(data)
+        if self.loop.recorder is not None:
+            stamp = time.time_ns()
+            self.loop.recorder.offer(DIAGNOSTICS, stamp, stamp, data)
+
+    def _crank_publishers(self) -> list[str]:
+        """Return who publishes the crank; where others share the topic, no one can tell."""
+        if self.crank_topic == self._joint_states.topic_name:
+            return []
+        return [
+            f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+            for info in self.get_publishers_info_by_topic(self.crank_topic)
+        ]
+
+
+class _TakenByTick(CallbackGroup):
+    """A group whose entities no executor waits for: the tick takes from them itself."""
+
+    def can_execute(self, _: Any) -> bool:
+        return False
+
+    def beginning_execution(self, _: Any) -> bool:
+        return False
+
+    def ending_execution(self, _: Any) -> None:
+        pass
+
+
+def _never_called(_: Any) -> None:
+    pass
+
+
+def _answer(response: Trigger.Response, success: bool, message: str) -> Trigger.Response:
+    response.success = success
+    response.message = message
+    return response

@@ -1,0 +1,82 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The node's parameters, declared with their units and bounds."""
+
+from __future__ import annotations
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    ParameterDescriptor,
+    ParameterType,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+_PERIOD = FloatingPointRange(from_value=0.1, to_value=3600.0)
+
+
+def declare_parameters(node: Node) -> None:
+    """Declare the parameters of the linkage node."""
+    for name, default, description in (
+        ('scene', '', 'Path of the scene file'),
+        ('runs_directory', '', "Folder of the bags; '' for the scene's own"),
+    ):
+        node.declare_parameter(
+            name,
+            default,
+            ParameterDescriptor(
+                type=ParameterType.PARAMETER_STRING, description=description, read_only=True
+            ),
+        )
+    node.declare_parameter(
+        'autostart',
+        True,
+        ParameterDescriptor(
+            type=ParameterType.PARAMETER_BOOL,
+            description='Whether the node configures and activates itself',
+            read_only=True,
+        ),
+    )
+    for name, default_period, description in (
+        ('diagnostics_period', 1.0, 'Time between two diagnostics [s]'),
+        ('warning_period', 5.0, 'Least time between two warnings of one kind [s]'),
+    ):
+        node.declare_parameter(
+            name,
+            default_period,
+            ParameterDescriptor(
+                type=ParameterType.PARAMETER_DOUBLE,
+                description=description,
+                floating_point_range=[_PERIOD],
+                additional_constraints='may be changed at any time',
+            ),
+        )
+    node.add_on_set_parameters_callback(_explain)
+
+
+def _explain(parameters: list[Parameter]) -> SetParametersResult:
+    """Say why a period is refused: rclpy's own answer to a NaN is to take it."""
+    for parameter in parameters:
+        if parameter.name in ('diagnostics_period', 'warning_period'):
+            value = parameter.value
+            if not _PERIOD.from_value <= value <= _PERIOD.to_value:
+                return SetParametersResult(
+                    successful=False,
+                    reason=f'{parameter.name}: {value} is out of bounds; '
+                    f'set {_PERIOD.from_value} to {_PERIOD.to_value} s',
+                )
+    return SetParametersResult(successful=True)

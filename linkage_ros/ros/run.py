@@ -1,0 +1,103 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Run nodes in this process until a signal ends them: ROS up, spin, ROS down, exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import sys
+from threading import Event
+
+from linkage_ros.errors import LinkageError
+from linkage_ros.ros.node import LinkageNode
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.signals import SignalHandlerOptions
+
+EXIT_OK, EXIT_INCOMPLETE, EXIT_CONFIGURATION = 0, 1, 2
+
+_SWITCH_INTERVAL = 1e-4
+_SPIN = 0.1
+
+
+def run_linkage_node(
+    stop: Event,
+    arguments: list[str],
+    every_spin: Callable[[LinkageNode], None] | None = None,
+    at_end: Callable[[LinkageNode], None] | None = None,
+) -> int:
+    """
+    Run the linkage node until the event.
+
+    Parameters
+    ----------
+    stop
+        Ends the run; `linkage_ros.stop` sets it on signals.
+    arguments
+        Command line with ``--ros-args``, without the program's name.
+    every_spin
+        Called about ten times a second.
+    at_end
+        Called when the run has ended and its bag is closed.
+
+    Returns
+    -------
+    code : int
+        0; 1 where the recording failed or the tick ended early; 2 for a configuration that is wrong.
+    """
+    # The tick shares the interpreter with executor and recorder: at the default of 5 ms it would wait
+    # for them that long.
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    try:
+        rclpy.init(args=['linkage_node', *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        node = LinkageNode()
+    except Exception as error:  # rcl's errors have no common root, and none is worth a traceback
+        print(f'linkage_node: {_first_line(error)}; see --ros-args in the README', file=sys.stderr)
+        rclpy.try_shutdown()
+        return EXIT_CONFIGURATION
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        if node.get_parameter('autostart').value:
+            node.trigger_configure()
+            if node.failure is not None:
+                return EXIT_CONFIGURATION
+            if node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
+                return EXIT_INCOMPLETE
+        while not stop.is_set() and rclpy.ok():
+            executor.spin_once(timeout_sec=_SPIN)
+            if every_spin is not None:
+                every_spin(node)
+            if node.loop is not None and node.loop.failure:
+                break
+        node.end()
+        if at_end is not None:
+            at_end(node)
+        failed = node.recording_failure or (node.loop is not None and node.loop.failure)
+        return EXIT_INCOMPLETE if failed else EXIT_OK
+    except LinkageError as error:
+        print(f'linkage_node: {error}', file=sys.stderr)
+        return EXIT_CONFIGURATION
+    finally:
+        node.end()
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _first_line(error: Exception) -> str:
+    return ' '.join((str(error).strip() or type(error).__name__).splitlines()[:1])

@@ -1,0 +1,195 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The tick, from the newest crank sample to the published bytes.
+
+One thread, no executor: it waits (for a time, a sample or the simulation's clock), takes what has
+come, solves, publishes, and hands the same bytes to the recorder. It never logs and never waits for
+another thread; what it has seen stands in its counts, for others to read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from threading import Event, Thread
+from time import monotonic_ns
+from typing import Any
+
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.joint_state import Rejection
+from linkage_ros.kinematics.closure import Position
+from linkage_ros.kinematics.status import Status
+from linkage_ros.pipeline import Pipeline, Tick
+from linkage_ros.ros.duration_histogram import DurationHistogram
+
+CRANK, JOINT_STATES, DIAGNOSTICS = range(3)
+"""The recorder's topics."""
+
+
+@dataclass(slots=True)
+class Counts:
+    """What the tick has seen since it began; written by its thread alone."""
+
+    ticks: int = 0
+    published: int = 0
+    silent: int = 0
+    lost: int = 0
+    late: int = 0
+    clock_jumps: int = 0
+    resets: int = 0
+    received: int = 0
+    used: int = 0
+    rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
+    lateness: DurationHistogram = field(default_factory=DurationHistogram)
+    last: Tick | None = None
+    unclosed: dict[Status, int] = field(default_factory=lambda: dict.fromkeys(Status, 0))
+    last_unclosed: Position | None = None
+    sample_at: int = 0
+    """When the newest good sample was taken, on the steady clock, in [ns]; 0 before the first."""
+
+
+Take = Callable[[], 'tuple[bytes, dict[str, Any]] | None']
+Pace = Callable[['TickLoop', Event], None]
+"""Runs a tick loop until the event: waits, and calls `tick_at` or `tick_samples`."""
+
+
+class TickLoop:
+    """
+    Drives a pipeline.
+
+    Parameters
+    ----------
+    build
+        Builds the pipeline; called again for a reset.
+    take
+        Takes the next crank message, as bytes and message info; nothing where there is none.
+    publish
+        Publishes a serialized JointState.
+    own
+        What the node's own messages have behind the stamp where they come back on the crank's topic,
+        so that they can be told; empty where they do not.
+    """
+
+    def __init__(
+        self,
+        build: Callable[[], Pipeline],
+        take: Take,
+        publish: Callable[[bytes], None],
+        own: bytes = b'',
+    ) -> None:
+        self._build = build
+        self._take = take
+        self._publish = publish
+        self._own = own
+        self._last_time = 0
+        self._pipeline = build()
+        self._stopping = Event()
+        self.closure = self._pipeline.closure
+        self._thread: Thread | None = None
+        self.counts = Counts()
+        self.recorder: Recorder | None = None
+        self.reset_requested = False
+        self.failure = ''
+
+    def start(self, pace: Pace) -> None:
+        """Start ticking on a thread of its own."""
+        self._stopping.clear()
+        self._thread = Thread(target=self._guarded, args=(pace,), name='tick', daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop ticking and wait for the end of the last tick."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    @property
+    def running(self) -> bool:
+        """Whether it has been started and not stopped."""
+        return self._thread is not None
+
+    def take(self, now: int) -> bool | None:
+        """Take the next message; return whether it was good, nothing where there is none."""
+        taken = self._take()
+        if taken is None:
+            return None
+        message, info = taken
+        if self._own and message[12 : 12 + len(self._own)] == self._own:
+            return False
+        counts = self.counts
+        counts.received += 1
+        if self.recorder is not None:
+            self.recorder.offer(CRANK, now, info['source_timestamp'], message)
+        rejection = self._pipeline.offer(message, now)
+        if rejection is not None:
+            counts.rejected[rejection] += 1
+            return False
+        counts.sample_at = monotonic_ns()
+        return True
+
+    def tick_at(self, now: int) -> None:
+        """Take every message that has come and tick at a time, in [ns]."""
+        self._begin(now)
+        good = False
+        while (taken := self.take(now)) is not None:
+            good = good or taken
+        self.counts.used += good
+        self._tick(now)
+
+    def tick_samples(self, now: int) -> None:
+        """Take every message that has come and tick once for each, at its stamp."""
+        self._begin(now)
+        while (taken := self.take(now)) is not None:
+            if taken:
+                self.counts.used += 1
+                self._tick(self._pipeline.newest_stamp)
+
+    def _begin(self, now: int) -> None:
+        """Build the pipeline anew where time has jumped back or one has asked."""
+        if now < self._last_time:
+            self.counts.clock_jumps += 1
+            self._pipeline = self._build()
+        elif self.reset_requested:
+            self.reset_requested = False
+            self.counts.resets += 1
+            self._pipeline = self._build()
+        self._last_time = now
+
+    def _tick(self, now: int) -> None:
+        """Solve for a time, in [ns]; publish, record and count."""
+        counts = self.counts
+        tick = self._pipeline.tick(now)
+        counts.ticks += 1
+        counts.last = tick
+        if tick.message:
+            self._publish(tick.message)
+            if self.recorder is not None:
+                self.recorder.offer(JOINT_STATES, now, now, tick.message)
+            counts.published += 1
+        if tick.position is None:
+            counts.silent += 1
+        elif tick.position.status is not Status.CLOSED:
+            counts.unclosed[tick.position.status] += 1
+            counts.last_unclosed = tick.position
+
+    def _guarded(self, pace: Pace) -> None:
+        # A defect here must neither vanish with its thread nor show a traceback.
+        try:
+            pace(self, self._stopping)
+        except Exception as error:
+            self.failure = f'{type(error).__name__}: {error}'

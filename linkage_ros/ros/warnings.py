@@ -1,0 +1,117 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Warnings in words, each kind at most once in a while.
+
+The gate is our own: a log line that rclpy's throttle suppresses costs 150 µs.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from time import monotonic
+
+from linkage_ros.joint_state import Rejection
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.mobility import describe
+from linkage_ros.kinematics.status import Status
+from linkage_ros.ros.tick_loop import Counts
+from rclpy.impl.rcutils_logger import RcutilsLogger
+
+_REMEDIES = {
+    Rejection.MALFORMED: 'the publisher must send sensor_msgs/JointState as plain CDR',
+    Rejection.EMPTY: 'fill name, position and velocity',
+    Rejection.UNEQUAL: 'fill name, position and velocity to one length',
+    Rejection.MISSING: 'remap crank_states, or name the joint as the linkage does',
+    Rejection.TWICE: 'name the joint once',
+    Rejection.NO_RATE: 'fill velocity, or set carry_forward: false and leave out velocity',
+    Rejection.NOT_FINITE: 'look at the sensor',
+    Rejection.TOO_LARGE: 'the unit is radians',
+    Rejection.STAMP_ZERO: 'stamp the messages',
+    Rejection.STAMP_INVALID: 'stamp the messages with the time',
+    Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
+    Rejection.STAMP_OLD: 'let one source publish, in order; ~/reset forgets the last stamp',
+}
+
+
+class Warnings:
+    """
+    What has been warned of, and when.
+
+    Parameters
+    ----------
+    logger
+        Where warnings go.
+    """
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        self._logger = logger
+        self._said: dict[str, float] = {}
+        self._rejected = dict.fromkeys(Rejection, 0)
+        self._unclosed = dict.fromkeys(Status, 0)
+        self._lost = 0
+
+    def look(self, counts: Counts, closure: Closure, crank_topic: str, period: float) -> None:
+        """
+        Warn of what has happened since the last warning of its kind.
+
+        Parameters
+        ----------
+        counts
+            The tick's.
+        closure
+            The linkage.
+        crank_topic
+            Where samples come from.
+        period
+            Least time between two warnings of a kind, in [s].
+        """
+        new = {r: n - self._rejected[r] for r, n in counts.rejected.items() if n > self._rejected[r]}
+        if new:
+            why = '; '.join(f'{r.value} ({n}): {_REMEDIES[r]}' for r, n in new.items())
+            line = f'{crank_topic}: {sum(new.values())} samples rejected: {why}'
+            if self.say('rejected', line, period):
+                self._rejected = dict(counts.rejected)
+        if counts.lost > self._lost and self.say(
+            'lost', f'{counts.lost - self._lost} ticks lost; lower the rate', period
+        ):
+            self._lost = counts.lost
+        for status, text in _UNCLOSED.items():
+            ticks = counts.unclosed[status] - self._unclosed[status]
+            if ticks and counts.last_unclosed is not None:
+                line = text.format(
+                    ticks=ticks,
+                    gap=counts.last_unclosed.gap,
+                    reachable=describe(closure.crank_ranges),
+                )
+                if self.say(status.value, line, period):
+                    self._unclosed[status] = counts.unclosed[status]
+
+    def say(self, kind: str, line: str, period: float) -> bool:
+        """Warn, unless that kind has been warned of within the period, in [s]."""
+        now = monotonic()
+        if now - self._said.get(kind, -inf) < period:
+            return False
+        self._said[kind] = now
+        self._logger.warning(line)
+        return True
+
+
+_UNCLOSED = {
+    Status.OPEN: '{ticks} ticks open by {gap:.6g} m, nothing published; reachable: {reachable}',
+    Status.INDETERMINATE: '{ticks} ticks with two pins in one place, nothing published; move the crank',
+    Status.TOGGLE: '{ticks} ticks at a toggle: positions published, velocities not',
+}

@@ -1,0 +1,150 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A linkage file, read into a `Linkage`; the shorthands stand for exactly such a file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.scene.yaml_file import Section
+
+
+def read_linkage(content: Section) -> Linkage:
+    """
+    Read a linkage and prove that it closes.
+
+    Raises
+    ------
+    FileError
+        With file, line and key of what is wrong.
+    """
+    for shorthand, expand in _SHORTHANDS.items():
+        if shorthand in content:
+            written_out = expand(content.section(shorthand))
+            content.finish(list(_SHORTHANDS))
+            return _closable(content, _linkage(Section(content.file, '', written_out)))
+    linkage = _linkage(content)
+    content.finish(list(_SHORTHANDS))
+    return _closable(content, linkage)
+
+
+def _linkage(content: Section) -> Linkage:
+    links = content.section('links')
+    points = {}
+    for name in links.keys():
+        link = links.section(name)
+        points[name] = {point: link.point(point) for point in link.keys()}
+
+    driven = content.section('input')
+    crank = Input(driven.text('joint'), driven.text('parent'), driven.text('child'))
+    driven.finish()
+
+    assembly = content.section('assembly')
+    sides = {
+        name: assembly.choice(name, ('left', 'right', 'ahead', 'behind')) for name in assembly.keys()
+    }
+
+    sliders = content.section('sliders', required=False)
+    joints = content.section('joints')
+    if not joints.keys():
+        raise content.error('joints', 'publishes nothing', 'name a joint')
+    if crank.joint in joints:
+        raise joints.error(crank.joint, 'is the input joint', 'publish the dependent joints')
+    return Linkage(
+        points,
+        crank,
+        sides,  # type: ignore[arg-type]  # the choice above is the Literal
+        {name: _joint(joints.section(name)) for name in joints.keys()},
+        {name: _slider(sliders.section(name)) for name in sliders.keys()},
+    )
+
+
+def _slider(content: Section) -> Slider:
+    slider = Slider(
+        content.text('point'),
+        content.text('along'),
+        content.text('through'),
+        content.point('direction'),
+    )
+    content.finish()
+    return slider
+
+
+def _joint(content: Section) -> RevoluteJoint | SlideJoint:
+    joint: RevoluteJoint | SlideJoint
+    if 'slider' in content:
+        joint = SlideJoint(content.text('slider'))
+    else:
+        joint = RevoluteJoint(content.text('parent'), content.text('child'))
+    content.finish(('slider',))
+    return joint
+
+
+def _closable(content: Section, linkage: Linkage) -> Linkage:
+    try:
+        Closure(linkage)
+    except DefinitionError as error:
+        raise content.error(error.where, error.reason, error.remedy) from None
+    return linkage
+
+
+def _four_bar(content: Section) -> dict[str, Any]:
+    """Write out crank a, coupler b, rocker c and ground d."""
+    a, b, c, d = (content.number(side, above=0.0, unit='m') for side in 'abcd')
+    side = content.choice('assembly', ('left', 'right'), 'left')
+    content.finish()
+    return {
+        'links': {
+            'ground': {'O2': [0, 0], 'O4': [d, 0]},
+            'crank': {'O2': [0, 0], 'A': [a, 0]},
+            'coupler': {'A': [0, 0], 'B': [b, 0]},
+            'rocker': {'O4': [0, 0], 'B': [c, 0]},
+        },
+        'input': {'joint': 'crank_joint', 'parent': 'ground', 'child': 'crank'},
+        'assembly': {'B': side},
+        'joints': {
+            'coupler_joint': {'parent': 'crank', 'child': 'coupler'},
+            'rocker_joint': {'parent': 'ground', 'child': 'rocker'},
+        },
+    }
+
+
+def _inverted_slider_crank(content: Section) -> dict[str, Any]:
+    """Write out crank a and the place of the swivel, from the crank's pivot."""
+    a = content.number('a', above=0.0, unit='m')
+    swivel = content.point('swivel')
+    side = content.choice('assembly', ('ahead', 'behind'), 'ahead')
+    content.finish()
+    return {
+        'links': {
+            'ground': {'O': [0, 0], 'C': list(swivel)},
+            'crank': {'O': [0, 0], 'B': [a, 0]},
+            'rod': {'B': [0, 0], 'end': [a + (swivel[0] ** 2 + swivel[1] ** 2) ** 0.5, 0]},
+        },
+        'sliders': {'swivel': {'point': 'C', 'along': 'rod', 'through': 'B', 'direction': [1, 0]}},
+        'input': {'joint': 'crank_joint', 'parent': 'ground', 'child': 'crank'},
+        'assembly': {'swivel': side},
+        'joints': {
+            'rod_joint': {'parent': 'crank', 'child': 'rod'},
+            'rod_slide': {'slider': 'swivel'},
+        },
+    }
+
+
+_SHORTHANDS = {'four_bar': _four_bar, 'inverted_slider_crank': _inverted_slider_crank}

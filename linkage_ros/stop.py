@@ -1,0 +1,38 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Signals that end a run: SIGINT, SIGTERM and SIGHUP set an event, and nothing else.
+
+Python's own handler would raise KeyboardInterrupt wherever the program happens to be, and rclpy's would
+take the context away from under a bag that is being closed.
+"""
+
+from __future__ import annotations
+
+import signal
+from threading import Event
+
+
+def stop_on_signals() -> Event:
+    """Install the handlers, and return the event that they set."""
+    stop = Event()
+
+    def handle(_number: int, _frame: object) -> None:
+        stop.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, handle)
+    return stop

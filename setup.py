@@ -1,0 +1,118 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Install linkage_ros with pip as well as with colcon."""
+
+from pathlib import Path
+import re
+
+from setuptools import find_packages, setup
+
+NAME = 'linkage_ros'
+HERE = Path(__file__).parent
+
+# Read, not imported: pip builds in an environment without the dependencies.
+VERSION = re.search(
+    r"^__version__ = '(.+)'$", (HERE / NAME / '__init__.py').read_text('utf-8'), re.MULTILINE
+).group(1)
+
+
+def shared(folder):
+    """Return data_files entries that keep the tree below a folder as it is."""
+    return [
+        (
+            f'share/{NAME}/{parent.as_posix()}',
+            sorted(
+                f'{parent.as_posix()}/{file.name}'
+                for file in (HERE / parent).iterdir()
+                if file.is_file() and not file.name.startswith('.')
+            ),
+        )
+        for parent in sorted(
+            {
+                file.relative_to(HERE).parent
+                for file in (HERE / folder).rglob('*')
+                if file.is_file() and '__pycache__' not in file.parts
+            }
+        )
+    ]
+
+
+# ROS is an extra: on a robot rclpy comes from apt and pip must leave it alone.
+ROS = ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces']
+REPORT = ['matplotlib', 'rich']
+# The name `test` matters: colcon runs pytest only when it finds it in this extra.
+TEST = ['pytest', 'pytest-timeout', 'hypothesis', 'mpmath', 'rosbags']
+STYLE = [
+    'mypy',
+    'ruff',
+    'types-PyYAML',
+    # ament's linters as Jazzy has them. The wheels leave flake8 and its plugins out.
+    'ros-ament-flake8>=0.17,<0.18',
+    'ros-ament-pep257>=0.17,<0.18',
+    'flake8',
+    # As Ubuntu 24.04 has it: 2.2 and later refuse modules named as one of the standard library.
+    'flake8-builtins>=2.1,<2.2',
+    'flake8-comprehensions',
+    'flake8-docstrings',
+    'flake8-import-order',
+    'flake8-quotes',
+    'pydocstyle',
+]
+COLCON = [
+    'colcon-bash',
+    'colcon-core',
+    'colcon-output',
+    'colcon-package-selection',
+    'colcon-ros',
+    'colcon-test-result',
+    # From 70.1 it builds wheels by itself; 80 took the develop command that --symlink-install
+    # needs.
+    'setuptools>=70.1,<80',
+]
+
+setup(
+    name=NAME,
+    version=VERSION,
+    description='Planar linkages for ROS 2: crank angle in, dependent joints out, run logged.',
+    author='The linkage_ros authors',
+    author_email='maintainers@linkage-ros.example',
+    maintainer='The linkage_ros authors',
+    maintainer_email='maintainers@linkage-ros.example',
+    license='Apache-2.0',
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        *shared('config'),
+        *shared('launch'),
+    ],
+    python_requires='>=3.10',
+    install_requires=['numpy>=1.26', 'mcap>=1.2', 'PyYAML'],
+    extras_require={
+        'ros': ROS,
+        'report': REPORT,
+        'test': TEST,
+        'dev': [*ROS, *REPORT, *TEST, *STYLE, *COLCON],
+    },
+    zip_safe=True,
+    entry_points={
+        'console_scripts': [
+            'linkage_node = linkage_ros.ros.linkage_node:main',
+            'crank_source = linkage_ros.ros.crank_source:main',
+            'linkage = linkage_ros.cli.main:main',
+        ],
+    },
+)

@@ -1,0 +1,90 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""ament's own linters have nothing to say, so that `colcon test` has not on a robot either."""
+
+import logging
+import re
+
+import pytest
+
+HEADER = """\
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+
+# Named one by one: a linter let loose on `.` would read build/ and install/ too.
+NAMES = ('setup.py', 'bench', 'launch', 'linkage_ros', 'test')
+
+
+@pytest.fixture
+def sources(root, monkeypatch):
+    monkeypatch.chdir(root)
+    return [name for name in NAMES if (root / name).exists()]
+
+
+@pytest.mark.linter
+def test_flake8(sources):
+    flake8 = pytest.importorskip('ament_flake8.main')
+    failed, errors = flake8.main_with_errors(argv=sources)
+    assert not failed, '\n'.join(['', *errors])
+
+
+@pytest.mark.linter
+def test_pep257(sources, capfd, caplog):
+    pep257 = pytest.importorskip('ament_pep257.main')
+    # It logs every file that it reads.
+    caplog.set_level(logging.WARNING, 'pydocstyle.utils')
+    failed = pep257.main(argv=sources)
+    assert not failed, '\n' + capfd.readouterr().err
+
+
+@pytest.mark.linter
+def test_copyright_by_ament(sources):
+    # No wheel of this one exists; on a robot it is there.
+    copyright_ = pytest.importorskip('ament_copyright.main')
+    assert copyright_.main(argv=['.', '--exclude', 'build', 'install', 'log']) == 0
+
+
+@pytest.mark.linter
+def test_copyright(root, sources):
+    files = [
+        file
+        for source in sources
+        for file in ([root / source] if source.endswith('.py') else (root / source).rglob('*.py'))
+    ]
+    without = [str(file) for file in files if not file.read_text('utf-8').startswith(HEADER)]
+    assert not without
+
+
+@pytest.mark.linter
+def test_contributions_come_under_the_licence(root):
+    # ament_copyright looks for this paragraph of the licence in CONTRIBUTING.md.
+    def words(name):
+        return ' '.join((root / name).read_text('utf-8').split())
+
+    (paragraph,) = re.findall(r'5\. Submission of Contributions.*?(?= 6\. )', words('LICENSE'))
+    assert paragraph in words('CONTRIBUTING.md')

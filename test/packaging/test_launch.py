@@ -1,0 +1,108 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""linkage.launch.py, run against stubs: no launch that pip could install exists."""
+
+from dataclasses import dataclass, field
+import importlib.util
+import sys
+from types import ModuleType
+
+import pytest
+
+
+@dataclass
+class Recorded:
+    """Takes the place of an action of launch: remembers what it was made with."""
+
+    arguments: tuple = ()
+    options: dict = field(default_factory=dict)
+
+    def __init__(self, *arguments, **options):
+        self.arguments = arguments
+        self.options = options
+
+    def perform(self, context):
+        """Substitute, as LaunchConfiguration does."""
+        return context[self.arguments[0]]
+
+
+@pytest.fixture
+def launch_file(root, monkeypatch):
+    stubs = {
+        'ament_index_python.packages': {'get_package_share_directory': lambda _: str(root)},
+        'launch': {'LaunchDescription': list},
+        'launch.actions': {'DeclareLaunchArgument': Recorded, 'OpaqueFunction': Recorded},
+        'launch.substitutions': {'LaunchConfiguration': Recorded},
+        'launch_ros.actions': {'Node': Recorded},
+    }
+    for name, contents in stubs.items():
+        stub = ModuleType(name)
+        vars(stub).update(contents)
+        monkeypatch.setitem(sys.modules, name, stub)
+        monkeypatch.setitem(
+            sys.modules, name.split('.')[0], sys.modules.get(name.split('.')[0], stub)
+        )
+    path = root / 'launch' / 'linkage.launch.py'
+    spec = importlib.util.spec_from_file_location('linkage_launch', path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def start(launch_file):
+    """Return a function that gives the nodes' options for some launch arguments."""
+
+    def start(**arguments):
+        *declared, function = launch_file.generate_launch_description()
+        context = {
+            argument.arguments[0]: argument.options['default_value'] for argument in declared
+        }
+        assert set(arguments) <= set(context)
+        return [node.options for node in function.options['function'](context | arguments)]
+
+    return start
+
+
+def test_by_default_the_node_runs_alone_with_the_installed_parameters(root, start):
+    (node,) = start()
+    assert node['executable'] == 'linkage_node'
+    assert node['parameters'] == [
+        str(root / 'config' / 'linkage_node.yaml'),
+        {'use_sim_time': False},
+    ]
+
+
+def test_a_scene_goes_before_that_of_the_parameter_file(start):
+    (node,) = start(scene='/scenes/mine.yaml', params_file='/mine.yaml')
+    assert node['parameters'][0] == '/mine.yaml'
+    assert node['parameters'][-1]['scene'] == '/scenes/mine.yaml'
+
+
+def test_arguments_reach_the_node(start):
+    (node,) = start(namespace='arm', use_sim_time='true', crank_states='joint_states')
+    assert node['namespace'] == 'arm'
+    assert node['parameters'][-1]['use_sim_time'] is True
+    assert node['remappings'] == [('crank_states', 'joint_states')]
+
+
+def test_a_urdf_starts_robot_state_publisher(start, tmp_path):
+    urdf = tmp_path / 'robot.urdf'
+    urdf.write_text('<robot name="r"/>', encoding='utf-8')
+    _, publisher = start(robot_description_file=str(urdf), namespace='arm')
+    assert publisher['package'] == publisher['executable'] == 'robot_state_publisher'
+    assert publisher['namespace'] == 'arm'
+    assert publisher['parameters'][0]['robot_description'] == '<robot name="r"/>'

@@ -1,0 +1,178 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The imports of linkage_ros point one way, and the core knows nothing of ROS."""
+
+import ast
+from collections import defaultdict
+from graphlib import CycleError, TopologicalSorter
+import sys
+
+import pytest
+
+PACKAGE = 'linkage_ros'
+
+# Rooms by height: a room may import from below its own height, and from its neighbours as long
+# as no two import each other.
+HEIGHTS = (
+    ('errors',),
+    ('kinematics',),
+    ('synthesis', 'scene', 'drives', 'joint_state'),
+    ('effects',),
+    ('pipeline',),
+    ('bag', 'accuracy'),
+    ('ros', 'cli'),
+)
+HEIGHT = {room: height for height, rooms in enumerate(HEIGHTS) for room in rooms}
+WITH_ROS = ('ros', 'cli')
+ROS = (
+    'ament_index_python',
+    'builtin_interfaces',
+    'diagnostic_msgs',
+    'lifecycle_msgs',
+    'rcl_interfaces',
+    'rclpy',
+    'rosgraph_msgs',
+    'sensor_msgs',
+    'std_msgs',
+    'std_srvs',
+)
+
+# An import of ours within a function is for pipeline.py, which imports what a scene calls for,
+# and for the command line, which starts fast. Elsewhere its line says why.
+LOCAL_IMPORTS = ('pipeline', 'cli')
+MARK = '# local import: '
+
+
+def _imported(module, node):
+    """Yield the dotted names that an import statement of a module names, made absolute."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+        return
+    base = node.module or ''
+    if node.level:
+        parents = module.split('.')[: -node.level]
+        base = '.'.join([*parents, base] if base else parents)
+    # `from linkage_ros import errors` imports the room errors, not the package.
+    yield from (f'{base}.{alias.name}' if base == PACKAGE else base for alias in node.names)
+
+
+def _imports(root):
+    """Yield (module, imported name, line, whether within a function) of all of linkage_ros."""
+    for path in sorted((root / PACKAGE).rglob('*.py')):
+        module = '.'.join(path.relative_to(root).with_suffix('').parts)
+        text = path.read_text('utf-8')
+        lines = text.splitlines()
+        tree = ast.parse(text, str(path))
+        within = {
+            id(inner)
+            for outer in ast.walk(tree)
+            if isinstance(outer, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+            for inner in ast.walk(outer)
+        }
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                for name in _imported(module, node):
+                    yield module, name, lines[node.lineno - 1], id(node) in within
+
+
+def _room(name):
+    """Return the room that a dotted name of ours lies in; '' is the package itself."""
+    room = name.split('.')[1:2]
+    return room[0] if room and room[0] in HEIGHT else ''
+
+
+@pytest.fixture(scope='module')
+def imports(root):
+    return list(_imports(root))
+
+
+@pytest.fixture(scope='module')
+def our_imports(imports):
+    return [found for found in imports if found[1].split('.')[0] == PACKAGE]
+
+
+def test_every_room_has_its_height(root):
+    rooms = {
+        path.stem
+        for path in (root / PACKAGE).iterdir()
+        if path.suffix == '.py' or (path / '__init__.py').exists()
+    }
+    assert rooms - {'__init__'} <= set(HEIGHT)
+
+
+def test_imports_point_down(our_imports):
+    up = [
+        f'{module} imports {name}'
+        for module, name, _, _ in our_imports
+        if HEIGHT.get(_room(name), -1) > HEIGHT.get(_room(module), -1)
+    ]
+    assert not up
+
+
+def test_neighbours_do_not_import_each_other(our_imports):
+    graph = defaultdict(set)
+    for module, name, _, _ in our_imports:
+        if _room(name) and _room(name) != _room(module):
+            graph[_room(module)].add(_room(name))
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(' imports '.join(reversed(error.args[1])), pytrace=False)
+
+
+def test_bag_needs_only_errors_save_to_replay(our_imports):
+    strangers = [
+        f'{module} imports {name}'
+        for module, name, _, _ in our_imports
+        if _room(module) == 'bag'
+        and not module.startswith(f'{PACKAGE}.bag.replay')
+        and _room(name) not in ('', 'bag', 'errors')
+    ]
+    assert not strangers
+
+
+def test_kinematics_needs_only_numpy(imports):
+    strangers = [
+        f'{module} imports {name}'
+        for module, name, _, _ in imports
+        if _room(module) == 'kinematics'
+        and name.split('.')[0] not in {*sys.stdlib_module_names, 'numpy', PACKAGE}
+    ]
+    assert not strangers
+
+
+def test_the_core_names_no_ros(imports):
+    strangers = [
+        f'{module} imports {name}'
+        for module, name, _, _ in imports
+        if _room(module) not in WITH_ROS and name.split('.')[0] in ROS
+    ]
+    assert not strangers
+
+
+def test_local_imports_say_why(our_imports):
+    unmarked = [
+        f'{module}: {line.strip()}'
+        for module, _, line, within in our_imports
+        if within and _room(module) not in LOCAL_IMPORTS and not line.partition(MARK)[2].strip()
+    ]
+    assert not unmarked
+
+
+def test_the_core_imports_where_there_is_no_ros(root, import_core):
+    file, count = import_core(sys.executable, skip=WITH_ROS, refuse=ROS, cwd=root)
+    assert file == root / PACKAGE / '__init__.py'
+    assert count > len(HEIGHTS)

@@ -1,0 +1,88 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The manifests agree with each other, and the tools that read them can."""
+
+from configparser import ConfigParser
+import re
+import xml.etree.ElementTree as ET
+
+import pytest
+import yaml
+
+
+@pytest.fixture(scope='module')
+def package_xml(root):
+    return ET.parse(root / 'package.xml').getroot()
+
+
+def test_one_version(root, package_xml):
+    text = (root / 'linkage_ros' / '__init__.py').read_text('utf-8')
+    assert re.findall(r"^__version__ = '(.+)'$", text, re.MULTILINE) == [
+        package_xml.findtext('version')
+    ]
+
+
+def test_package_xml_is_valid(root):
+    package = pytest.importorskip('catkin_pkg.package')
+    warnings = []
+    parsed = package.parse_package(str(root), warnings=warnings)
+    parsed.validate(warnings=warnings)
+    assert not warnings
+    assert parsed.get_build_type() == 'ament_python'
+
+
+def test_every_ros_import_is_declared(root, package_xml):
+    ours = r'builtin_interfaces|\w+_msgs|rcl_interfaces|rclpy|std_srvs|launch_ros'
+    imported = set()
+    for folder in ('linkage_ros', 'launch'):
+        for path in (root / folder).rglob('*.py'):
+            text = path.read_text('utf-8')
+            imported |= set(re.findall(rf'^\s*(?:from|import) ({ours})\b', text, re.MULTILINE))
+    assert imported <= {depend.text for depend in package_xml.iter('exec_depend')}
+
+
+def test_executables_go_where_ros2_run_looks(root):
+    config = ConfigParser()
+    config.read(root / 'setup.cfg')
+    assert config['develop']['script_dir'] == '$base/lib/linkage_ros'
+    assert config['install']['install_scripts'] == '$base/lib/linkage_ros'
+
+
+def test_changelog_names_the_package(root):
+    # catkin_prepare_release takes the heading literally.
+    changelog = (root / 'CHANGELOG.rst').read_text('utf-8')
+    assert 'Changelog for package linkage_ros\n^^^' in changelog
+
+
+def test_parameter_file_has_the_shape_that_rcl_reads(root):
+    parameters = yaml.safe_load((root / 'config' / 'linkage_node.yaml').read_text('utf-8'))
+    assert list(parameters) == ['/**']
+    assert list(parameters['/**']) == ['ros__parameters']
+    assert parameters['/**']['ros__parameters'] == {
+        'scene': '',
+        'autostart': True,
+        'diagnostics_period': 1.0,
+        'warning_period': 5.0,
+        'runs_directory': '',
+    }
+
+
+def test_policy_grants_no_wildcard(root):
+    policy = ET.parse(root / 'policy.xml').getroot()
+    assert (policy.tag, policy.get('version')) == ('policy', '0.2.0')
+    names = [name.text for kind in ('topic', 'service') for name in policy.iter(kind)]
+    assert len(names) == len(set(names))
+    assert all(re.fullmatch(r'(~?/)?[a-z_]+', name) for name in names)

@@ -1,0 +1,91 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A wheel holds all that the core needs, and all that ROS looks for under share/."""
+
+import sys
+import sysconfig
+import venv
+
+import pytest
+
+pytest.importorskip('pip', reason='a robot has no pip')
+pytest.importorskip('setuptools', minversion='70.1', reason='older ones build no wheel alone')
+
+ROS = ('rclpy', 'sensor_msgs', 'std_msgs', 'std_srvs', 'diagnostic_msgs', 'lifecycle_msgs')
+REPORT = ('matplotlib', 'rich')
+
+
+@pytest.fixture(scope='module')
+def prefix(tmp_path_factory, copy_checkout, run):
+    """Return a fresh environment that has linkage_ros from its wheel, and no extras."""
+    folder = tmp_path_factory.mktemp('wheel')
+    source = copy_checkout(folder / 'source')
+    prefix = folder / 'environment'
+    venv.create(prefix, with_pip=False, symlinks=True)
+    pip = [sys.executable, '-m', 'pip', '--disable-pip-version-check']
+    build = ['wheel', '--no-deps', '--no-build-isolation', '--no-index', '-w', folder, source]
+    run(*pip, *build, cwd=folder)
+    (wheel,) = folder.glob('*.whl')
+    install = ['--python', prefix, 'install', '--no-deps', '--no-index', wheel]
+    run(*pip, *install, cwd=folder)
+    # numpy, mcap and PyYAML are borrowed from this environment, which saves their download.
+    (site,) = prefix.glob('lib/python*/site-packages')
+    (site / 'borrowed.pth').write_text(sysconfig.get_path('purelib'), encoding='utf-8')
+    return prefix
+
+
+def test_core_imports_without_extras(prefix, import_core):
+    file, _ = import_core(
+        prefix / 'bin' / 'python',
+        # The report draws, so that it may need its extra.
+        skip=('ros', 'cli', 'accuracy'),
+        refuse=ROS + REPORT,
+        cwd=prefix,
+    )
+    assert file.is_relative_to(prefix)
+
+
+def test_share_is_what_the_checkout_has(prefix, root):
+    share = prefix / 'share' / 'linkage_ros'
+    for folder in ('config', 'launch'):
+        expected, found = (
+            {
+                path.relative_to(base / folder)
+                for path in (base / folder).rglob('*')
+                if path.is_file() and path.suffix != '.pyc'
+            }
+            for base in (root, share)
+        )
+        assert found == expected
+        assert found
+    assert (share / 'package.xml').read_bytes() == (root / 'package.xml').read_bytes()
+    index = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages' / 'linkage_ros'
+    assert index.is_file()
+
+
+def test_tests_and_benchmarks_stay_out(prefix):
+    packages = {path.name for path in prefix.glob('lib/python*/site-packages/*')}
+    assert not {'test', 'bench', 'launch'} & packages
+
+
+@pytest.mark.parametrize('name', ['linkage_node', 'crank_source', 'linkage'])
+def test_executable_names_a_function_that_exists(prefix, root, name):
+    script = (prefix / 'bin' / name).read_text('utf-8')
+    module = next(
+        line.split()[1] for line in script.splitlines() if line.startswith('from linkage_ros')
+    )
+    path = root.joinpath(*module.split('.')).with_suffix('.py')
+    assert 'def main(' in path.read_text('utf-8')
