@@ -39,6 +39,7 @@ class LinkageError(Exception):
         What is wrong, with the value.
     remedy
         What would help.
+
     """
 
     def __init__(self, where: str | PathLike[str], reason: str, remedy: str) -> None:
@@ -66,6 +67,7 @@ class FileError(LinkageError):
         As in `LinkageError`.
     line
         Line of the key in the file, counted from 1; 0 where there is none.
+
     """
 
     def __init__(

@@ -16,8 +16,8 @@
 """
 JointState messages as bytes (CDR): one joint read out of them, and a whole message written.
 
-A message taken as bytes and read here costs a tenth of one that is built as an object; and the same
-bytes go to the recorder. Encoding: CDR version 1 (encapsulation 00 00 or 00 01), of
+A message taken as bytes and read here costs a tenth of one that is built as an object; and the
+same bytes go to the recorder. Encoding: CDR version 1 (encapsulation 00 00 or 00 01), of
 ``sensor_msgs/msg/JointState``: stamp, frame_id, name[], position[], velocity[], effort[].
 """
 
@@ -25,8 +25,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import Enum
-from struct import Struct
 from struct import error as StructError
+from struct import Struct
 from typing import NamedTuple
 
 NANOSECONDS = 1_000_000_000
@@ -61,6 +61,7 @@ class CrankSample(NamedTuple):
         Angle of the input joint, in [rad].
     rate
         Its rate, in [rad/s]; None where the message has no velocities.
+
     """
 
     stamp: int
@@ -75,7 +76,7 @@ class _Layout(NamedTuple):
     names: bytes  # from the frame_id up to the first position
     encapsulation: bytes
     stamp: Struct
-    count: Struct
+    counter: Struct
     value: Struct
     angle: int
     rates: tuple[int, int]  # where their count stands, and the count
@@ -92,6 +93,7 @@ class JointStateReader:
     ----------
     joint
         Name of the joint.
+
     """
 
     __slots__ = ('_joint', '_layout')
@@ -108,8 +110,8 @@ class JointStateReader:
             or len(data) < layout.size
             or data[:2] != layout.encapsulation
             or data[12 : layout.start] != layout.names
-            or layout.count.unpack_from(data, layout.rates[0])[0] != layout.rates[1]
-            or layout.count.unpack_from(data, layout.efforts[0])[0] != layout.efforts[1]
+            or layout.counter.unpack_from(data, layout.rates[0])[0] != layout.rates[1]
+            or layout.counter.unpack_from(data, layout.efforts[0])[0] != layout.efforts[1]
         ):
             found = _find(data, self._joint)
             if isinstance(found, Rejection):
@@ -184,6 +186,7 @@ class JointStateWriter:
     ----------
     names
         The joints, in the order in which they are published.
+
     """
 
     __slots__ = ('_join', '_middle', '_positions_only', '_tail', '_with_rates', 'names')
@@ -201,7 +204,8 @@ class JointStateWriter:
             head += Struct('<I').pack(len(text)) + text
         head += bytes(_aligned(len(head), 4) - len(head)) + Struct('<I').pack(n)
         head += bytes(_aligned(12 + len(head), 8) - 12 - len(head))
-        # After n doubles the offset is a multiple of 8: the next count, then four bytes of padding.
+        # After n doubles the offset is a multiple of 8: the next count, then four bytes of
+        # padding.
         self.names = bytes(head)
         self._join = Struct('<II').pack(n, 0)
         self._tail = Struct('<I').pack(0)
@@ -221,6 +225,7 @@ class JointStateWriter:
             One for each joint, in [rad] or [m].
         rates
             One for each joint, in [rad/s] or [m/s], or none: then the array is left empty.
+
         """
         seconds, nanoseconds = divmod(stamp, NANOSECONDS)
         if rates:

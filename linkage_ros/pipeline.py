@@ -44,6 +44,7 @@ class Tick(NamedTuple):
         What is published; nothing where nothing is.
     message
         The JointState, serialized; empty where nothing is published.
+
     """
 
     position: Position | None
@@ -69,6 +70,7 @@ class Pipeline:
         Where the scene names an effect that does not exist, or gives it a wrong parameter.
     DefinitionError
         Where the linkage does not close.
+
     """
 
     __slots__ = ('_drive', '_reader', '_stages', '_writer', 'closure')
@@ -99,6 +101,7 @@ class Pipeline:
             A ``sensor_msgs/msg/JointState`` in CDR.
         now
             The time, in [ns].
+
         """
         sample = self._reader.read(message)
         if isinstance(sample, Rejection):
@@ -113,6 +116,7 @@ class Pipeline:
         ----------
         now
             The time, and the stamp of the message, in [ns].
+
         """
         crank = self._drive.state(now)
         if crank is None:

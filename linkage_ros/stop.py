@@ -16,8 +16,8 @@
 """
 Signals that end a run: SIGINT, SIGTERM and SIGHUP set an event, and nothing else.
 
-Python's own handler would raise KeyboardInterrupt wherever the program happens to be, and rclpy's would
-take the context away from under a bag that is being closed.
+Python's own handler would raise KeyboardInterrupt wherever the program happens to be, and rclpy's
+would take the context away from under a bag that is being closed.
 """
 
 from __future__ import annotations

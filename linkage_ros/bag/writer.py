@@ -16,27 +16,20 @@
 """
 Write a bag that is readable at every instant and stays so when the disk fills.
 
-mcap's ``Writer`` gives whole records to its stream, and loses its balance when the stream raises.
-So ours never raises: from the first error on it keeps the records in memory, and `BagWriter` ends
-the recording with the records and indexes that ``Writer`` goes on to make. They go into room that
-was set aside for them. If even that is too little (a limit on the file's size, another process
-that was faster), the file ends with the last chunk after which an index still fits. A minimal
-footer without an index was rejected: rosbags refuses such a file when log times are out of order.
+From the first error of the disk on, mcap's ``Writer`` goes on into memory (`disk.RecordFile`), and
+`BagWriter` ends the recording with the records and indexes that it makes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
-from io import BytesIO
-from operator import itemgetter
-import os
+from contextlib import ExitStack
 from pathlib import Path
-import tempfile
 import time
 from typing import cast, IO, NoReturn
 
 from linkage_ros import __version__
+from linkage_ros.bag.disk import CHUNK_SIZE, FIRST_RESERVE, RecordFile, Reserve
 from linkage_ros.bag.metadata import (
     BagSummary,
     metadata_text,
@@ -47,24 +40,11 @@ from linkage_ros.bag.metadata import (
 )
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import RecordingError
-from mcap.data_stream import RecordBuilder
 from mcap.records import (
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    McapRecord,
-    Schema,
     Statistics,
 )
-from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType, MCAP0_MAGIC, Writer
+from mcap.writer import CompressionType, Writer
 
-# Closing a chunk holds the interpreter for the time that its message index takes to build, 0.5 ms
-# for 64 KiB of joint states; mcap's default of 1 MiB would hold it, and a tick, for 10 ms.
-_CHUNK_SIZE = 64 * 1024
-_FIRST_RESERVE = 512 * 1024
 _TIME_END = 2**63  # rosbag2's times are signed
 _SEQUENCE_END = 2**32  # MCAP's sequence numbers; at 10 kHz they start again after five days
 
@@ -115,9 +95,9 @@ class BagWriter:
         try:
             with ExitStack() as undo:
                 undo.callback(_remove, self.folder)
-                self._file = _RecordFile(path)
+                self._file = RecordFile(path)
                 undo.callback(self._file.close)
-                self._reserve = _Reserve(self.folder)
+                self._reserve = Reserve(self.folder)
                 undo.callback(self._reserve.release)
                 self._begin(attachments or {})
                 undo.pop_all()
@@ -128,7 +108,7 @@ class BagWriter:
         # Our stream stands in for a binary file: mcap asks it for write, tell and flush only.
         self._mcap = Writer(
             cast('IO[bytes]', self._file),
-            chunk_size=_CHUNK_SIZE,
+            chunk_size=CHUNK_SIZE,
             compression=CompressionType.NONE,
         )
         self._mcap.start(profile='ros2', library=f'linkage_ros {__version__}')
@@ -207,13 +187,13 @@ class BagWriter:
             return
         self._flushed = self._file.position
         self._flushes += 1
-        chunks = self._flushes + self._file.position // _CHUNK_SIZE
+        chunks = self._flushes + self._file.position // CHUNK_SIZE
         try:
             if self._file.error:
                 raise self._file.error
             self._file.sync()
             # The index at the end grows by about this much with each chunk.
-            self._reserve.grow(_FIRST_RESERVE + chunks * (90 + 10 * len(self.topics)))
+            self._reserve.grow(FIRST_RESERVE + chunks * (90 + 10 * len(self.topics)))
         except OSError as error:
             self._fail(error)
 
@@ -312,163 +292,8 @@ class BagWriter:
         )
 
 
-class _RecordFile:
-    """
-    A file of whole records; writing to it never raises, and leaves what failed in `error`.
-
-    After the first error, records wait in memory for `drain`.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.position = 0  # where the next record goes once the waiting ones are on the disk
-        self.size = 0  # the end of the last record that the system took as a whole [bytes]
-        self.error: OSError | None = None
-        self._waiting: list[bytes] = []
-        self._tail: list[bytes] | None = None
-        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
-
-    def write(self, records: bytes) -> None:
-        self.position += len(records)
-        self._waiting.append(records)
-        if self._tail is not None:
-            self._tail.append(records)
-        if not self.error:
-            try:
-                self.drain()
-            except OSError as error:
-                self.error = error
-
-    def tell(self) -> int:
-        return self.position
-
-    def flush(self) -> None:
-        """Do nothing: no buffer is between `write` and the system."""
-
-    def sync(self) -> None:
-        os.fsync(self._descriptor)
-
-    def close(self) -> None:
-        os.close(self._descriptor)
-
-    def keep_tail(self) -> None:
-        """Remember what is written from here on; it holds the index that `cut_back` needs."""
-        self._tail = []
-
-    def drain(self) -> None:
-        """Write the waiting records; raises OSError, and can be called again then."""
-        while self._waiting:
-            self._put(self._waiting[0], self.size)
-            self.size += len(self._waiting.pop(0))
-
-    def cut_back(self) -> Statistics:
-        """
-        End the file with as many chunks as leave room for an index; return what is then in it.
-
-        The index overwrites the end of the file in place, which takes no new room on the disk.
-        Where not even that works the file stays without an end, but with whole records only.
-        """
-        stream = BytesIO(b''.join(self._tail or []))
-        records = list(StreamReader(stream, skip_magic=True, emit_chunks=True).records)
-        chunks = [r for r in records if isinstance(r, ChunkIndex) and _end_of(r) <= self.size]
-        while chunks:
-            start = _end_of(chunks[-1])
-            ending = _ending(records, chunks, start)
-            if start + len(ending) <= self.size:
-                self.size = start
-                with suppress(OSError):
-                    try:
-                        self._put(ending, start)
-                    except OSError:
-                        # A file system that copies on write needs the room first.
-                        os.ftruncate(self._descriptor, start)
-                        self._put(ending, start)
-                    self.size = start + len(ending)
-                break
-            chunks.pop()
-        with suppress(OSError):
-            os.ftruncate(self._descriptor, self.size)
-        return _statistics(records, chunks)
-
-    def _put(self, data: bytes, offset: int) -> None:
-        view = memoryview(data)
-        while view:
-            count = os.pwrite(self._descriptor, view, offset)
-            view, offset = view[count:], offset + count
-
-
-class _Reserve:
-    """
-    Room on the disk, held by a nameless file: it is free again on `release` and on a kill.
-
-    Raises
-    ------
-    OSError
-        There is not as much room.
-
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 (`release` closes it)
-        self._size = 0
-        self.grow(_FIRST_RESERVE)
-
-    def grow(self, size: int) -> None:
-        if size > self._size:
-            size += _CHUNK_SIZE  # asks the system once in a while only
-            os.posix_fallocate(self._file.fileno(), 0, size)
-            self._size = size
-
-    def release(self) -> None:
-        self._file.close()
-
-
 def _remove(folder: Path) -> None:
     """Remove a folder that nobody but us has written to."""
     for leftover in folder.iterdir():
         leftover.unlink()
     folder.rmdir()
-
-
-def _end_of(chunk: ChunkIndex) -> int:
-    return chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
-
-
-def _statistics(records: Sequence[McapRecord], chunks: Sequence[ChunkIndex]) -> Statistics:
-    """Return the statistics of these chunks, of which only the indexes need to be known."""
-    counts: dict[int, int] = {}
-    for chunk in chunks:
-        # The message indexes lie one after the other: 15 bytes, and 16 for each message.
-        end = _end_of(chunk)
-        for channel, start in sorted(
-            chunk.message_index_offsets.items(), key=itemgetter(1), reverse=True
-        ):
-            counts[channel] = counts.get(channel, 0) + (end - start - 15) // 16
-            end = start
-    return Statistics(
-        attachment_count=sum(isinstance(r, AttachmentIndex) for r in records),
-        channel_count=sum(isinstance(r, Channel) for r in records),
-        channel_message_counts=counts,
-        chunk_count=len(chunks),
-        message_count=sum(counts.values()),
-        message_end_time=max((chunk.message_end_time for chunk in chunks), default=0),
-        message_start_time=min((chunk.message_start_time for chunk in chunks), default=0),
-        metadata_count=0,
-        schema_count=sum(isinstance(r, Schema) for r in records),
-    )
-
-
-def _ending(records: Sequence[McapRecord], chunks: Sequence[ChunkIndex], start: int) -> bytes:
-    """Return all that follows the last of these chunks: end of data, index, footer, magic."""
-    builder = RecordBuilder()
-    DataEnd(0).write(builder)
-    summary_start = start + builder.count
-    for record in records:
-        if isinstance(record, Schema | Channel | AttachmentIndex):
-            record.write(builder)
-    _statistics(records, chunks).write(builder)
-    for chunk in chunks:
-        chunk.write(builder)
-    Footer(summary_start, 0, 0).write(builder)
-    ending: bytes = builder.end()  # type: ignore[no-untyped-call]
-    return ending + MCAP0_MAGIC

@@ -40,6 +40,7 @@ class TopicParameters:
         Age of the newest sample beyond which there is no crank, in [ns].
     max_lead
         How far ahead of the clock a stamp may be, in [ns].
+
     """
 
     carry_forward: bool
@@ -59,6 +60,7 @@ class CrankState(NamedTuple):
         In [rad/s].
     age
         Time of the tick less that of the sample, in [ns].
+
     """
 
     angle: float
@@ -75,8 +77,9 @@ class TopicDrive:
     parameters
         How samples are used.
     needs_rate
-        Whether something beyond carrying forward needs the crank's rate. Where nothing does, messages
-        without velocities are good enough.
+        Whether something beyond carrying forward needs the crank's rate. Where nothing does,
+        messages without velocities are good enough.
+
     """
 
     __slots__ = ('_carry_forward', '_max_age', '_max_lead', '_needs_rate', '_sample')
@@ -103,6 +106,7 @@ class TopicDrive:
             The sample.
         now
             The time, in [ns].
+
         """
         stamp, angle, rate = sample
         if rate is None:

@@ -54,6 +54,7 @@ class Motion(NamedTuple):
         Values of the published joints, in [rad] or [m].
     rates
         Their rates, in [rad/s] or [m/s]; empty where no one asked, or at a toggle.
+
     """
 
     crank: CrankState

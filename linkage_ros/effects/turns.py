@@ -16,8 +16,9 @@
 """
 How a published angle runs: on beyond a turn, or wrapped.
 
-The closure knows an angle up to whole turns. `Continuous` adds the turns that bring it nearest to what
-was published last, so it takes steps of less than half a turn; it is the only stage with a memory.
+The closure knows an angle up to whole turns. `Continuous` adds the turns that bring it nearest to
+what was published last, so it takes steps of less than half a turn; it is the only stage with a
+memory.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ class Continuous:
     ----------
     turning
         For each joint whether it is an angle.
+
     """
 
     __slots__ = ('_last', '_turning')
@@ -68,6 +70,7 @@ class Wrapped:
     ----------
     turning
         For each joint whether it is an angle.
+
     """
 
     __slots__ = ('_turning',)
@@ -78,9 +81,7 @@ class Wrapped:
     def __call__(self, motion: Motion) -> Motion:
         """Return the motion with whole turns left out."""
         crank, position, joints, rates = motion
-        now = [
-            wrapped(v) if turns else v for v, turns in zip(joints, self._turning, strict=True)
-        ]
+        now = [wrapped(v) if turns else v for v, turns in zip(joints, self._turning, strict=True)]
         return Motion(crank, position, tuple(now), rates)
 
 

@@ -28,7 +28,6 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.scene.yaml_file import Section
 
-
 NEEDS_CRANK_RATE = True
 
 

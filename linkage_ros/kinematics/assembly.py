@@ -68,6 +68,7 @@ class Loop:
         For each link its angle, in [rad].
     slides
         For each slider the position of its point from ``through``, in [m].
+
     """
 
     dyad: RRRDyad | RPRDyad
@@ -85,11 +86,14 @@ def find_loop(linkage: Linkage) -> Loop:
     ------
     DefinitionError
         Where the links do not make one loop of the kinds above.
+
     """
     _check_links(linkage)
     crank = linkage.input.child
     pins = _pins(linkage)
-    pivot = _pin_between(pins, GROUND, crank, 'links', 'the crank turns about a point of the ground')
+    pivot = _pin_between(
+        pins, GROUND, crank, 'links', 'the crank turns about a point of the ground'
+    )
     others = [name for name in linkage.links if name not in (GROUND, crank)]
     if len(others) == 2 and not linkage.sliders:
         return _four_bar(linkage, pins, pivot, others)
@@ -147,7 +151,9 @@ def _inverted_slider_crank(
             _CLOSABLE,
         )
     a_pin = _pin_between(pins, linkage.input.child, rod, f'links.{rod}', _CLOSABLE)
-    sign = _sign(linkage, name, {'ahead': 1, 'behind': -1}, f'where {slider.point} lies from {a_pin}')
+    sign = _sign(
+        linkage, name, {'ahead': 1, 'behind': -1}, f'where {slider.point} lies from {a_pin}'
+    )
 
     a, crank_zero = _polar(crank, pivot, a_pin)
     d, base = _polar(ground, pivot, slider.point)
@@ -169,7 +175,9 @@ def _inverted_slider_crank(
 def _check_links(linkage: Linkage) -> None:
     """Refuse what no loop can be made of, whatever its kind."""
     if GROUND not in linkage.links:
-        raise DefinitionError('links', f'no link is named {GROUND!r}', f'name the frame {GROUND!r}')
+        raise DefinitionError(
+            'links', f'no link is named {GROUND!r}', f'name the frame {GROUND!r}'
+        )
     if linkage.input.parent != GROUND:
         raise DefinitionError(
             'input.parent',

@@ -25,11 +25,11 @@ from math import cos, hypot, sin
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.assembly import Loop, find_loop
+from linkage_ros.kinematics.assembly import find_loop, Loop
 from linkage_ros.kinematics.dyads.rpr import RPRPose
 from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.mobility import CrankRange, crank_ranges
+from linkage_ros.kinematics.mobility import crank_ranges, CrankRange
 from linkage_ros.kinematics.status import Status
 
 
@@ -50,6 +50,7 @@ class Position(NamedTuple):
         Direction of the crank in the frame of the loop, in [rad].
     pose
         The dyad's own coordinates.
+
     """
 
     status: Status
@@ -72,6 +73,7 @@ class Closure:
     ------
     DefinitionError
         Where no dyad closes the linkage, or where it closes at no crank angle.
+
     """
 
     __slots__ = ('_crank_offset', '_dyad', '_terms', 'crank_ranges', 'loop', 'turning')
@@ -106,6 +108,7 @@ class Closure:
         ----------
         crank_angle
             Angle of the input joint, in [rad], finite.
+
         """
         phi = crank_angle + self._crank_offset
         pose = self._dyad.close(phi)
@@ -127,6 +130,7 @@ class Closure:
             A closed position; a rate at a toggle does not exist.
         crank_rate
             Rate of the input joint, in [rad/s].
+
         """
         # The pose came out of this very dyad: the pair matches, which no annotation can say.
         first, second = self._dyad.rates(position.phi, position.pose, crank_rate)  # type: ignore[arg-type]

@@ -26,7 +26,6 @@ from __future__ import annotations
 from math import atan2, cos, fsum, hypot, sin, sqrt
 from typing import NamedTuple
 
-
 UNIT_ROUNDOFF = 2.0**-53
 
 SMALLEST = 2.0**-1020
@@ -63,6 +62,7 @@ def reach(constant: float, part: float, span: float) -> tuple[float, float]:
         0 at a toggle.
     gap : float
         0 where the dyad closes, else what it misses by, in the unit of the lengths.
+
     """
     if constant == 0.0 and span > 0.0:
         return part / sqrt(span), 0.0
@@ -91,6 +91,7 @@ class Diagonal(NamedTuple):
         value by.
     half_sine, half_cosine
         sin(φ/2) and cos(φ/2).
+
     """
 
     length: float
@@ -111,6 +112,7 @@ class CrankDiagonal:
         Length of the crank, O to A.
     d
         Length of the ground, O to D, in the same unit.
+
     """
 
     __slots__ = ('_constants', 'greatest', 'least')
@@ -130,7 +132,9 @@ class CrankDiagonal:
         near = root * half_sine
         return Diagonal(
             hypot(difference, near),
-            atan2(-2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine),
+            atan2(
+                -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
+            ),
             near,
             root * half_cosine,
             half_sine,

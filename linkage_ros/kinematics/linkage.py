@@ -48,6 +48,7 @@ class Slider:
         Name of a point of ``along`` on the line; the slide is measured from it, in [m].
     direction
         Direction of the line in the frame of ``along``, any length but zero.
+
     """
 
     point: str
@@ -97,6 +98,7 @@ class Linkage:
         What is published, in this order.
     sliders
         The sliders, by name.
+
     """
 
     links: Mapping[str, Mapping[str, Point]]

@@ -31,8 +31,23 @@ from rclpy.qos import QoSProfile
 
 _FIELD = re.compile(r'^\s*(?P<type>[A-Za-z]\w*(?:/\w+)*)(?:<=\d+)?(?:\[[^\]]*\])?\s+[a-z]\w*')
 _PRIMITIVES = frozenset(
-    'bool byte char float32 float64 int8 uint8 int16 uint16 int32 uint32 int64 uint64 string '
-    'wstring'.split()
+    [
+        'bool',
+        'byte',
+        'char',
+        'float32',
+        'float64',
+        'int8',
+        'uint8',
+        'int16',
+        'uint16',
+        'int32',
+        'uint32',
+        'int64',
+        'uint64',
+        'string',
+        'wstring',
+    ]
 )
 _SEPARATOR = f'\n{"=" * 80}\n'
 
@@ -54,6 +69,7 @@ def bag_topic(name: str, message_type: Any, qos: QoSProfile) -> Topic:
     ------
     RecordingError
         Where the message's definition is not installed.
+
     """
     package, _, kind = message_type.__module__.split('.')[0], None, message_type.__name__
     texts: dict[str, str] = {}
@@ -62,9 +78,7 @@ def bag_topic(name: str, message_type: Any, qos: QoSProfile) -> Topic:
     definition = texts[first] + ''.join(
         f'{_SEPARATOR}MSG: {other}\n{texts[other]}' for other in others
     )
-    return Topic(
-        name, f'{package}/msg/{kind}', definition, _type_hash(package, kind), _qos(qos)
-    )
+    return Topic(name, f'{package}/msg/{kind}', definition, _type_hash(package, kind), _qos(qos))
 
 
 def _collect(package: str, kind: str, texts: dict[str, str]) -> None:
@@ -91,8 +105,12 @@ def _type_hash(package: str, kind: str) -> str:
 
 
 def _share(package: str, file: str) -> Path:
-    # A robot's packages lie under the prefixes of its environment, the wheels' under the interpreter.
-    prefixes = [*filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)), sys.prefix]
+    # A robot's packages lie under the prefixes of its environment, the wheels' under the
+    # interpreter.
+    prefixes = [
+        *filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)),
+        sys.prefix,
+    ]
     for prefix in prefixes:
         path = Path(prefix, 'share', package, 'msg', file)
         if path.is_file():

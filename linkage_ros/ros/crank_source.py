@@ -16,8 +16,8 @@
 """
 ``ros2 run linkage_ros crank_source``: a crank that turns, for demos and tests.
 
-It publishes angle and rate of one joint as ``sensor_msgs/JointState`` on ``crank_states``. The speed
-swings about its mean, as that of a machine under a load that varies with the angle does:
+It publishes angle and rate of one joint as ``sensor_msgs/JointState`` on ``crank_states``. The
+speed swings about its mean, as that of a machine under a load that varies with the angle does:
 angle(t) = start + speed·t + (ripple·speed/2π)·sin(2πt).
 """
 
@@ -50,13 +50,14 @@ class CrankSource(Node):
         self._speed = self._number('speed', tau, 'Mean speed [rad/s]', -1e4, 1e4)
         self._ripple = self._number('ripple', 0.3, 'Swing of the speed, of its mean', 0.0, 1.0)
         self._start = self._number('start', 0.0, 'First angle [rad]', -1e6, 1e6)
+        self._seconds = self._number('seconds', 0.0, 'How long [s]; 0 for ever', 0.0, 1e9)
         self._writer = JointStateWriter([joint])
         self._publisher = self.create_publisher(
             JointState, 'crank_states', qos_profile_sensor_data
         )
 
     def run(self, stop: Event) -> None:
-        """Publish until the event."""
+        """Publish until the event, or for the time that was set."""
         period = NANOSECONDS / self._rate
         swing = self._ripple * self._speed
         begin = monotonic_ns()
@@ -68,6 +69,8 @@ class CrankSource(Node):
                 sleep(wait * 1e-9)
             stamp = time_ns()
             t = (monotonic_ns() - begin) * 1e-9
+            if 0.0 < self._seconds < t:
+                return
             angle = self._start + self._speed * t + swing / tau * sin(tau * t)
             message = self._writer.write(stamp, (angle,), (self._speed + swing * cos(tau * t),))
             self._publisher.publish(message)
@@ -88,7 +91,7 @@ def main() -> int:
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = CrankSource()
-    except Exception as error:  # as in `run`
+    except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
         print(f'crank_source: {str(error).splitlines()[0]}', file=sys.stderr)
         return 2
     node.run(stop)

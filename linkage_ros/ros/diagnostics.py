@@ -84,6 +84,7 @@ class Health:
         Its counts at the beginning and the end of the window.
     recording_failure
         Why there is no recording although one was wanted; '' where there is none to tell.
+
     """
 
     node: str

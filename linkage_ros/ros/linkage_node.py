@@ -25,7 +25,8 @@ from linkage_ros.stop import stop_on_signals
 
 def main() -> int:
     """Run the node and return the exit code."""
-    # First of all, and before the second that rclpy takes to load: a signal at any moment is heeded.
+    # First of all, and before the second that rclpy takes to load: a signal at any moment is
+    # heeded.
     stop = stop_on_signals()
     run = import_module('linkage_ros.ros.run')
     return int(run.run_linkage_node(stop, sys.argv[1:]))

@@ -16,8 +16,8 @@
 """
 The node: crank samples in, joint states of the dependent joints out.
 
-A lifecycle node. The tick has a thread of its own (`tick_loop`); what is here runs on the executor:
-transitions, services, parameters, diagnostics, and all that is logged.
+A lifecycle node. The tick has a thread of its own (`tick_loop`); what is here runs on the
+executor: transitions, services, parameters, diagnostics, and all that is logged.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def _reporting(transition: Transition) -> Transition:
     def reported(node: LinkageNode, state: LifecycleState) -> TransitionCallbackReturn:
         try:
             return transition(node, state)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 (whatever it is, rclpy would hide it)
             node.get_logger().error(f'{transition.__name__}: {type(error).__name__}: {error}')
             return TransitionCallbackReturn.ERROR
 
@@ -221,7 +221,8 @@ class LinkageNode(LifecycleNode):
 
     def _start_recording(self) -> str:
         """Start a bag and return what came of it, as one line."""
-        assert self.scene is not None and self.loop is not None
+        assert self.scene is not None
+        assert self.loop is not None
         offered = [
             info.qos_profile for info in self.get_publishers_info_by_topic(self.crank_topic)
         ]
@@ -305,7 +306,8 @@ class LinkageNode(LifecycleNode):
             self._diagnose()
 
     def _diagnose(self) -> None:
-        assert self.loop is not None and self.scene is not None
+        assert self.scene is not None
+        assert self.loop is not None
         publishers = self._crank_publishers()
         if len(publishers) > 1:
             self._warnings.say(

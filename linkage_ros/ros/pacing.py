@@ -42,8 +42,8 @@ def steady(rate: float) -> Pace:
     """
     Tick at a rate, in [Hz], on the steady clock, stamped with the system's time.
 
-    Ticks are due at whole multiples of the period from the start, so that a late one does not shift
-    those that follow.
+    Ticks are due at whole multiples of the period from the start, so that a late one does not
+    shift those that follow.
     """
     period = NANOSECONDS / rate
 
@@ -87,6 +87,7 @@ def on_samples(context: Context, subscription: Subscription, now: Callable[[], i
         The crank's.
     now
         Returns the time by which stamps are judged, in [ns].
+
     """
 
     def pace(loop: TickLoop, stopping: Event) -> None:
@@ -110,6 +111,7 @@ def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
         Subscription to ``/clock``.
     rate
         Ticks a second of simulated time.
+
     """
     period = round(NANOSECONDS / rate)
 

@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import sys
 from threading import Event
 
@@ -26,6 +26,7 @@ from linkage_ros.ros.node import LinkageNode
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
 EXIT_OK, EXIT_INCOMPLETE, EXIT_CONFIGURATION = 0, 1, 2
@@ -37,6 +38,7 @@ _SPIN = 0.1
 def run_linkage_node(
     stop: Event,
     arguments: list[str],
+    parameters: Mapping[str, str] | None = None,
     every_spin: Callable[[LinkageNode], None] | None = None,
     at_end: Callable[[LinkageNode], None] | None = None,
 ) -> int:
@@ -49,6 +51,8 @@ def run_linkage_node(
         Ends the run; `linkage_ros.stop` sets it on signals.
     arguments
         Command line with ``--ros-args``, without the program's name.
+    parameters
+        Parameters of the node, beside those of the command line.
     every_spin
         Called about ten times a second.
     at_end
@@ -57,15 +61,20 @@ def run_linkage_node(
     Returns
     -------
     code : int
-        0; 1 where the recording failed or the tick ended early; 2 for a configuration that is wrong.
+        0; 1 where the recording failed or the tick ended early; 2 for a configuration that is
+        wrong.
+
     """
-    # The tick shares the interpreter with executor and recorder: at the default of 5 ms it would wait
-    # for them that long.
+    # The tick shares the interpreter with executor and recorder: at the default of 5 ms it would
+    # wait for them that long.
     sys.setswitchinterval(_SWITCH_INTERVAL)
     try:
-        rclpy.init(args=['linkage_node', *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        node = LinkageNode()
-    except Exception as error:  # rcl's errors have no common root, and none is worth a traceback
+        rclpy.init(
+            args=['linkage_node', *arguments], signal_handler_options=SignalHandlerOptions.NO
+        )
+        overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
+        node = LinkageNode(parameter_overrides=overrides)
+    except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
         print(f'linkage_node: {_first_line(error)}; see --ros-args in the README', file=sys.stderr)
         rclpy.try_shutdown()
         return EXIT_CONFIGURATION

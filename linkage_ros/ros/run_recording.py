@@ -25,8 +25,10 @@ import platform
 
 from linkage_ros import __version__
 from linkage_ros.bag.recorder import Recorder, RecordingSummary
+from linkage_ros.bag.replay import RUN_FILE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.ros.tick_loop import CRANK, JOINT_STATES
 from linkage_ros.scene.scene import RecordParameters, Scene
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
@@ -44,23 +46,26 @@ def start_recording(scene: Scene, directory: str, topics: Sequence[Topic]) -> Re
     directory
         Where the bag's folder is made; '' for where the scene says.
     topics
-        What will be recorded.
+        What will be recorded, in the order of the tick's topic numbers.
 
     Raises
     ------
     RecordingError
         Where the folder exists or cannot be written.
+
     """
     record = scene.record or _DEFAULT
-    versions = {
+    run = {
+        'scene': scene.name,
+        'crank_topic': topics[CRANK].name,
+        'joint_states_topic': topics[JOINT_STATES].name,
         'linkage_ros': __version__,
         'python': platform.python_version(),
         'machine': platform.machine(),
-        'scene': scene.name,
     }
     attachments = {
         **{name: ('application/yaml', data) for name, data in scene.files.items()},
-        'versions.json': ('application/json', json.dumps(versions).encode()),
+        RUN_FILE: ('application/json', json.dumps(run).encode()),
     }
     folder = _folder(Path(directory or record.directory), record.name, scene.name)
     return Recorder(BagWriter(folder, topics, attachments), capacity=record.queue)
@@ -74,7 +79,7 @@ def counted(summary: RecordingSummary) -> str:
 def _folder(directory: Path, name: str, scene: str) -> Path:
     if name:
         return directory / name
-    dated = f'{scene}_{datetime.now():%Y-%m-%d_%H-%M-%S}'
+    dated = f'{scene}_{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}'
     folder, number = directory / dated, 1
     while folder.exists():
         number += 1

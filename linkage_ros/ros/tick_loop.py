@@ -17,8 +17,8 @@
 The tick, from the newest crank sample to the published bytes.
 
 One thread, no executor: it waits (for a time, a sample or the simulation's clock), takes what has
-come, solves, publishes, and hands the same bytes to the recorder. It never logs and never waits for
-another thread; what it has seen stands in its counts, for others to read.
+come, solves, publishes, and hands the same bytes to the recorder. It never logs and never waits
+for another thread; what it has seen stands in its counts, for others to read.
 """
 
 from __future__ import annotations
@@ -80,8 +80,9 @@ class TickLoop:
     publish
         Publishes a serialized JointState.
     own
-        What the node's own messages have behind the stamp where they come back on the crank's topic,
-        so that they can be told; empty where they do not.
+        What the node's own messages have behind the stamp where they come back on the crank's
+        topic, so that they can be told; empty where they do not.
+
     """
 
     def __init__(
@@ -104,10 +105,13 @@ class TickLoop:
         self.recorder: Recorder | None = None
         self.reset_requested = False
         self.failure = ''
+        self._begun = 0
+        self.seconds = 0.0
 
     def start(self, pace: Pace) -> None:
         """Start ticking on a thread of its own."""
         self._stopping.clear()
+        self._begun = monotonic_ns()
         self._thread = Thread(target=self._guarded, args=(pace,), name='tick', daemon=True)
         self._thread.start()
 
@@ -117,6 +121,7 @@ class TickLoop:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
+            self.seconds = (monotonic_ns() - self._begun) * 1e-9
 
     @property
     def running(self) -> bool:
@@ -191,5 +196,5 @@ class TickLoop:
         # A defect here must neither vanish with its thread nor show a traceback.
         try:
             pace(self, self._stopping)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 (see above)
             self.failure = f'{type(error).__name__}: {error}'

@@ -55,6 +55,7 @@ class Warnings:
     ----------
     logger
         Where warnings go.
+
     """
 
     def __init__(self, logger: RcutilsLogger) -> None:
@@ -78,8 +79,11 @@ class Warnings:
             Where samples come from.
         period
             Least time between two warnings of a kind, in [s].
+
         """
-        new = {r: n - self._rejected[r] for r, n in counts.rejected.items() if n > self._rejected[r]}
+        new = {
+            r: n - self._rejected[r] for r, n in counts.rejected.items() if n > self._rejected[r]
+        }
         if new:
             why = '; '.join(f'{r.value} ({n}): {_REMEDIES[r]}' for r, n in new.items())
             line = f'{crank_topic}: {sum(new.values())} samples rejected: {why}'
@@ -112,6 +116,6 @@ class Warnings:
 
 _UNCLOSED = {
     Status.OPEN: '{ticks} ticks open by {gap:.6g} m, nothing published; reachable: {reachable}',
-    Status.INDETERMINATE: '{ticks} ticks with two pins in one place, nothing published; move the crank',
+    Status.INDETERMINATE: '{ticks} ticks with two pins in one place, nothing published',
     Status.TOGGLE: '{ticks} ticks at a toggle: positions published, velocities not',
 }

@@ -24,6 +24,10 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.scene.yaml_file import Section
 
+_KEYS = ('links', 'input', 'assembly', 'sliders', 'joints')
+_FARTHEST = 1e9
+"""Coordinates beyond this, in [m], are no machine's; below it no square overflows."""
+
 
 def read_linkage(content: Section) -> Linkage:
     """
@@ -33,23 +37,25 @@ def read_linkage(content: Section) -> Linkage:
     ------
     FileError
         With file, line and key of what is wrong.
+
     """
     for shorthand, expand in _SHORTHANDS.items():
         if shorthand in content:
             written_out = expand(content.section(shorthand))
-            content.finish(list(_SHORTHANDS))
-            return _closable(content, _linkage(Section(content.file, '', written_out)))
-    linkage = _linkage(content)
-    content.finish(list(_SHORTHANDS))
-    return _closable(content, linkage)
+            content.finish()
+            return _closable(content, _linkage(Section(content.file, '', written_out)), shorthand)
+    for key in content:
+        if key not in _KEYS:
+            content.finish((*_KEYS, *_SHORTHANDS))
+    return _closable(content, _linkage(content))
 
 
 def _linkage(content: Section) -> Linkage:
     links = content.section('links')
     points = {}
-    for name in links.keys():
+    for name in links:
         link = links.section(name)
-        points[name] = {point: link.point(point) for point in link.keys()}
+        points[name] = {point: link.point(point, most=_FARTHEST) for point in link}
 
     driven = content.section('input')
     crank = Input(driven.text('joint'), driven.text('parent'), driven.text('child'))
@@ -57,12 +63,12 @@ def _linkage(content: Section) -> Linkage:
 
     assembly = content.section('assembly')
     sides = {
-        name: assembly.choice(name, ('left', 'right', 'ahead', 'behind')) for name in assembly.keys()
+        name: assembly.choice(name, ('left', 'right', 'ahead', 'behind')) for name in assembly
     }
 
     sliders = content.section('sliders', required=False)
     joints = content.section('joints')
-    if not joints.keys():
+    if not list(joints):
         raise content.error('joints', 'publishes nothing', 'name a joint')
     if crank.joint in joints:
         raise joints.error(crank.joint, 'is the input joint', 'publish the dependent joints')
@@ -70,8 +76,8 @@ def _linkage(content: Section) -> Linkage:
         points,
         crank,
         sides,  # type: ignore[arg-type]  # the choice above is the Literal
-        {name: _joint(joints.section(name)) for name in joints.keys()},
-        {name: _slider(sliders.section(name)) for name in sliders.keys()},
+        {name: _joint(joints.section(name)) for name in joints},
+        {name: _slider(sliders.section(name)) for name in sliders},
     )
 
 
@@ -80,7 +86,7 @@ def _slider(content: Section) -> Slider:
         content.text('point'),
         content.text('along'),
         content.text('through'),
-        content.point('direction'),
+        content.point('direction', most=_FARTHEST),
     )
     content.finish()
     return slider
@@ -96,17 +102,17 @@ def _joint(content: Section) -> RevoluteJoint | SlideJoint:
     return joint
 
 
-def _closable(content: Section, linkage: Linkage) -> Linkage:
+def _closable(content: Section, linkage: Linkage, shorthand: str = '') -> Linkage:
     try:
         Closure(linkage)
     except DefinitionError as error:
-        raise content.error(error.where, error.reason, error.remedy) from None
+        raise content.error(shorthand or error.where, error.reason, error.remedy) from None
     return linkage
 
 
 def _four_bar(content: Section) -> dict[str, Any]:
     """Write out crank a, coupler b, rocker c and ground d."""
-    a, b, c, d = (content.number(side, above=0.0, unit='m') for side in 'abcd')
+    a, b, c, d = (content.number(side, above=0.0, most=_FARTHEST, unit='m') for side in 'abcd')
     side = content.choice('assembly', ('left', 'right'), 'left')
     content.finish()
     return {
@@ -127,8 +133,8 @@ def _four_bar(content: Section) -> dict[str, Any]:
 
 def _inverted_slider_crank(content: Section) -> dict[str, Any]:
     """Write out crank a and the place of the swivel, from the crank's pivot."""
-    a = content.number('a', above=0.0, unit='m')
-    swivel = content.point('swivel')
+    a = content.number('a', above=0.0, most=_FARTHEST, unit='m')
+    swivel = content.point('swivel', most=_FARTHEST)
     side = content.choice('assembly', ('ahead', 'behind'), 'ahead')
     content.finish()
     return {

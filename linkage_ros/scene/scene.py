@@ -38,6 +38,7 @@ class RecordParameters:
         Name of the bag's folder; '' for the scene's name and the time.
     queue
         How many messages wait for the disk before further ones are dropped.
+
     """
 
     directory: str
@@ -68,6 +69,7 @@ class Scene:
         How the run is recorded; absent for no bag.
     files
         The scene and linkage files as they stand, by a name for each.
+
     """
 
     name: str

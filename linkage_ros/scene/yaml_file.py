@@ -17,18 +17,18 @@
 YAML files, read strictly.
 
 What PyYAML would let pass is refused here with file, line and key: a key that stands twice, a key
-that nobody reads, a value of the wrong type, a number that is none. Scalars follow YAML 1.2, so that
-``1e-3`` is a number and ``off`` a name.
+that nobody reads, a value of the wrong type, a number that is none. Scalars follow YAML 1.2, so
+that ``1e-3`` is a number and ``off`` a name.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from math import inf, isfinite
 from pathlib import Path
 import re
-from typing import Any, cast
+from typing import Any, cast, ClassVar
 
 from linkage_ros.errors import FileError, quoted
 import yaml
@@ -52,6 +52,7 @@ class Section:
         The mapping.
     line
         Line of the mapping.
+
     """
 
     def __init__(self, file: str, path: str, content: Mapping[str, Any], line: int = 0) -> None:
@@ -64,15 +65,13 @@ class Section:
     def __contains__(self, key: str) -> bool:
         return key in self._content
 
-    def keys(self) -> list[str]:
-        """Return the names in this section, in the order of the file."""
-        return list(self._content)
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._content)
 
     def error(self, key: str, reason: str, remedy: str) -> FileError:
         """Return the error for a key of this section ('' for the section itself)."""
         path = '.'.join(filter(None, (self._path, key)))
-        line = getattr(self._content, 'lines', {}).get(key, self._line)
-        return FileError(self.file, path, reason, remedy, line)
+        return FileError(self.file, path, reason, remedy, self._line_of(key))
 
     def number(
         self,
@@ -88,7 +87,7 @@ class Section:
         value = self._take(key, default, f'a number{unit and f" in [{unit}]"}')
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, f'{quoted(value)} is not a number', 'write a number')
-        if not isfinite(value) or not least <= value <= most or value <= above:
+        if not _is_finite(value) or not least <= value <= most or value <= above:
             bounds = ' and '.join(
                 text
                 for text in (
@@ -100,7 +99,7 @@ class Section:
             )
             raise self.error(
                 key,
-                f'{value} is out of bounds',
+                f'{quoted(value)} is out of bounds',
                 f'write a finite number{bounds and f", {bounds}"}{unit and f" [{unit}]"}',
             )
         return float(value)
@@ -117,7 +116,7 @@ class Section:
         value = self._take(key, default, 'a text')
         if value == default and default is not None:
             return default
-        if not isinstance(value, str) or not value:
+        if not isinstance(value, str) or not value.isprintable() or not value:
             raise self.error(key, f'{quoted(value)} is not a text', 'write a name; quote numbers')
         return value
 
@@ -128,24 +127,28 @@ class Section:
             raise self.error(key, f'{quoted(value)} is none', f'write {" or ".join(choices)}')
         return cast(str, value)
 
-    def point(self, key: str) -> tuple[float, float]:
-        """Return two finite numbers."""
+    def point(self, key: str, *, most: float = inf) -> tuple[float, float]:
+        """Return two finite numbers, of which none is beyond ±most."""
         value = self._take(key, None, 'two numbers [x, y]')
         if (
             not isinstance(value, list)
             or len(value) != 2
             or any(isinstance(v, bool) or not isinstance(v, int | float) for v in value)
-            or not all(map(isfinite, value))
+            or not all(map(_is_finite, value))
         ):
             raise self.error(
                 key, f'{quoted(value)} is not a point', 'write two finite numbers: [x, y]'
+            )
+        if max(map(abs, value)) > most:
+            raise self.error(
+                key, f'{quoted(value)} is out of bounds', f'write numbers of at most {most:g}'
             )
         return float(value[0]), float(value[1])
 
     def section(self, key: str, *, required: bool = True) -> Section:
         """Return a mapping within this one; an empty one where it is absent and not required."""
         value = self._take(key, None if required else {}, 'a mapping')
-        line = getattr(self._content, 'lines', {}).get(key, self._line)
+        line = self._line_of(key)
         if not isinstance(value, dict):
             raise self.error(key, f'{quoted(value)} is not a mapping', f'write {key}: {{…}}')
         path = '.'.join(filter(None, (self._path, key)))
@@ -159,13 +162,24 @@ class Section:
         ----------
         known
             Further keys that could have stood here, for the suggestion.
+
         """
         for key in self._content:
             if key not in self._taken:
                 names = sorted(self._taken | set(known))
                 near = get_close_matches(key, names, n=1)
-                remedy = f'did you mean {near[0]!r}?' if near else f'known: {", ".join(names)}'
+                known_names = f'known: {", ".join(names)}' if names else 'leave it out'
+                remedy = f'did you mean {near[0]!r}?' if near else known_names
                 raise self.error(key, 'unknown key', remedy)
+
+    def _line_of(self, key: str) -> int:
+        """Return the line of a key, or of as much of a dotted one as there is."""
+        line, content = self._line, self._content
+        for part in (key,) if key in content else key.split('.'):
+            if not isinstance(content, _LinedDict) or part not in content:
+                break
+            line, content = content.lines[part], content[part]
+        return line
 
     def _take(self, key: str, default: Any, expected: str) -> Any:
         self._taken.add(key)
@@ -174,6 +188,13 @@ class Section:
                 raise self.error('', f'the key {key!r} is missing', f'add {key}: {expected}')
             return default
         return self._content[key]
+
+
+def _is_finite(value: float) -> bool:
+    try:
+        return isfinite(value)
+    except OverflowError:  # a whole number beyond 1e308
+        return False
 
 
 def read_yaml(file: str | Path) -> tuple[Section, bytes]:
@@ -191,9 +212,10 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
     ------
     FileError
         Where it cannot be read, is not UTF-8, not YAML, not a mapping, or a key stands twice.
+
     """
     try:
-        with open(file, 'rb') as stream:
+        with Path(file).open('rb') as stream:
             data = stream.read(_LARGEST_FILE + 1)
     except OSError as error:
         raise FileError(
@@ -221,6 +243,7 @@ def parse_yaml(data: bytes, file: str) -> Section:
     ------
     FileError
         As `read_yaml`.
+
     """
     try:
         text = data.decode('utf-8')
@@ -264,19 +287,23 @@ class _LinedDict(dict[str, Any]):
 class _StrictLoader(yaml.SafeLoader):
     """PyYAML's safe loader with the scalars of YAML 1.2 and without repeated keys."""
 
-    yaml_implicit_resolvers: dict[str, Any] = {}
-    yaml_constructors: dict[Any, Any] = {None: yaml.SafeLoader.construct_undefined}
+    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 (as in the base class)
+    yaml_constructors: ClassVar[dict[Any, Any]] = {None: yaml.SafeLoader.construct_undefined}
     file: str
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         """Build a mapping whose keys are texts, each once."""
+        if not isinstance(node, yaml.MappingNode):  # one that is tagged !!map
+            raise yaml.constructor.ConstructorError(
+                None, None, 'expected a mapping', node.start_mark
+            )
         mapping = _LinedDict()
         for key_node, value_node in node.value:
             key = self.construct_object(key_node, deep=True)
             line = key_node.start_mark.line + 1
-            if not isinstance(key, str):
+            if not isinstance(key, str) or not key.isprintable():
                 raise FileError(
-                    self.file, '', f'the key {quoted(key)} is not a name', 'quote it', line
+                    self.file, '', f'the key {quoted(key)} is not a name', 'write a name', line
                 )
             if key in mapping:
                 first = mapping.lines[key]
@@ -292,15 +319,18 @@ class _StrictLoader(yaml.SafeLoader):
         yield self.construct_mapping(node)
 
 
-for _tag, _construct in {
+_CONSTRUCTORS: dict[str, Callable[[Any, Any], Any]] = {
     'map': _StrictLoader.construct_yaml_map,
     'seq': _StrictLoader.construct_yaml_seq,
     'str': _StrictLoader.construct_yaml_str,
     'null': _StrictLoader.construct_yaml_null,
-    'bool': lambda _, node: node.value.lower() == 'true',
-    'int': lambda _, node: int(node.value),
-    'float': lambda _, node: float(node.value.replace('.inf', 'inf').replace('.nan', 'nan')),
-}.items():
+    'bool': lambda self, node: self.construct_scalar(node).lower() == 'true',
+    'int': lambda self, node: int(self.construct_scalar(node)),
+    'float': lambda self, node: float(
+        self.construct_scalar(node).replace('.inf', 'inf').replace('.nan', 'nan')
+    ),
+}
+for _tag, _construct in _CONSTRUCTORS.items():
     _StrictLoader.add_constructor(f'tag:yaml.org,2002:{_tag}', _construct)
 for _tag, _pattern, _first in (
     ('bool', r'true|True|TRUE|false|False|FALSE', 'tTfF'),

@@ -46,6 +46,7 @@ from typing import NamedTuple
 from linkage_ros.kinematics.diagonal import CrankDiagonal, margin, reach, SMALLEST
 from linkage_ros.kinematics.status import Status
 
+
 class RPRPose(NamedTuple):
     """
     The dyad at one crank direction, angles in the frame of the loop.
@@ -62,6 +63,7 @@ class RPRPose(NamedTuple):
         r, from the foot of A on the line to the swivel, along the line, in the unit of the lengths.
     p, q
         The quotients of the derivation, of which the rates consist.
+
     """
 
     status: Status
@@ -85,6 +87,7 @@ class RPRDyad:
     sign
         The assembly: +1 where the swivel lies ahead of A along the rod, −1 where it lies behind. Where
         |d − a| = |h|: for 0 < φ < 2π.
+
     """
 
     __slots__ = ('_constants', '_diagonal', 'fold_margin', 'sides')

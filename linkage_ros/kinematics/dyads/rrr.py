@@ -69,6 +69,7 @@ from linkage_ros.kinematics.diagonal import (
 )
 from linkage_ros.kinematics.status import Status
 
+
 class RRRPose(NamedTuple):
     """
     The dyad at one crank direction, angles in the frame of the loop.
@@ -87,6 +88,7 @@ class RRRPose(NamedTuple):
         From A to D.
     halves
         Numerator and denominator of tan(β/2), then of tan(γ'/2).
+
     """
 
     status: Status
@@ -112,6 +114,7 @@ class RRRDyad:
     sign
         The assembly: +1 where B lies left of A→D, −1 where it lies right of it. In a change-point
         linkage: for 0 < φ < π.
+
     """
 
     __slots__ = ('_constants', '_diagonal', 'fold_margin', 'sides', 'stretch_margin')

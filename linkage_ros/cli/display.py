@@ -1,0 +1,117 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A run as it goes: a table that renews itself with rich, a line a second without."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+import sys
+from time import monotonic
+from typing import Any
+
+from linkage_ros.ros.node import LinkageNode
+from linkage_ros.ros.tick_loop import TickLoop
+
+_RICH = find_spec('rich') is not None
+if _RICH:
+    from rich.live import Live
+    from rich.table import Table
+
+_LIVE_PERIOD, _PLAIN_PERIOD = 0.25, 1.0
+
+
+class Display:
+    """
+    Shows a running node.
+
+    Parameters
+    ----------
+    plain
+        Whether to print lines also where a live display is possible.
+
+    """
+
+    def __init__(self, *, plain: bool) -> None:
+        live = not plain and _RICH and sys.stdout.isatty()
+        self._live: Any = Live(transient=True, auto_refresh=False) if live else None
+        self._period = _LIVE_PERIOD if live else _PLAIN_PERIOD
+        self._shown = monotonic()
+        self._before = (0, self._shown)
+        self._entered = False
+
+    def close(self) -> None:
+        """End the display; calling it again does nothing."""
+        if self._entered:
+            self._live.stop()
+            self._entered = False
+
+    def show(self, node: LinkageNode) -> None:
+        """Show the node as it is now, if it is time."""
+        now = monotonic()
+        if node.loop is None or node.scene is None or now - self._shown < self._period:
+            return
+        self._shown = now
+        ticks = node.loop.counts.ticks
+        rate = (ticks - self._before[0]) / (now - self._before[1])
+        self._before = (ticks, now)
+        joints = list(node.scene.linkage.joints)
+        if self._live is None:
+            print(_line(node.loop, joints, rate), flush=True)
+            return
+        if not self._entered:
+            self._live.start()
+            self._entered = True
+        crank = node.scene.linkage.input.joint
+        self._live.update(_table(node.loop, crank, joints, rate), refresh=True)
+
+
+def _state(loop: TickLoop) -> tuple[str, list[tuple[float, float | None]]]:
+    """Return the input's age as text, and angle and rate of crank and joints."""
+    tick = loop.counts.last
+    if tick is None or tick.position is None:
+        return 'no crank', []
+    if tick.motion is None:
+        return f'{tick.position.status.value}, gap {tick.position.gap:.3g} m', []
+    crank, _, joints, rates = tick.motion
+    values: list[tuple[float, float | None]] = [(crank.angle, crank.rate)]
+    values += zip(joints, rates or [None] * len(joints), strict=True)
+    return f'{crank.age * 1e-6:.2f} ms', values
+
+
+def _line(loop: TickLoop, joints: list[str], rate: float) -> str:
+    age, values = _state(loop)
+    counts = loop.counts
+    shown = '  '.join(
+        f'{name} {value:+.4f}'
+        for name, (value, _) in zip(['crank', *joints], values, strict=False)
+    )
+    return f'{rate:7.1f} ticks/s  lost {counts.lost}  late {counts.late}  age {age}  {shown}'
+
+
+def _table(loop: TickLoop, crank: str, joints: list[str], rate: float) -> Any:
+    age, values = _state(loop)
+    counts = loop.counts
+    table = Table(
+        title=f'{rate:.1f} ticks/s   lost {counts.lost}   late {counts.late}   '
+        f'input age {age}   samples {counts.received}',
+        title_justify='left',
+    )
+    table.add_column('joint')
+    table.add_column('position [rad, m]', justify='right', min_width=18)
+    table.add_column('rate [1/s]', justify='right', min_width=14)
+    for name, (value, speed) in zip([crank, *joints], values, strict=False):
+        table.add_row(name, f'{value:+.6f}', '' if speed is None else f'{speed:+.5f}')
+    return table

@@ -1,0 +1,67 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``linkage``: one command; each subcommand is a module, loaded where it is named."""
+
+from __future__ import annotations
+
+import argparse
+from importlib import import_module
+import sys
+
+from linkage_ros import __version__
+from linkage_ros.errors import LinkageError
+from linkage_ros.stop import stop_on_signals
+
+COMMANDS = {
+    'run': 'run a scene as a ROS 2 node, with a live display',
+    'demo': 'run the demo scene with a crank of its own, on a ROS graph of its own',
+    'plot': 'draw the joints of a bag over the angle of its crank',
+}
+"""Name of each subcommand, also that of its module in this folder, and what it does."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run ``linkage``; return 0, 1 for a run that went wrong, or 2 for wrong input."""
+    # First of all: from here on Ctrl-C ends a run by closing its bag.
+    stop = stop_on_signals()
+    arguments = sys.argv[1:] if arguments is None else arguments
+    commands = '\n'.join(f'  {name:<6} {text}' for name, text in COMMANDS.items())
+    parser = argparse.ArgumentParser(
+        prog='linkage',
+        description=f'Planar linkages for ROS 2.\n\ncommands:\n{commands}',
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog='linkage COMMAND --help says more.',
+    )
+    parser.add_argument('--version', action='version', version=f'linkage_ros {__version__}')
+    parser.add_argument('command', choices=COMMANDS, metavar='COMMAND')
+    name = parser.parse_args(arguments[:1]).command
+
+    module = import_module(f'linkage_ros.cli.{name}')
+    subparser = argparse.ArgumentParser(prog=f'linkage {name}', description=module.__doc__)
+    module.add_arguments(subparser)
+    try:
+        return int(module.run(subparser.parse_args(arguments[1:]), stop))
+    except LinkageError as error:
+        print(f'linkage {name}: {error}', file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        # Who read our output has gone; there is nobody to tell.
+        sys.stderr.close()
+        return 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,143 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Draw the joints of a bag, and their rates, over the angle of its crank."""
+
+from __future__ import annotations
+
+import argparse
+from importlib.util import find_spec
+from math import nan, pi, tau
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.replay import recorded_scene, replay
+from linkage_ros.effects.turns import wrapped
+from linkage_ros.errors import BagError, LinkageError
+from linkage_ros.joint_state import JointStateReader, Rejection
+from linkage_ros.kinematics.linkage import RevoluteJoint
+
+_COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
+"""Okabe and Ito's, which colour-blind readers can tell."""
+
+Curves = dict[str, tuple[list[float], list[float]]]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
+    parser.add_argument('-o', '--output', type=Path, help='PNG, SVG or PDF; without it BAG.png')
+
+
+def run(arguments: argparse.Namespace, _stop: Event) -> int:
+    """Draw the bag."""
+    picture = arguments.output or Path(f'{str(arguments.bag).rstrip("/")}.png')
+    draw(arguments.bag, picture)
+    print(picture)
+    return 0
+
+
+def draw(bag_path: Path, picture: Path) -> None:
+    """
+    Draw a bag: each published joint, and its rate where there is one, over one turn of the crank.
+
+    Raises
+    ------
+    LinkageError
+        Where matplotlib is not installed, or the bag holds nothing to draw.
+
+    """
+    if find_spec('matplotlib') is None:
+        raise LinkageError(
+            'matplotlib', 'is not installed', 'pip install linkage_ros[report], or apt its package'
+        )
+    bag = read_bag(bag_path, allow_truncated=True)
+    scene = recorded_scene(bag)
+    positions: Curves = {name: ([], []) for name in scene.linkage.joints}
+    rates: Curves = {name: ([], []) for name in scene.linkage.joints}
+    readers = {name: JointStateReader(name) for name in scene.linkage.joints}
+    states = 0
+    for _, recorded, tick in replay(bag, scene):
+        if tick.motion is None:
+            continue
+        states += 1
+        crank = tick.motion.crank.angle % tau
+        for name, reader in readers.items():
+            sample = reader.read(recorded)
+            if isinstance(sample, Rejection):
+                raise BagError(bag_path, f'{name}: {sample.value}', 'name another bag')
+            turning = isinstance(scene.linkage.joints[name], RevoluteJoint)
+            _add(
+                positions[name], crank, wrapped(sample.angle) if turning else sample.angle, turning
+            )
+            if sample.rate is not None:
+                _add(rates[name], crank, sample.rate, False)
+    if not states:
+        raise BagError(bag_path, 'holds no joint states', 'record a run with a crank')
+    title = f'{scene.name}: dependent joints over one turn of {scene.linkage.input.joint}'
+    _figure(f'{title} ({states} joint states)', positions, rates, picture)
+
+
+def _add(curve: tuple[list[float], list[float]], x: float, y: float, turning: bool) -> None:
+    """Add a point; where crank or joint begins a new turn, lift the pen."""
+    xs, ys = curve
+    if xs and (abs(x - xs[-1]) > pi or (turning and abs(y - ys[-1]) > pi)):
+        xs.append(nan)
+        ys.append(nan)
+    xs.append(x)
+    ys.append(y)
+
+
+def _figure(title: str, positions: Curves, rates: Curves, picture: Path) -> None:
+    import matplotlib as mpl  # local import: an extra, and slow to load
+
+    mpl.use('Agg')
+    from matplotlib import pyplot as plt
+
+    panels = [('joint position [rad, m]', positions)]
+    if any(xs for xs, _ in rates.values()):
+        panels.append(('joint rate [rad/s, m/s]', rates))
+    figure, axes = plt.subplots(
+        len(panels), 1, sharex=True, squeeze=False, figsize=(8, 1 + 3 * len(panels)), dpi=120
+    )
+    for (label, curves), axis in zip(panels, axes[:, 0], strict=True):
+        _panel(axis, label, curves)
+    axes[-1, 0].set_xlabel('crank angle [rad]')
+    figure.suptitle(title, fontsize=11)
+    figure.tight_layout()
+    try:
+        figure.savefig(picture)
+    except (OSError, ValueError) as error:
+        raise LinkageError(str(picture), str(error), 'name another picture with -o') from None
+    finally:
+        plt.close(figure)
+
+
+def _panel(axis: Any, label: str, curves: Curves) -> None:
+    for number, (name, (xs, ys)) in enumerate(curves.items()):
+        axis.plot(
+            xs,
+            ys,
+            label=name,
+            color=_COLOURS[number % len(_COLOURS)],
+            linewidth=1.6,
+        )
+    axis.set_ylabel(label)
+    axis.set_xlim(0.0, tau)
+    axis.set_xticks([0.0, pi / 2, pi, 3 * pi / 2, tau], ['0', 'π/2', 'π', '3π/2', '2π'])
+    axis.grid(alpha=0.3)
+    axis.legend(loc='best', frameon=False)

@@ -1,0 +1,82 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a run came to, in a few lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.replay import recorded_scene, replay
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.status import Status
+from linkage_ros.ros.node import LinkageNode
+
+
+def summary(node: LinkageNode) -> str:
+    """Return the summary of a node's last run."""
+    loop = node.loop
+    if loop is None:
+        return 'nothing ran'
+    counts = loop.counts
+    rejected = sum(counts.rejected.values())
+    per_second = counts.ticks / loop.seconds
+    rows = [('ticks', f'{counts.ticks} in {loop.seconds:.2f} s, {per_second:.1f} a second')]
+    if counts.lateness.count:
+        p50, p99 = (counts.lateness.percentile(p) / 1e3 for p in (50, 99))
+        longest = counts.lateness.longest / 1e3
+        rows += [
+            ('', f'{counts.late} late by more than a period, {counts.lost} lost'),
+            ('lateness', f'p50 {p50:.0f} µs, p99 {p99:.0f} µs, max {longest:.0f} µs'),
+        ]
+    rows += [
+        ('published', f'{counts.published} joint states; {counts.silent} ticks without a crank'),
+        ('samples', f'{counts.received} received, {counts.used} used, {rejected} rejected'),
+    ]
+    rows += [
+        (status.value, f'{counts.unclosed[status]} ticks')
+        for status in (Status.TOGGLE, Status.OPEN, Status.INDETERMINATE)
+        if counts.unclosed[status]
+    ]
+    for recording in node.recordings:
+        rows += [
+            ('recorded', f'{t.name}: {t.recorded} of {t.received}, {t.dropped} dropped')
+            for t in recording.topics
+        ]
+        rows += [('bag', str(recording.folder)), ('proof', _proof(recording.folder))]
+    if node.recording_failure:
+        rows.append(('FAILED', node.recording_failure))
+    return '\n'.join(f'{name:<10}{text}' for name, text in rows)
+
+
+def _proof(folder: Path) -> str:
+    """Replay a bag: whether it gives the same bytes, and how well its loop closed."""
+    try:
+        bag = read_bag(folder)
+        scene = recorded_scene(bag)
+        closure = Closure(scene.linkage)
+        states = same = 0
+        worst = 0.0
+        for _, recorded, tick in replay(bag, scene):
+            states += 1
+            same += tick.message == recorded
+            if tick.motion is not None:
+                worst = max(worst, closure.residual(tick.motion.position))
+    except LinkageError as error:
+        return str(error)
+    proof = f'{same} of {states} joint states replay to the same bytes'
+    return f'{proof}; worst loop residual {worst:.1e} m'

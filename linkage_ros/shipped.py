@@ -1,0 +1,51 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Where the scenes and linkages that come with the package lie."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import sys
+
+from linkage_ros.errors import FileError
+
+
+def shipped(name: str) -> Path:
+    """
+    Return the path of a file under ``config/``.
+
+    A checkout comes first, since an editable install's copies go stale; then a robot's prefixes,
+    then the interpreter's.
+
+    Raises
+    ------
+    FileError
+        Where the file is not installed.
+
+    """
+    checkout = Path(__file__).parent.parent
+    prefixes = [
+        *filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)),
+        sys.prefix,
+    ]
+    folders = [Path(prefix, 'share', 'linkage_ros') for prefix in prefixes]
+    if (checkout / 'package.xml').is_file():
+        folders.insert(0, checkout)
+    for folder in folders:
+        if (folder / 'config' / name).is_file():
+            return folder / 'config' / name
+    raise FileError(f'config/{name}', '', 'is not installed', 'install linkage_ros again')

@@ -1,0 +1,255 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A recording on a disk that fills or fails: what was written stays a bag.
+
+Real faults where the machine allows: a tmpfs of 2 MiB, a limit on the size of a file, SIGKILL.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+import errno
+import json
+import os
+from pathlib import Path
+import pickle
+import signal
+import subprocess
+import sys
+
+from linkage_ros.bag import writer as writer_module
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import BagError, RecordingError
+import pytest
+import yaml
+
+ATTACHMENTS = {'scene.yaml': ('text/yaml', b'linkage: four_bar\n')}
+ROOT = Path(__file__).parents[2]
+
+
+def _write_until_it_fails(writer, messages, *, flush_every=10**9):
+    """Return how many messages were taken before the first error, and the error."""
+    taken = 0
+    try:
+        for taken, message in enumerate(messages):
+            writer.write(*message)
+            if taken % flush_every == flush_every - 1:
+                writer.flush()
+    except RecordingError as error:
+        return taken, error
+    return len(messages), None
+
+
+@pytest.mark.parametrize('flush_every', [10**9, 100])
+def test_a_full_disk_costs_no_message_that_was_taken(
+    small_disk, topics, messages, readers, flush_every
+):
+    writer = BagWriter(small_disk / 'run', topics, ATTACHMENTS)
+    taken, error = _write_until_it_fails(writer, messages, flush_every=flush_every)
+    assert 2000 < taken < len(messages), 'the disk was to fill in the middle'
+    assert str(error) == (
+        f'{small_disk}/run: the recording ended early: No space left on device; what is on the '
+        'disk stays readable; make room there before the next recording'
+    )
+    summary = writer.close()
+    # The message at which the disk was found full went into the room set aside.
+    assert taken <= sum(summary.counts) <= taken + 1
+    readers.agree(small_disk / 'run', topics, messages[: sum(summary.counts)])
+    text = yaml.safe_load((small_disk / 'run' / 'metadata.yaml').read_text())
+    information = text['rosbag2_bagfile_information']
+    assert information['message_count'] == sum(summary.counts)
+    assert 'No space left' in information['custom_data']['linkage_ros.failure']
+    assert read_bag(small_disk / 'run').attachments == {'scene.yaml': b'linkage: four_bar\n'}
+
+
+def test_when_another_process_takes_the_reserve_whole_chunks_remain(
+    small_disk, topics, messages, readers, monkeypatch
+):
+    monkeypatch.setattr(writer_module.Reserve, 'release', lambda reserve: None)
+    writer = BagWriter(small_disk / 'run', topics)
+    taken, _ = _write_until_it_fails(writer, messages, flush_every=100)
+    summary = writer.close()
+    kept = sum(summary.counts)
+    # At most the chunk in progress and those that made way for the index.
+    assert taken - 600 < kept < taken
+    assert summary.start == min(message.log_time for message in messages[:kept])
+    readers.agree(small_disk / 'run', topics, messages[:kept])
+
+
+def test_a_disk_that_is_full_at_the_end_still_gets_an_index(small_disk, topics, messages, readers):
+    writer = BagWriter(small_disk / 'run', topics)
+    for message in messages[:1000]:
+        writer.write(*message)
+    writer.flush()
+    with (small_disk / 'other').open('wb', buffering=0) as other, suppress(OSError):
+        while True:
+            other.write(bytes(4096))
+    with pytest.raises(RecordingError, match='No space left'):
+        writer.close()
+    assert writer.close().counts == (500, 500)
+    readers.agree(small_disk / 'run', topics, messages[:1000])
+
+
+LIMITED = """
+import json, pickle, resource, signal, sys
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import RecordingError
+folder, limit, flush_every, pickled = sys.argv[1:]
+topics, messages = pickle.load(open(pickled, 'rb'))
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+writer = BagWriter(folder, topics)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(limit), int(limit)))
+taken = 0
+try:
+    for message in messages:
+        writer.write(*message)
+        taken += 1
+        if taken % int(flush_every) == 0:
+            writer.flush()
+    writer.close()
+except RecordingError as error:
+    print(json.dumps([taken, writer.close().counts, str(error)]))
+"""
+
+
+@pytest.mark.parametrize('limit', [1_000_000, 1_000_001, 1_003_000, 1_060_000])
+@pytest.mark.parametrize('flush_every', [7, 100, 10**9])
+def test_a_limit_on_the_files_size_leaves_a_bag_of_whole_chunks(
+    tmp_path, topics, messages, readers, limit, flush_every
+):
+    plain = [tuple(message) for message in messages]
+    pickled = tmp_path / 'messages'
+    pickled.write_bytes(_pickle(topics, plain))
+    folder = tmp_path / 'run'
+    script = [sys.executable, '-c', LIMITED, folder, str(limit), str(flush_every), pickled]
+    done = subprocess.run(script, cwd=ROOT, capture_output=True, text=True, check=True)
+    taken, counts, error = json.loads(done.stdout)
+    assert 'the recording ended early: File too large' in error
+    assert 3000 < taken < len(messages)
+    # Lost are the chunk in progress, and at the file's end as much as the index takes.
+    assert taken - 1200 < sum(counts) <= taken
+    readers.agree(folder, topics, messages[: sum(counts)])
+    assert (folder / 'run_0.mcap').stat().st_size <= limit
+
+
+def _pickle(topics, messages):
+    return pickle.dumps((topics, messages))
+
+
+@pytest.mark.parametrize('healthy_writes', [6, 20, 21])
+def test_a_disk_that_dies_leaves_the_part_that_it_took(
+    tmp_path, topics, messages, monkeypatch, healthy_writes
+):
+    writer = BagWriter(tmp_path / 'run', topics, ATTACHMENTS)
+    healthy = iter(range(healthy_writes))
+    pwrite = os.pwrite
+
+    def dying(*arguments):
+        if next(healthy, None) is None:
+            raise OSError(errno.EIO, 'Input/output error')
+        return pwrite(*arguments)
+
+    monkeypatch.setattr('os.pwrite', dying)
+    _, error = _write_until_it_fails(writer, messages)
+    assert 'ended early: Input/output error' in str(error)
+    kept = sum(writer.close().counts)
+    bag = read_bag(tmp_path / 'run', allow_truncated=True)
+    assert bag.truncated
+    assert [message.data for message in bag.messages()] == [m.data for m in messages[:kept]]
+    assert kept > 200
+
+
+@pytest.mark.parametrize('when', ['flush', 'close'])
+def test_a_failing_fsync_is_said(tmp_path, topics, messages, readers, monkeypatch, when):
+    writer = BagWriter(tmp_path / 'run', topics)
+    for message in messages[:100]:
+        writer.write(*message)
+
+    def failing(descriptor):
+        raise OSError(errno.EIO, 'Input/output error')
+
+    monkeypatch.setattr('os.fsync', failing)
+    with pytest.raises(RecordingError, match='Input/output error'):
+        getattr(writer, when)()
+    with pytest.raises(RecordingError, match='Input/output error'):
+        writer.write(*messages[100])
+    assert sum(writer.close().counts) == 100
+    readers.agree(tmp_path / 'run', topics, messages[:100])
+
+
+def test_a_failing_rename_is_said_and_leaves_the_first_metadata(
+    tmp_path, topics, messages, readers, monkeypatch
+):
+    writer = BagWriter(tmp_path / 'run', topics)
+    for message in messages[:100]:
+        writer.write(*message)
+
+    def failing(path, target):
+        raise OSError(errno.EDQUOT, 'Disk quota exceeded')
+
+    monkeypatch.setattr('pathlib.Path.replace', failing)
+    with pytest.raises(RecordingError, match='Disk quota exceeded'):
+        writer.close()
+    assert sorted(p.name for p in (tmp_path / 'run').iterdir()) == ['metadata.yaml', 'run_0.mcap']
+    readers.agree(tmp_path / 'run', topics, messages[:100])
+
+
+KILLED = """
+import pickle, sys, time
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.writer import BagWriter
+kind, folder, pickled = sys.argv[1:]
+topics, messages = pickle.load(open(pickled, 'rb'))
+writer = BagWriter(folder, topics, {'scene.yaml': ('text/yaml', b'linkage: four_bar')})
+if kind == 'writer':
+    for message in messages[:500]:
+        writer.write(*message)
+    writer.flush()
+    for message in messages[500:600]:
+        writer.write(*message)
+    print('flushed', flush=True)
+    time.sleep(60)
+recorder = Recorder(writer, flush_period=0.05)
+said = False
+for message in messages:
+    recorder.offer(*message)
+    time.sleep(0.001)
+    if not said and recorder._safe[0] >= 100:
+        said = True
+        print('flushed', flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize(('kind', 'least'), [('writer', 500), ('recorder', 200)])
+def test_a_kill_leaves_what_was_flushed(tmp_path, topics, messages, kind, least):
+    pickled = tmp_path / 'messages'
+    pickled.write_bytes(_pickle(topics, [tuple(message) for message in messages]))
+    script = [sys.executable, '-c', KILLED, kind, tmp_path / 'run', pickled]
+    with subprocess.Popen(script, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == 'flushed\n'
+        process.send_signal(signal.SIGKILL)
+    assert sorted(p.name for p in (tmp_path / 'run').iterdir()) == ['metadata.yaml', 'run_0.mcap']
+    with pytest.raises(BagError, match='has no end: its recording was killed'):
+        read_bag(tmp_path / 'run')
+    bag = read_bag(tmp_path / 'run', allow_truncated=True)
+    found = [message.data for message in bag.messages()]
+    assert len(found) >= least
+    assert found == [message.data for message in messages[: len(found)]]
+    assert bag.topics == topics
+    assert bag.attachments == {'scene.yaml': b'linkage: four_bar'}

@@ -1,0 +1,208 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What `Recorder` promises the hot path: it never waits, and every message is accounted for."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import threading
+
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.writer import BagWriter
+import pytest
+import yaml
+
+
+class StalledWriter(BagWriter):
+    """A writer whose disk stops answering at a message, until the test lets it go on."""
+
+    def __init__(self, *arguments, answered=0):
+        super().__init__(*arguments)
+        self.reached, self.answer = threading.Event(), threading.Event()
+        self.answered = answered
+
+    def write(self, *message):
+        if self.answered == 0:
+            self.reached.set()
+            self.answer.wait(30)
+        else:
+            self.answered -= 1
+        return super().write(*message)
+
+
+def _counts(summary):
+    return [(counts.received, counts.recorded, counts.dropped) for counts in summary.topics]
+
+
+def test_all_that_was_offered_is_in_the_bag(tmp_path, topics, messages, readers):
+    recorder = Recorder(BagWriter(tmp_path / 'run', topics))
+    for message in messages:
+        recorder.offer(*message)
+    summary = recorder.stop({'seed': '7'})
+    assert _counts(summary) == [(6000, 6000, 0), (6000, 6000, 0)]
+    assert summary.failure is None
+    assert summary.folder == tmp_path / 'run'
+    assert summary.size == (tmp_path / 'run' / 'run_0.mcap').stat().st_size
+    readers.agree(tmp_path / 'run', topics, messages)
+
+
+def test_the_bag_says_what_is_missing_from_it(tmp_path, topics, messages):
+    writer = StalledWriter(tmp_path / 'run', topics)
+    recorder = Recorder(writer, capacity=0)
+    for message in messages[:5]:
+        recorder.offer(*message)
+    writer.answer.set()
+    recorder.stop({'seed': '7'})
+    text = yaml.safe_load((tmp_path / 'run' / 'metadata.yaml').read_text())
+    custom = text['rosbag2_bagfile_information']['custom_data']
+    assert custom['seed'] == '7'
+    assert json.loads(custom['linkage_ros.dropped']) == {'/crank': 3, '/arm/joint_states': 2}
+
+
+def test_a_stalled_disk_stalls_nobody_and_the_overflow_is_counted(
+    tmp_path, topics, messages, readers
+):
+    writer = StalledWriter(tmp_path / 'run', topics)
+    recorder = Recorder(writer, capacity=100)
+    recorder.offer(*messages[0])
+    assert writer.reached.wait(10)
+    for message in messages[1:501]:
+        recorder.offer(*message)
+    # All 500 offers are back, and the writer still holds the first message in its hands.
+    assert not writer.answer.is_set()
+    counts = recorder.inspect()
+    assert sum(c.received for c in counts) == 501
+    assert sum(c.recorded for c in counts) == 0
+    assert all(c.received == c.recorded + c.dropped + c.waiting for c in counts)
+    writer.answer.set()
+    summary = recorder.stop()
+    assert _counts(summary) == [(251, 51, 200), (250, 50, 200)]
+    readers.agree(tmp_path / 'run', topics, messages[:101])
+
+
+def test_a_disk_that_never_answers_does_not_keep_the_process(tmp_path, topics, messages):
+    writer = StalledWriter(tmp_path / 'run', topics, answered=4)
+    recorder = Recorder(writer, flush_period=1000.0)
+    for message in messages[:10]:
+        recorder.offer(*message)
+    assert writer.reached.wait(10)
+    summary = recorder.stop(timeout=0.05)
+    # Four are with the writer, but no flush has brought them to the disk.
+    assert _counts(summary) == [(5, 0, 5), (5, 0, 5)]
+    assert 'run: the disk has not answered for 0.05 s' in summary.failure
+    writer.answer.set()
+    assert recorder.stop() is summary
+
+
+def test_a_failure_ends_the_recording_and_not_the_process(
+    tmp_path, topics, messages, readers, monkeypatch
+):
+    recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.01)
+    pwrite = os.pwrite
+
+    def filling(descriptor, data, offset):
+        if offset > 300_000:
+            raise OSError(errno.ENOSPC, 'No space left on device')
+        return pwrite(descriptor, data, offset)
+
+    monkeypatch.setattr('os.pwrite', filling)
+    for message in messages[:6000]:
+        recorder.offer(*message)
+    recorder._thread.join(20)
+    assert 'run: the recording ended early: No space left on device' in str(recorder.failure)
+    for message in messages[6000:]:
+        recorder.offer(*message)
+    assert all(c.received == c.recorded + c.dropped and not c.waiting for c in recorder.inspect())
+    summary = recorder.stop()
+    assert summary.failure == str(recorder.failure)
+    assert [counts.received for counts in summary.topics] == [6000, 6000]
+    assert all(c.received == c.recorded + c.dropped for c in summary.topics)
+    kept = sum(counts.recorded for counts in summary.topics)
+    assert 500 < kept < 6000
+    readers.agree(tmp_path / 'run', topics, messages[:kept])
+
+
+def test_an_error_nobody_thought_of_is_a_failure_too(tmp_path, topics, messages, monkeypatch):
+    recorder = Recorder(BagWriter(tmp_path / 'run', topics))
+
+    def broken(*message):
+        raise ZeroDivisionError('a slip')
+
+    monkeypatch.setattr(recorder._writer, 'write', broken)
+    recorder.offer(*messages[0])
+    recorder.offer(*messages[1])
+    summary = recorder.stop()
+    assert 'ended early: ZeroDivisionError: a slip; please report this' in summary.failure
+    assert _counts(summary) == [(1, 0, 1), (1, 0, 1)]
+    assert list(read_bag(tmp_path / 'run').messages()) == []
+
+
+def test_a_message_with_an_impossible_time_is_dropped_alone(tmp_path, topics, messages, readers):
+    recorder = Recorder(BagWriter(tmp_path / 'run', topics))
+    for message in [messages[0], messages[1]._replace(log_time=-1), *messages[2:10]]:
+        recorder.offer(*message)
+    assert _counts(recorder.stop()) == [(5, 5, 0), (5, 4, 1)]
+    readers.agree(tmp_path / 'run', topics, [messages[0], *messages[2:10]])
+
+
+def test_after_the_end_an_offer_is_counted_and_forgotten(tmp_path, topics, messages):
+    recorder = Recorder(BagWriter(tmp_path / 'run', topics))
+    recorder.offer(*messages[0])
+    summary = recorder.stop()
+    recorder.offer(*messages[0])
+    assert recorder.stop() is summary
+    assert [c.dropped for c in recorder.inspect()] == [1, 0]
+
+
+@pytest.mark.parametrize('capacity', [50, 10**6])
+def test_threads_that_offer_at_once_lose_no_count(tmp_path, topics, messages, readers, capacity):
+    recorder = Recorder(BagWriter(tmp_path / 'run', topics), capacity=capacity)
+    start = threading.Barrier(4)
+
+    def offer_all():
+        start.wait()
+        for message in messages[:5000]:
+            recorder.offer(*message)
+
+    threads = [threading.Thread(target=offer_all) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
+        for counts in recorder.inspect():
+            assert counts.waiting >= 0
+            assert counts.recorded >= 0
+    summary = recorder.stop(timeout=60)
+    assert [counts.received for counts in summary.topics] == [10_000, 10_000]
+    assert all(c.received == c.recorded + c.dropped for c in summary.topics)
+    found = readers.mcap(tmp_path / 'run' / 'run_0.mcap')
+    assert len(found) == sum(counts.recorded for counts in summary.topics)
+    if capacity > 50:
+        assert len(found) == 20_000
+
+
+def test_what_waits_for_long_is_flushed_in_between(tmp_path, topics, messages):
+    recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.02)
+    recorder.offer(*messages[0])
+    for _ in range(500):
+        if recorder._safe == (1, 0):
+            break
+        threading.Event().wait(0.02)
+    found = list(read_bag(tmp_path / 'run', allow_truncated=True).messages())
+    recorder.stop()
+    assert [message.data for message in found] == [messages[0].data]

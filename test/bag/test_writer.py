@@ -1,0 +1,228 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A bag as `BagWriter` leaves it: what other readers find in it, and what it never touches."""
+
+from __future__ import annotations
+
+from itertools import groupby
+import os
+import subprocess
+
+from linkage_ros import __version__
+from linkage_ros.bag.metadata import qos_text
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import RecordingError
+from mcap.reader import make_reader
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
+import pytest
+import yaml
+
+ATTACHMENTS = {
+    'scene.yaml': ('text/yaml', b'linkage: four_bar\n'),
+    'empty': ('text/plain', b''),
+    'bytes': ('application/octet-stream', bytes(range(256)) * 400),
+}
+
+
+@pytest.fixture
+def bag(tmp_path, topics, messages):
+    """Return a finished bag of all messages, flushed now and then, and its summary."""
+    writer = BagWriter(tmp_path / 'run', topics, ATTACHMENTS)
+    for number, message in enumerate(messages):
+        assert writer.write(*message)
+        if number % 1000 == 500:
+            writer.flush()
+    return writer.close({'seed': '7'})
+
+
+def test_both_readers_find_every_message(bag, topics, messages, readers):
+    readers.agree(bag.folder, topics, messages)
+
+
+def test_the_joint_states_deserialize_by_the_type_in_the_bag(bag, readers):
+    found = dict.fromkeys(['/crank', '/arm/joint_states'], 0)
+    for topic, message in readers.deserialized(bag.folder):
+        number = int(message.header.frame_id.removeprefix('frame '))
+        assert message.name == ['coupler_joint', 'rocker_joint']
+        assert list(message.position) == [0.001 * (number // 2), -0.002 * number]
+        assert list(message.velocity) == [1.0, -2.0]
+        assert list(message.effort) == []
+        found[topic] += 1
+    assert found == {'/crank': 6000, '/arm/joint_states': 6000}
+
+
+def test_the_summary_says_what_is_in_the_file(bag, messages):
+    times = [message.log_time for message in messages]
+    assert bag.counts == (6000, 6000)
+    assert bag.refused == (0, 0)
+    assert (bag.start, bag.duration) == (min(times), max(times) - min(times))
+    assert bag.size == (bag.folder / bag.file).stat().st_size
+
+
+def test_the_folder_holds_two_files_and_nothing_else(bag):
+    assert sorted(p.name for p in bag.folder.iterdir()) == ['metadata.yaml', 'run_0.mcap']
+
+
+def test_the_file_has_what_rosbag2_puts_there(bag, topics):
+    with (bag.folder / bag.file).open('rb') as stream:
+        reader = make_reader(stream)
+        header, summary = reader.get_header(), reader.get_summary()
+        (record,) = reader.iter_metadata()
+        attachments = {a.name: (a.media_type, a.data) for a in reader.iter_attachments()}
+    assert header.profile == 'ros2'
+    assert header.library == f'linkage_ros {__version__}'
+    (schema,) = summary.schemas.values()
+    assert (schema.name, schema.encoding) == (topics[0].type, 'ros2msg')
+    assert schema.data.decode() == topics[0].definition
+    for topic, channel in zip(topics, summary.channels.values(), strict=True):
+        assert (channel.topic, channel.message_encoding) == (topic.name, 'cdr')
+        assert channel.metadata == {
+            'offered_qos_profiles': qos_text(topic.qos),
+            'topic_type_hash': topic.type_hash,
+        }
+    text = yaml.safe_load((bag.folder / 'metadata.yaml').read_text())
+    inner = yaml.safe_load(record.metadata['serialized_metadata'])
+    assert record.name == 'rosbag2'
+    assert inner == text['rosbag2_bagfile_information']
+    assert inner['message_count'] == 12_000
+    assert inner['custom_data'] == {'seed': '7'}
+    assert attachments == ATTACHMENTS
+    assert summary.statistics.attachment_count == 3
+
+
+def test_chunks_are_small_uncompressed_and_checked(bag):
+    with (bag.folder / bag.file).open('rb') as stream:
+        chunks = [r for r in StreamReader(stream, emit_chunks=True).records if type(r) is Chunk]
+    assert {chunk.compression for chunk in chunks} == {''}
+    assert all(chunk.uncompressed_crc for chunk in chunks)
+    assert max(chunk.uncompressed_size for chunk in chunks) < 70_000
+
+
+def test_each_topic_numbers_its_messages(bag):
+    with (bag.folder / bag.file).open('rb') as stream:
+        numbered = sorted(
+            (channel.topic, message.sequence)
+            for _, channel, message in make_reader(stream).iter_messages()
+        )
+    for _, group in groupby(numbered, key=lambda pair: pair[0]):
+        assert [sequence for _, sequence in group] == list(range(6000))
+
+
+@pytest.mark.parametrize('custom', [{}, {'a': 'b'}])
+def test_a_bag_without_messages_is_a_bag(tmp_path, topics, readers, custom):
+    summary = BagWriter(tmp_path / 'run', topics).close(custom)
+    assert summary.counts == (0, 0)
+    readers.agree(tmp_path / 'run', topics, [])
+
+
+def test_an_older_mcap_that_cannot_flush_loses_nothing(
+    tmp_path, topics, messages, readers, monkeypatch
+):
+    monkeypatch.delattr('mcap.writer.Writer.flush')
+    writer = BagWriter(tmp_path / 'run', topics)
+    for message in messages[:2000]:
+        writer.write(*message)
+        writer.flush()
+    writer.close()
+    readers.agree(tmp_path / 'run', topics, messages[:2000])
+
+
+@pytest.mark.parametrize(
+    ('log_time', 'publish_time', 'taken'),
+    [
+        (0, 0, True),
+        (2**63 - 1, 2**63 - 1, True),
+        (-1, 5, False),
+        (5, -1, False),
+        (2**63, 5, False),
+        (5, 2**63, False),
+        (2**64, 5, False),
+        (5, 2**64 + 5, False),
+    ],
+)
+def test_a_time_that_does_not_fit_costs_that_message_only(
+    tmp_path, topics, messages, readers, log_time, publish_time, taken
+):
+    writer = BagWriter(tmp_path / 'run', topics)
+    odd = messages[1]._replace(log_time=log_time, publish_time=publish_time)
+    assert writer.write(*messages[0])
+    assert writer.write(*odd) is taken
+    assert writer.write(*messages[2])
+    summary = writer.close()
+    kept = [messages[0], *([odd] if taken else []), messages[2]]
+    assert summary.counts == (2, int(taken))
+    assert summary.refused == (0, int(not taken))
+    assert [data for *_, data in readers.mcap(tmp_path / 'run' / 'run_0.mcap')] == [
+        message.data for message in kept
+    ]
+
+
+def _contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob('*') if path.is_file()}
+
+
+def test_an_existing_bag_is_untouched(bag, topics):
+    before = _contents(bag.folder)
+    with pytest.raises(RecordingError, match='run: exists already; name a new folder'):
+        BagWriter(bag.folder, topics)
+    assert _contents(bag.folder) == before
+
+
+@pytest.mark.parametrize('kind', ['empty folder', 'file', 'link to nowhere'])
+def test_whatever_has_the_name_is_untouched(tmp_path, topics, kind):
+    path = tmp_path / 'run'
+    if kind == 'empty folder':
+        path.mkdir()
+    elif kind == 'file':
+        path.write_text('mine')
+    else:
+        path.symlink_to(tmp_path / 'nowhere')
+    with pytest.raises(RecordingError, match='exists already'):
+        BagWriter(path, topics)
+    assert list(tmp_path.iterdir()) == [path]
+    if kind == 'empty folder':
+        assert not list(path.iterdir())
+
+
+def test_a_place_below_a_file_is_refused(tmp_path, topics):
+    (tmp_path / 'file').write_text('mine')
+    with pytest.raises(RecordingError, match='cannot be recorded to: Not a directory'):
+        BagWriter(tmp_path / 'file' / 'run', topics)
+    assert (tmp_path / 'file').read_text() == 'mine'
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason='root may write anywhere')
+def test_a_folder_without_permission_is_refused(tmp_path, topics):
+    tmp_path.chmod(0o500)
+    try:
+        with pytest.raises(RecordingError, match='Permission denied'):
+            BagWriter(tmp_path / 'run', topics)
+    finally:
+        tmp_path.chmod(0o700)
+
+
+def test_a_read_only_disk_is_refused(small_disk, topics):
+    subprocess.run(['mount', '-o', 'remount,ro', str(small_disk)], check=True)
+    with pytest.raises(RecordingError, match='Read-only file system'):
+        BagWriter(small_disk / 'run', topics)
+
+
+def test_a_disk_that_is_full_from_the_start_gets_no_bag(small_disk, topics):
+    (small_disk / 'other').write_bytes(bytes(1_700_000))
+    with pytest.raises(RecordingError, match='No space left on device'):
+        BagWriter(small_disk / 'run', topics)
+    assert list(small_disk.iterdir()) == [small_disk / 'other']
