@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Run the demo."""
     scene = shipped('scenes/demo.yaml')
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _DOMAINS))
+    os.environ['ROS_DOMAIN_ID'] = str(1 + os.getpid() % _DOMAINS)
     print(
         f'{scene.name}: {arguments.seconds:g} s; from a second terminal: '
         f'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]}'

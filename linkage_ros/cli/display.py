@@ -27,8 +27,10 @@ from linkage_ros.ros.tick_loop import TickLoop
 
 _RICH = find_spec('rich') is not None
 if _RICH:
+    from rich.console import Group
     from rich.live import Live
     from rich.table import Table
+    from rich.text import Text
 
 _LIVE_PERIOD, _PLAIN_PERIOD = 0.25, 1.0
 
@@ -104,14 +106,16 @@ def _line(loop: TickLoop, joints: list[str], rate: float) -> str:
 def _table(loop: TickLoop, crank: str, joints: list[str], rate: float) -> Any:
     age, values = _state(loop)
     counts = loop.counts
-    table = Table(
-        title=f'{rate:.1f} ticks/s   lost {counts.lost}   late {counts.late}   '
-        f'input age {age}   samples {counts.received}',
-        title_justify='left',
+    status = Text(
+        f'{rate:.1f} ticks/s   {counts.late} late   {counts.lost} lost   input age {age}   '
+        f'{counts.received} samples   {counts.published} published',
+        no_wrap=True,
+        overflow='ellipsis',
     )
+    table = Table()
     table.add_column('joint')
     table.add_column('position [rad, m]', justify='right', min_width=18)
     table.add_column('rate [1/s]', justify='right', min_width=14)
     for name, (value, speed) in zip([crank, *joints], values, strict=False):
         table.add_row(name, f'{value:+.6f}', '' if speed is None else f'{speed:+.5f}')
-    return table
+    return Group(status, table)

@@ -19,10 +19,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from contextlib import closing
+from math import inf
 from pathlib import Path
 from threading import Event
-from time import monotonic
 
 from linkage_ros.cli.display import Display
 from linkage_ros.cli.summary import summary
@@ -41,7 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_run_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments that every run has."""
-    parser.add_argument('--seconds', type=_seconds, help='how long; without it, until Ctrl-C')
+    parser.add_argument(
+        '--seconds', type=_seconds, default=inf, help='how long; without it, until Ctrl-C'
+    )
     parser.add_argument('--runs', default='', metavar='FOLDER', help="folder of the bags' folders")
     parser.add_argument('--plain', action='store_true', help='a line a second, no live display')
 
@@ -58,27 +59,19 @@ def run_scene(
 ) -> tuple[int, Path | None]:
     """Run a scene; return the exit code and the bag."""
     bags: list[Path] = []
-    begun = monotonic()
 
-    with closing(Display(plain=arguments.plain)) as display:
+    def at_end(node: LinkageNode) -> None:
+        bags.extend(recording.folder for recording in node.recording.ended)
+        print(summary(node))
 
-        def every_spin(node: LinkageNode) -> None:
-            display.show(node)
-            if arguments.seconds is not None and monotonic() - begun >= arguments.seconds:
-                stop.set()
-
-        def at_end(node: LinkageNode) -> None:
-            display.close()
-            bags.extend(recording.folder for recording in node.recordings)
-            print(summary(node))
-
-        code = run_linkage_node(
-            stop,
-            list(ros),
-            {'scene': scene, 'runs_directory': arguments.runs},
-            every_spin,
-            at_end,
-        )
+    code = run_linkage_node(
+        stop,
+        ros,
+        {'scene': scene, 'runs_directory': arguments.runs},
+        seconds=arguments.seconds,
+        view=Display(plain=arguments.plain),
+        at_end=at_end,
+    )
     return code, bags[-1] if bags else None
 
 

@@ -52,14 +52,14 @@ def summary(node: LinkageNode) -> str:
         for status in (Status.TOGGLE, Status.OPEN, Status.INDETERMINATE)
         if counts.unclosed[status]
     ]
-    for recording in node.recordings:
+    for recording in node.recording.ended:
         rows += [
             ('recorded', f'{t.name}: {t.recorded} of {t.received}, {t.dropped} dropped')
             for t in recording.topics
         ]
         rows += [('bag', str(recording.folder)), ('proof', _proof(recording.folder))]
-    if node.recording_failure:
-        rows.append(('FAILED', node.recording_failure))
+    if node.recording.failure:
+        rows.append(('FAILED', node.recording.failure))
     return '\n'.join(f'{name:<10}{text}' for name, text in rows)
 
 

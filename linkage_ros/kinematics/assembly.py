@@ -110,7 +110,6 @@ def _four_bar(
     linkage: Linkage, pins: Mapping[frozenset[str], str], pivot: str, others: list[str]
 ) -> Loop:
     links = linkage.links
-    ground, crank = links[GROUND], links[linkage.input.child]
     coupler, rocker = others
     if frozenset((linkage.input.child, coupler)) not in pins:
         coupler, rocker = rocker, coupler
@@ -119,10 +118,10 @@ def _four_bar(
     b_pin = _pin_between(pins, coupler, rocker, f'links.{rocker}', _CLOSABLE)
     sign = _sign(linkage, b_pin, {'left': 1, 'right': -1}, f'the side of {a_pin}→{d_pin}')
 
-    a, crank_zero = _polar(crank, pivot, a_pin)
-    d, base = _polar(ground, pivot, d_pin)
-    b, coupler_zero = _polar(links[coupler], a_pin, b_pin)
-    c, rocker_zero = _polar(links[rocker], d_pin, b_pin)
+    a, crank_zero = _polar(links, linkage.input.child, pivot, a_pin)
+    d, base = _polar(links, GROUND, pivot, d_pin)
+    b, coupler_zero = _polar(links, coupler, a_pin, b_pin)
+    c, rocker_zero = _polar(links, rocker, d_pin, b_pin)
     scale = _scale(a, b, c, d)
     return Loop(
         RRRDyad(a / scale, b / scale, c / scale, d / scale, sign),
@@ -142,9 +141,8 @@ def _inverted_slider_crank(
     linkage: Linkage, pins: Mapping[frozenset[str], str], pivot: str, rod: str
 ) -> Loop:
     links = linkage.links
-    ground, crank = links[GROUND], links[linkage.input.child]
     ((name, slider),) = linkage.sliders.items()
-    if slider.along != rod or slider.point not in ground:
+    if slider.along != rod or slider.point not in links[GROUND]:
         raise DefinitionError(
             f'sliders.{name}',
             f'the point {slider.point!r} slides along {slider.along!r}',
@@ -155,8 +153,8 @@ def _inverted_slider_crank(
         linkage, name, {'ahead': 1, 'behind': -1}, f'where {slider.point} lies from {a_pin}'
     )
 
-    a, crank_zero = _polar(crank, pivot, a_pin)
-    d, base = _polar(ground, pivot, slider.point)
+    a, crank_zero = _polar(links, linkage.input.child, pivot, a_pin)
+    d, base = _polar(links, GROUND, pivot, slider.point)
     along, offset = _line_from(links[rod], a_pin, slider)
     scale = _scale(a, d, offset)
     return Loop(
@@ -270,14 +268,17 @@ def _sign(linkage: Linkage, closing: str, sides: Mapping[str, int], meaning: str
     return sides[side]
 
 
-def _polar(points: Mapping[str, Point], start: str, end: str) -> tuple[float, float]:
+def _polar(
+    links: Mapping[str, Mapping[str, Point]], link: str, start: str, end: str
+) -> tuple[float, float]:
     """Return length and direction from one point of a link to another."""
+    points = links[link]
     x = points[end][0] - points[start][0]
     y = points[end][1] - points[start][1]
     length = hypot(x, y)
     if length == 0.0:
         raise DefinitionError(
-            f'links.*.{end}', f'lies on {start!r}', 'give the two points different places'
+            f'links.{link}.{end}', f'lies on {start!r}', 'give the two points different places'
         )
     return length, atan2(y, x)
 

@@ -28,15 +28,15 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from linkage_ros.bag.recorder import RecordingSummary
-from linkage_ros.errors import LinkageError, RecordingError
+from linkage_ros.bag.topic import Topic
+from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros import pacing
 from linkage_ros.ros.bag_topics import bag_topic
 from linkage_ros.ros.diagnostics import Health, Snapshot
 from linkage_ros.ros.parameters import declare_parameters
-from linkage_ros.ros.run_recording import counted, start_recording
+from linkage_ros.ros.run_recording import RunRecording
 from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
 from linkage_ros.ros.warnings import Warnings
 from linkage_ros.scene.load import load_scene
@@ -86,10 +86,7 @@ class LinkageNode(LifecycleNode):
         declare_parameters(self)
         self.failure: LinkageError | None = None
         """Why the node could not be configured."""
-        self.recording_failure = ''
-        """Why a recording could not be started or ended early; '' where none did."""
-        self.recordings: list[RecordingSummary] = []
-        """The recordings that have ended."""
+        self.recording = RunRecording(self.get_logger())
         self.scene: Scene | None = None
         self.loop: TickLoop | None = None
         """The tick of this run, or of the last; nothing before the first."""
@@ -215,53 +212,25 @@ class LinkageNode(LifecycleNode):
         if self.loop is not None and self.loop.running:
             self.loop.stop()
             self._diagnose()
-            self._stop_recording()
-
-    # Recording.
+            self.recording.stop(self.loop)
 
     def _start_recording(self) -> str:
-        """Start a bag and return what came of it, as one line."""
         assert self.scene is not None
         assert self.loop is not None
+        directory = self.get_parameter('runs_directory').value
+        return self.recording.start(self.scene, self.loop, directory, self._bag_topics)
+
+    def _bag_topics(self) -> list[Topic]:
+        """Describe what is recorded, in the order of the tick's topic numbers."""
+        joint_states = self._joint_states
         offered = [
             info.qos_profile for info in self.get_publishers_info_by_topic(self.crank_topic)
         ]
-        try:
-            self.loop.recorder = start_recording(
-                self.scene,
-                self.get_parameter('runs_directory').value,
-                [
-                    bag_topic(self.crank_topic, JointState, [*offered, CRANK_QOS][0]),
-                    bag_topic(
-                        self._joint_states.topic_name, JointState, self._joint_states.qos_profile
-                    ),
-                    bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS),
-                ],
-            )
-        except RecordingError as error:
-            self.recording_failure = f'not recording: {error}'
-            self.get_logger().error(self.recording_failure)
-            return self.recording_failure
-        self.recording_failure = ''
-        line = f'recording to {self.loop.recorder.folder}'
-        self.get_logger().info(line)
-        return line
-
-    def _stop_recording(self) -> str:
-        """Close the bag and return what came of it, as one line."""
-        if self.loop is None or self.loop.recorder is None:
-            return 'not recording'
-        recorder, self.loop.recorder = self.loop.recorder, None
-        summary = recorder.stop()
-        self.recordings.append(summary)
-        if summary.failure:
-            self.recording_failure = f'recording ended early: {summary.failure}'
-            line = f'{self.recording_failure}: {counted(summary)}'
-            self.get_logger().error(line)
-        else:
-            line = f'recorded {summary.folder}: {counted(summary)}'
-            self.get_logger().info(line)
-        return line
+        return [
+            bag_topic(self.crank_topic, JointState, offered[0] if offered else CRANK_QOS),
+            bag_topic(joint_states.topic_name, JointState, joint_states.qos_profile),
+            bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS),
+        ]
 
     # Services.
 
@@ -284,9 +253,10 @@ class LinkageNode(LifecycleNode):
     def _on_stop_recording(
         self, _: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        recording = self.loop is not None and self.loop.recorder is not None
-        line = self._stop_recording()
-        return _answer(response, recording and not self.recordings[-1].failure, line)
+        if self.loop is None or self.loop.recorder is None:
+            return _answer(response, False, 'not recording')
+        line = self.recording.stop(self.loop)
+        return _answer(response, not self.recording.ended[-1].failure, line)
 
     # Watching.
 
@@ -300,7 +270,7 @@ class LinkageNode(LifecycleNode):
         if loop.failure:
             self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
         if loop.recorder is not None and loop.recorder.failure is not None:
-            self._stop_recording()
+            self.recording.stop(loop)
         due = self._before.time + self.get_parameter('diagnostics_period').value * NANOSECONDS
         if time.monotonic_ns() >= due - 0.5 * _WATCH_PERIOD * NANOSECONDS:
             self._diagnose()
@@ -328,7 +298,7 @@ class LinkageNode(LifecycleNode):
             loop=self.loop,
             before=self._before,
             now=now,
-            recording_failure=self.recording_failure,
+            recording_failure=self.recording.failure,
         )
         self._before = now
         message = DiagnosticArray(status=health.statuses())

@@ -17,11 +17,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from math import inf
 import sys
 from threading import Event
+from time import monotonic
+from typing import Protocol
 
-from linkage_ros.errors import LinkageError
 from linkage_ros.ros.node import LinkageNode
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -35,15 +37,27 @@ _SWITCH_INTERVAL = 1e-4
 _SPIN = 0.1
 
 
+class View(Protocol):
+    """Shows a run as it goes."""
+
+    def show(self, node: LinkageNode) -> None:
+        """Show the node as it is now; called about ten times a second."""
+
+    def close(self) -> None:
+        """Leave the screen to others; called before the node ends its run."""
+
+
 def run_linkage_node(
     stop: Event,
-    arguments: list[str],
+    arguments: Sequence[str],
     parameters: Mapping[str, str] | None = None,
-    every_spin: Callable[[LinkageNode], None] | None = None,
+    *,
+    seconds: float = inf,
+    view: View | None = None,
     at_end: Callable[[LinkageNode], None] | None = None,
 ) -> int:
     """
-    Run the linkage node until the event.
+    Run the linkage node until the event, or for a time.
 
     Parameters
     ----------
@@ -53,8 +67,10 @@ def run_linkage_node(
         Command line with ``--ros-args``, without the program's name.
     parameters
         Parameters of the node, beside those of the command line.
-    every_spin
-        Called about ten times a second.
+    seconds
+        How long the run lasts, in [s].
+    view
+        What shows it.
     at_end
         Called when the run has ended and its bag is closed.
 
@@ -75,37 +91,49 @@ def run_linkage_node(
         overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
         node = LinkageNode(parameter_overrides=overrides)
     except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
-        print(f'linkage_node: {_first_line(error)}; see --ros-args in the README', file=sys.stderr)
+        print(f'linkage_node: {_first_line(error)}; see the README', file=sys.stderr)
         rclpy.try_shutdown()
         return EXIT_CONFIGURATION
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
-        if node.get_parameter('autostart').value:
-            node.trigger_configure()
-            if node.failure is not None:
-                return EXIT_CONFIGURATION
-            if node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
-                return EXIT_INCOMPLETE
-        while not stop.is_set() and rclpy.ok():
-            executor.spin_once(timeout_sec=_SPIN)
-            if every_spin is not None:
-                every_spin(node)
-            if node.loop is not None and node.loop.failure:
-                break
-        node.end()
-        if at_end is not None:
+        code = _spin(node, executor, stop, monotonic() + seconds, view)
+        if code == EXIT_OK and at_end is not None:
             at_end(node)
-        failed = node.recording_failure or (node.loop is not None and node.loop.failure)
-        return EXIT_INCOMPLETE if failed else EXIT_OK
-    except LinkageError as error:
-        print(f'linkage_node: {error}', file=sys.stderr)
-        return EXIT_CONFIGURATION
+        if node.recording.failure or (node.loop is not None and node.loop.failure):
+            code = code or EXIT_INCOMPLETE
+        return code
     finally:
         node.end()
         executor.shutdown()
         node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _spin(
+    node: LinkageNode,
+    executor: SingleThreadedExecutor,
+    stop: Event,
+    deadline: float,
+    view: View | None,
+) -> int:
+    """Start the node unless it is told not to, spin until the end, and end its run."""
+    if node.get_parameter('autostart').value:
+        node.trigger_configure()
+        if node.failure is not None:
+            return EXIT_CONFIGURATION
+        if node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
+            return EXIT_INCOMPLETE
+    while not stop.is_set() and monotonic() < deadline:
+        executor.spin_once(timeout_sec=_SPIN)
+        if view is not None:
+            view.show(node)
+        if node.loop is not None and node.loop.failure:
+            break
+    if view is not None:
+        view.close()
+    node.end()
+    return EXIT_OK
 
 
 def _first_line(error: Exception) -> str:

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 
-"""The bag of a run: where it goes, what it says of itself, and how it went."""
+"""The bags of a run: where they go, what they say of themselves, and how they went."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 import json
 from pathlib import Path
@@ -28,33 +28,86 @@ from linkage_ros.bag.recorder import Recorder, RecordingSummary
 from linkage_ros.bag.replay import RUN_FILE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.ros.tick_loop import CRANK, JOINT_STATES
+from linkage_ros.errors import RecordingError
+from linkage_ros.ros.tick_loop import CRANK, JOINT_STATES, TickLoop
 from linkage_ros.scene.scene import RecordParameters, Scene
+from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
 """How a run is recorded that a service asks for where the scene says nothing."""
 
 
-def start_recording(scene: Scene, directory: str, topics: Sequence[Topic]) -> Recorder:
+class RunRecording:
     """
-    Start a bag that explains itself.
+    Starts and stops the bags of a node, and keeps account of them.
 
     Parameters
     ----------
-    scene
-        What is run; its files go into the bag.
-    directory
-        Where the bag's folder is made; '' for where the scene says.
-    topics
-        What will be recorded, in the order of the tick's topic numbers.
-
-    Raises
-    ------
-    RecordingError
-        Where the folder exists or cannot be written.
+    logger
+        Where it says what it does.
 
     """
-    record = scene.record or _DEFAULT
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        self._logger = logger
+        self.ended: list[RecordingSummary] = []
+        """The recordings that have ended."""
+        self.failure = ''
+        """Why a recording could not be started or ended early; '' while none has."""
+
+    def start(
+        self, scene: Scene, loop: TickLoop, directory: str, topics: Callable[[], Sequence[Topic]]
+    ) -> str:
+        """
+        Start a bag that explains itself; return what came of it, as one line.
+
+        Parameters
+        ----------
+        scene
+            What is run; its files go into the bag.
+        loop
+            The tick, which from here on hands over what it takes and publishes.
+        directory
+            Where the bag's folder is made; '' for where the scene says.
+        topics
+            Returns what will be recorded, in the order of the tick's topic numbers.
+
+        """
+        record = scene.record or _DEFAULT
+        try:
+            described = topics()
+            folder = _folder(Path(directory or record.directory), record.name, scene.name)
+            writer = BagWriter(folder, described, _attachments(scene, described))
+        except RecordingError as error:
+            self.failure = f'not recording: {error}'
+            self._logger.error(self.failure)
+            return self.failure
+        loop.recorder = Recorder(writer, capacity=record.queue)
+        line = f'recording to {folder}'
+        self._logger.info(line)
+        return line
+
+    def stop(self, loop: TickLoop) -> str:
+        """Close the bag, if there is one, and return what came of it, as one line."""
+        if loop.recorder is None:
+            return 'not recording'
+        recorder, loop.recorder = loop.recorder, None
+        summary = recorder.stop()
+        self.ended.append(summary)
+        counts = ', '.join(
+            f'{t.name} {t.recorded} recorded {t.dropped} dropped' for t in summary.topics
+        )
+        if summary.failure:
+            self.failure = f'recording ended early: {summary.failure}'
+            line = f'{self.failure}: {counts}'
+            self._logger.error(line)
+        else:
+            line = f'recorded {summary.folder}: {counts}'
+            self._logger.info(line)
+        return line
+
+
+def _attachments(scene: Scene, topics: Sequence[Topic]) -> dict[str, tuple[str, bytes]]:
     run = {
         'scene': scene.name,
         'crank_topic': topics[CRANK].name,
@@ -63,17 +116,10 @@ def start_recording(scene: Scene, directory: str, topics: Sequence[Topic]) -> Re
         'python': platform.python_version(),
         'machine': platform.machine(),
     }
-    attachments = {
+    return {
         **{name: ('application/yaml', data) for name, data in scene.files.items()},
         RUN_FILE: ('application/json', json.dumps(run).encode()),
     }
-    folder = _folder(Path(directory or record.directory), record.name, scene.name)
-    return Recorder(BagWriter(folder, topics, attachments), capacity=record.queue)
-
-
-def counted(summary: RecordingSummary) -> str:
-    """Return the counts of a recording as one line."""
-    return ', '.join(f'{t.name} {t.recorded} recorded {t.dropped} dropped' for t in summary.topics)
 
 
 def _folder(directory: Path, name: str, scene: str) -> Path:

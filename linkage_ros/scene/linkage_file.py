@@ -135,6 +135,10 @@ def _inverted_slider_crank(content: Section) -> dict[str, Any]:
     """Write out crank a and the place of the swivel, from the crank's pivot."""
     a = content.number('a', above=0.0, most=_FARTHEST, unit='m')
     swivel = content.point('swivel', most=_FARTHEST)
+    if swivel == (0.0, 0.0):
+        raise content.error(
+            'swivel', "[0, 0] is the crank's pivot", 'give the swivel another place'
+        )
     side = content.choice('assembly', ('ahead', 'behind'), 'ahead')
     content.finish()
     return {

@@ -51,7 +51,7 @@ def load_scene(file: str | Path) -> Scene:
     """
     content, scene_bytes = read_yaml(file)
     linkage = Path(file).parent / content.text('linkage')
-    if not isfile(linkage):
+    if not isfile(linkage):  # noqa: PTH113 (Path's raises where a name is too long)
         raise content.error(
             'linkage', f'{quoted(str(linkage))} is not a file', 'name one, relative to the scene'
         )

@@ -34,6 +34,7 @@ from linkage_ros.errors import FileError, quoted
 import yaml
 
 _LARGEST_FILE = 1_000_000
+_LONGEST_INTEGER = 100
 
 
 class Section:
@@ -87,7 +88,7 @@ class Section:
         value = self._take(key, default, f'a number{unit and f" in [{unit}]"}')
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, f'{quoted(value)} is not a number', 'write a number')
-        if not _is_finite(value) or not least <= value <= most or value <= above:
+        if not isfinite(value) or not least <= value <= most or value <= above:
             bounds = ' and '.join(
                 text
                 for text in (
@@ -134,7 +135,7 @@ class Section:
             not isinstance(value, list)
             or len(value) != 2
             or any(isinstance(v, bool) or not isinstance(v, int | float) for v in value)
-            or not all(map(_is_finite, value))
+            or not all(map(isfinite, value))
         ):
             raise self.error(
                 key, f'{quoted(value)} is not a point', 'write two finite numbers: [x, y]'
@@ -188,13 +189,6 @@ class Section:
                 raise self.error('', f'the key {key!r} is missing', f'add {key}: {expected}')
             return default
         return self._content[key]
-
-
-def _is_finite(value: float) -> bool:
-    try:
-        return isfinite(value)
-    except OverflowError:  # a whole number beyond 1e308
-        return False
 
 
 def read_yaml(file: str | Path) -> tuple[Section, bytes]:
@@ -291,6 +285,13 @@ class _StrictLoader(yaml.SafeLoader):
     yaml_constructors: ClassVar[dict[Any, Any]] = {None: yaml.SafeLoader.construct_undefined}
     file: str
 
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Refuse aliases: ten lines of them stand for gigabytes."""
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.composer.ComposerError(None, None, 'aliases are not read', mark)
+        return super().compose_node(parent, index)
+
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         """Build a mapping whose keys are texts, each once."""
         if not isinstance(node, yaml.MappingNode):  # one that is tagged !!map
@@ -319,13 +320,18 @@ class _StrictLoader(yaml.SafeLoader):
         yield self.construct_mapping(node)
 
 
+def _integer(text: str) -> float:
+    # Python refuses to convert integers without end, to and from text as well as to a float.
+    return int(text) if len(text) <= _LONGEST_INTEGER else float(text)
+
+
 _CONSTRUCTORS: dict[str, Callable[[Any, Any], Any]] = {
     'map': _StrictLoader.construct_yaml_map,
     'seq': _StrictLoader.construct_yaml_seq,
     'str': _StrictLoader.construct_yaml_str,
     'null': _StrictLoader.construct_yaml_null,
     'bool': lambda self, node: self.construct_scalar(node).lower() == 'true',
-    'int': lambda self, node: int(self.construct_scalar(node)),
+    'int': lambda self, node: _integer(self.construct_scalar(node)),
     'float': lambda self, node: float(
         self.construct_scalar(node).replace('.inf', 'inf').replace('.nan', 'nan')
     ),
