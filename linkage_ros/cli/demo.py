@@ -17,7 +17,7 @@
 Run the demo scene: a crank in a process of its own, the node in this one, a picture at the end.
 
 Nothing leaves the machine, and no other ROS graph on it is heard: discovery stays local, in a
-domain that is chosen anew for each run unless ROS_DOMAIN_ID is set.
+domain of its own.
 """
 
 from __future__ import annotations
