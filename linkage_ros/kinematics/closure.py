@@ -140,7 +140,8 @@ class Closure:
         """
         Return what is left open by a closed position, in [m].
 
-        The loop is walked from the crank's pivot along crank, dyad and ground, with the angles alone.
+        The loop is walked from the crank's pivot along crank, dyad and ground, with the angles
+        alone.
         """
         _, _, first, second, *_ = position.pose
         x, y = cos(position.phi), sin(position.phi)

@@ -16,9 +16,9 @@
 """
 The diagonal of a crank-driven loop: from the crank pin A to the ground pivot D.
 
-In the frame of the loop the crank pivot O is the origin and D lies on the positive x axis; φ is the
-crank's direction there. The half-angle form loses nothing where the crank lies along the ground
-(a change point), where the coordinates of A and D cancel.
+In the frame of the loop the crank pivot O is the origin and D lies on the positive x axis; φ is
+the crank's direction there. The half-angle form loses nothing where the crank lies along the
+ground (a change point), where the coordinates of A and D cancel.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ def margin(*lengths: float) -> float:
     """
     Return a sum of signed lengths that is a constant of a linkage, correctly rounded.
 
-    Lengths come from files, in decimals: what cancels but for their rounding was meant to cancel, and
-    is 0.
+    Lengths come from files, in decimals: what cancels but for their rounding was meant to cancel,
+    and is 0.
     """
     total = fsum(lengths)
     return 0.0 if abs(total) <= 4.0 * UNIT_ROUNDOFF * fsum(map(abs, lengths)) else total
@@ -50,11 +50,11 @@ def reach(constant: float, part: float, span: float) -> tuple[float, float]:
     """
     Return the root of ``constant + part²/span``, and the gap where that is negative.
 
-    A dyad that folds or stretches does so where such a sum, its reach, goes to zero. The constant is a
-    margin of the linkage; part is `Diagonal.near` or `Diagonal.far`. Where the constant is zero, the
-    root is part/√span and has its sign. The span is negative where the square is to be taken away;
-    there is no change point then. A sum within its own rounding error of zero is zero: those
-    are the last few floats on either side of a toggle, where the rate has no correct digit.
+    A dyad that folds or stretches does so where such a sum, its reach, goes to zero. The constant
+    is a margin of the linkage; part is `Diagonal.near` or `Diagonal.far`. Where the constant is
+    zero, the root is part/√span and has its sign. The span is negative where the square is to be
+    taken away; there is no change point then. A sum within its own rounding error of zero is zero:
+    those are the last few floats on either side of a toggle, where the rate has no correct digit.
 
     Returns
     -------

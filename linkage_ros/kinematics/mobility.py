@@ -40,8 +40,8 @@ def crank_ranges(loop: Loop) -> tuple[CrankRange, ...]:
     """
     Return the intervals in which the loop closes; none where it closes nowhere.
 
-    The diagonal s grows with |φ| from |d − a| to a + d. Its limits, |b − c| and b + c for a four-bar
-    and |h| for an inverted slider-crank, are met at::
+    The diagonal s grows with |φ| from |d − a| to a + d. Its limits, |b − c| and b + c for a
+    four-bar and |h| for an inverted slider-crank, are met at::
 
         sin²(φ/2) = (limit² − (d − a)²)/(4ad)        cos²(φ/2) = ((a + d)² − limit²)/(4ad)
     """

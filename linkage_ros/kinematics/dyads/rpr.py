@@ -16,17 +16,18 @@
 """
 RPR: a rod pinned to the crank that slides through a swivel; the inverted slider-crank.
 
-In the frame of the loop (`diagonal`) the rod is pinned to the crank at A and runs through the swivel
-D. Its direction is û, n̂ is û turned left by 90°, and the line along which it slides passes A at the
-offset h: AD = r·û + h·n̂. With s = |AD|::
+In the frame of the loop (`diagonal`) the rod is pinned to the crank at A and runs through the
+swivel D. Its direction is û, n̂ is û turned left by 90°, and the line along which it slides passes
+A at the offset h: AD = r·û + h·n̂. With s = |AD|::
 
     r = σ·√((s − |h|)·(s + |h|))        s − |h| = (|d − a| − |h|) + near²/(s + |d − a|)
     ψ = dir(û) = dir(AD) − atan2(h, r)
 
-σ = +1 where D lies ahead of A along û, −1 where it lies behind. For a straight rod h = 0 and r = ±s.
-Where |d − a| = |h| (a straight rod: the crank as long as the distance to the swivel), r passes zero
-with the sign of the half angle, as the rod itself does. At r = 0 a straight rod has no direction that
-could be told: the pose is indeterminate, not zero. A bent one (h ≠ 0) is at a toggle.
+σ = +1 where D lies ahead of A along û, −1 where it lies behind. For a straight rod h = 0 and r =
+±s. Where |d − a| = |h| (a straight rod: the crank as long as the distance to the swivel), r passes
+zero with the sign of the half angle, as the rod itself does. At r = 0 a straight rod has no
+direction that could be told: the pose is indeterminate, not zero. A bent one (h ≠ 0) is at a
+toggle.
 
 Rates, from the velocity of the rod's point at D, which is along û. With OA the crank::
 
@@ -35,7 +36,8 @@ Rates, from the velocity of the rod's point at D, which is along û. With OA the
     ω3 = −ω2·(OA·û)/r        = −ω2·(p − q·h/r)
     ṙ  = ω3·h + ω2·(OA·n̂)    = ω3·h + ω2·(r·q + h·p) = ω2·q·(r + h²/r)
 
-p is written with the half angle: where A meets D both OA·AD and s² vanish, and their quotient does not.
+p is written with the half angle: where A meets D both OA·AD and s² vanish, and their quotient does
+not.
 """
 
 from __future__ import annotations
@@ -56,11 +58,13 @@ class RPRPose(NamedTuple):
     status
         Whether the loop closes.
     gap
-        What the rod's line misses the swivel by where it is open, else 0, in the unit of the lengths.
+        What the rod's line misses the swivel by where it is open, else 0, in the unit of the
+        lengths.
     rod
         ψ, direction of the rod's line, in [rad].
     slide
-        r, from the foot of A on the line to the swivel, along the line, in the unit of the lengths.
+        r, from the foot of A on the line to the swivel, along the line, in the unit of the
+        lengths.
     p, q
         The quotients of the derivation, of which the rates consist.
 
@@ -85,8 +89,8 @@ class RPRDyad:
     offset
         h, from A to the rod's line, positive where the line lies left of A, in the same unit.
     sign
-        The assembly: +1 where the swivel lies ahead of A along the rod, −1 where it lies behind. Where
-        |d − a| = |h|: for 0 < φ < 2π.
+        The assembly: +1 where the swivel lies ahead of A along the rod, −1 where it lies behind.
+        Where |d − a| = |h|: for 0 < φ < 2π.
 
     """
 

@@ -16,31 +16,33 @@
 """
 RRR: two links pinned together; the coupler and the rocker of a four-bar.
 
-In the frame of the loop (`diagonal`) the coupler runs from the crank pin A to B, the rocker from the
-ground pivot D to B. A, D and B are a triangle with the sides s = |AD|, b = |AB| and c = |DB|, and
-everything follows from what its sides fail to cancel::
+In the frame of the loop (`diagonal`) the coupler runs from the crank pin A to B, the rocker from
+the ground pivot D to B. A, D and B are a triangle with the sides s = |AD|, b = |AB| and c = |DB|,
+and everything follows from what its sides fail to cancel::
 
     P  = b + c + s        Fs = b + c − s        Fb = c + s − b        Fc = b + s − c
     tan(β/2)  = √(Fb·Fs / (P·Fc))        β  = the angle at A from AD to AB
     tan(γ'/2) = √(P·Fb / (Fc·Fs))        γ' = the angle from AD to DB (π less the triangle's at D)
     AB × DB   = ½·√(P·Fs·Fb·Fc)          twice the area
 
-(W. Kahan, Miscalculating Area and Angles of a Needle-like Triangle, 2014.) Taking γ' and not π − γ'
-keeps small angles small. With σ = +1 where B lies left of A→D, the directions are
+(W. Kahan, Miscalculating Area and Angles of a Needle-like Triangle, 2014.) Taking γ' and not π −
+γ' keeps small angles small. With σ = +1 where B lies left of A→D, the directions are
 
     θ3 = dir(AD) + σ·β        θ4 = dir(AD) + σ·γ'
 
-Where the dyad folds (s → |b − c|) or stretches (s → b + c), the smaller of Fb and Fc, or Fs, goes to
-zero. Neither is taken as a difference of s, which has lost the digits by then, but from the diagonal::
+Where the dyad folds (s → |b − c|) or stretches (s → b + c), the smaller of Fb and Fc, or Fs, goes
+to zero. Neither is taken as a difference of s, which has lost the digits by then, but from the
+diagonal::
 
     s − |b − c| = (|d − a| − |b − c|) + near²/(s + |d − a|)
     b + c − s   = (b + c − a − d) + far²/(s + a + d)
                 = (b + c − |d − a|) − near²/(s + |d − a|)
 
-Where crank and ground are long beside coupler and rocker, so that no stretch can be near s = a + d, the
-last line is taken: the one before it would cancel a + d. The brackets are constants of the linkage. Where one of them is zero (a change point), the root of the
-difference is near/√(s + |d − a|), or far/√(s + a + d), which changes sign with the half angle: the
-motion passes the change point as the linkage itself does, at any step and with no memory (`reach`).
+Where crank and ground are long beside coupler and rocker, so that no stretch can be near s = a +
+d, the last line is taken: the one before it would cancel a + d. The brackets are constants of the
+linkage. Where one of them is zero (a change point), the root of the difference is near/√(s + |d −
+a|), or far/√(s + a + d), which changes sign with the half angle: the motion passes the change
+point as the linkage itself does, at any step and with no memory (`reach`).
 
 Rates, with OA the crank, from the loop's velocity equation multiplied by DB and by AB, and with OA
 taken along the diagonal and across it (p and q, as in `rpr`)::
@@ -49,10 +51,10 @@ taken along the diagonal and across it (p and q, as in `rpr`)::
     ω4 = −ω2·(OA × AB)/(AB × DB) = −ω2·(p − q·cot(σ·β))
     p = OA·AD/s² = a·((d − a)/s² − 2d·(sin(φ/2)/s)²)
     q = 2ad·sin(φ/2)·cos(φ/2)/s²
-    cot(β) = (P·Fc − Fb·Fs)/(4·AB × DB)  cot(γ') = (Fc·Fs − P·Fb)/(4·AB × DB)     (both times σ)
+    cot(σ·β) = (P·Fc − Fb·Fs)/(4·AB × DB)       cot(σ·γ') = (Fc·Fs − P·Fb)/(4·AB × DB)
 
-OA × DB = a·c·sin(θ4 − φ) says the same, but where crank and rocker are nearly parallel it takes the
-difference of two angles that were rounded at the size of a half-turn: 6,500 u·κ was measured.
+OA × DB = a·c·sin(θ4 − φ) says the same, but where crank and rocker are nearly parallel it takes
+the difference of two angles that were rounded at the size of a half-turn: 6,500 u·κ was measured.
 """
 
 from __future__ import annotations

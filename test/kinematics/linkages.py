@@ -1,0 +1,104 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Linkage objects for the tests: textbook shapes, in frames as plain or as odd as a test wants."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from linkage_ros.kinematics.linkage import (
+    Input,
+    Linkage,
+    Point,
+    RevoluteJoint,
+    Side,
+    SlideJoint,
+    Slider,
+)
+
+Frame = tuple[float, float, float]
+"""Where a link's plain frame lies in the frame that the linkage file uses: x, y and angle."""
+
+PLAIN: Frame = (0.0, 0.0, 0.0)
+
+
+def placed(frame: Frame, points: dict[str, Point]) -> dict[str, Point]:
+    """Return a link's points in another frame."""
+    x0, y0, angle = frame
+    return {
+        name: (x0 + x * cos(angle) - y * sin(angle), y0 + x * sin(angle) + y * cos(angle))
+        for name, (x, y) in points.items()
+    }
+
+
+def four_bar_linkage(
+    lengths: tuple[float, float, float, float], side: Side, frames: dict[str, Frame] | None = None
+) -> Linkage:
+    """Return a four-bar: crank a, coupler b, rocker c, ground d, links along their x axes."""
+    a, b, c, d = lengths
+    plain: dict[str, dict[str, Point]] = {
+        'ground': {'O': (0.0, 0.0), 'D': (d, 0.0)},
+        'crank': {'O': (0.0, 0.0), 'A': (a, 0.0)},
+        'coupler': {'A': (0.0, 0.0), 'B': (b, 0.0)},
+        'rocker': {'D': (0.0, 0.0), 'B': (c, 0.0)},
+    }
+    return Linkage(
+        links={
+            name: placed(frames.get(name, PLAIN), points) if frames else points
+            for name, points in plain.items()
+        },
+        input=Input('crank_joint', 'ground', 'crank'),
+        assembly={'B': side},
+        joints={
+            'coupler_joint': RevoluteJoint('crank', 'coupler'),
+            'rocker_joint': RevoluteJoint('ground', 'rocker'),
+        },
+        sliders={},
+    )
+
+
+def inverted_slider_crank_linkage(
+    lengths: tuple[float, float, float],
+    side: Side,
+    frames: dict[str, Frame] | None = None,
+    along: float = 0.0,
+) -> Linkage:
+    """
+    Return an inverted slider-crank: crank a, ground d, a rod at an offset from the crank pin.
+
+    The rod's line is parallel to the x axis of its plain frame; the slide is measured from a point
+    that lies ``along`` metres from the foot of the pin.
+    """
+    a, d, offset = lengths
+    frames = frames or {}
+    _, _, angle = frames.get('rod', PLAIN)
+    plain: dict[str, dict[str, Point]] = {
+        'ground': {'O': (0.0, 0.0), 'C': (d, 0.0)},
+        'crank': {'O': (0.0, 0.0), 'A': (a, 0.0)},
+        'rod': {'A': (0.0, 0.0), 'T': (along, offset)},
+    }
+    return Linkage(
+        links={
+            name: placed(frames.get(name, PLAIN), points) if frames else points
+            for name, points in plain.items()
+        },
+        input=Input('crank_joint', 'ground', 'crank'),
+        assembly={'swivel': side},
+        joints={
+            'rod_joint': RevoluteJoint('crank', 'rod'),
+            'slide_joint': SlideJoint('swivel'),
+        },
+        sliders={'swivel': Slider('C', 'rod', 'T', (3.0 * cos(angle), 3.0 * sin(angle)))},
+    )

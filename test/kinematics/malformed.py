@@ -1,0 +1,221 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What can be wrong with a linkage: how to make each fault, the key that is named, the remedy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from linkage_ros.kinematics.linkage import Input, RevoluteJoint, SlideJoint, Slider
+
+from .edits import Change, drop, Fields, fields, put, rename
+from .linkages import four_bar_linkage, inverted_slider_crank_linkage
+
+FOUR_BAR = fields(four_bar_linkage((0.04, 0.12, 0.08, 0.1), 'left'))
+SLIDER_CRANK = fields(inverted_slider_crank_linkage((0.15, 0.27, 0.0), 'ahead', along=0.3))
+
+
+def swivel(**changes: Any) -> Change:
+    """Return a change of the slider-crank's slider."""
+    parts = {'point': 'C', 'along': 'rod', 'through': 'T', 'direction': (1.0, 0.0)} | changes
+    return put('sliders', 'swivel', Slider(**parts))
+
+
+# What is wrong: the linkage it is wrong in, the change, the key named, and words of the remedy.
+MALFORMED: dict[str, tuple[Fields, Change, str, str]] = {
+    'no ground': (FOUR_BAR, rename('ground', 'frame'), 'links', "name the frame 'ground'"),
+    'a crank that is not on the ground': (
+        FOUR_BAR,
+        put('input', Input('crank_joint', 'rocker', 'crank')),
+        'input.parent',
+        'parent: ground',
+    ),
+    'an unknown crank': (
+        FOUR_BAR,
+        put('input', Input('crank_joint', 'ground', 'krank')),
+        'input.child',
+        'name one of coupler, crank, rocker',
+    ),
+    'a ground that is driven': (
+        FOUR_BAR,
+        put('input', Input('crank_joint', 'ground', 'ground')),
+        'input.child',
+        'name one of coupler, crank, rocker',
+    ),
+    'a link of one point': (
+        FOUR_BAR,
+        drop('links', 'coupler', 'A'),
+        'links.coupler',
+        'two points',
+    ),
+    'a link of no length': (
+        FOUR_BAR,
+        put('links', 'coupler', 'B', (0.0, 0.0)),
+        'links.coupler.B',
+        'different places',
+    ),
+    'a ground pivot on the other': (
+        FOUR_BAR,
+        put('links', 'ground', 'D', (0.0, 0.0)),
+        'links.ground.D',
+        'different places',
+    ),
+    'two links with two points in common': (
+        FOUR_BAR,
+        put('links', 'rocker', 'A', (0.5, 0.5)),
+        'links.rocker',
+        'rename the points that are not pins',
+    ),
+    'a crank without a pin on the ground': (
+        FOUR_BAR,
+        put('links', 'crank', {'Q': (0.0, 0.0), 'A': (0.04, 0.0)}),
+        'links',
+        'the crank turns about a point of the ground',
+    ),
+    'a coupler without a pin on the crank': (
+        FOUR_BAR,
+        put('links', 'crank', {'O': (0.0, 0.0), 'Q': (0.04, 0.0)}),
+        'links.rocker',
+        'four-bar',
+    ),
+    'a rocker without a pin on the ground': (
+        FOUR_BAR,
+        put('links', 'ground', {'O': (0.0, 0.0), 'Q': (0.1, 0.0)}),
+        'links.rocker',
+        'four-bar',
+    ),
+    'a coupler and a rocker that are not pinned': (
+        FOUR_BAR,
+        put('links', 'rocker', {'D': (0.0, 0.0), 'Q': (0.08, 0.0)}),
+        'links.rocker',
+        'four-bar',
+    ),
+    'no assembly': (FOUR_BAR, drop('assembly', 'B'), 'assembly', 'write B: left or right'),
+    'an assembly of a pin that closes nothing': (
+        FOUR_BAR,
+        put('assembly', 'A', 'left'),
+        'assembly.A',
+        "name 'B'",
+    ),
+    'an assembly on no side': (
+        FOUR_BAR,
+        put('assembly', 'B', 'ahead'),
+        'assembly.B',
+        'write left or right (the side of A→D)',
+    ),
+    'a rod assembled on no side': (
+        SLIDER_CRANK,
+        put('assembly', 'swivel', 'left'),
+        'assembly.swivel',
+        'write ahead or behind',
+    ),
+    'no assembly of a rod': (
+        SLIDER_CRANK,
+        drop('assembly', 'swivel'),
+        'assembly',
+        'write swivel: ahead or behind',
+    ),
+    'a slider along an unknown link': (
+        SLIDER_CRANK,
+        swivel(along='rail'),
+        'sliders.swivel.along',
+        'name one of crank, ground, rod',
+    ),
+    'a slider through an unknown point': (
+        SLIDER_CRANK,
+        swivel(through='U'),
+        'sliders.swivel.through',
+        'name one of A, T',
+    ),
+    'a slider of an unknown point': (
+        SLIDER_CRANK,
+        swivel(point='U'),
+        'sliders.swivel.point',
+        "one link other than 'rod'",
+    ),
+    'a slider of a pin': (
+        SLIDER_CRANK,
+        swivel(point='O'),
+        'sliders.swivel.point',
+        "one link other than 'rod'",
+    ),
+    'a slider of its own link': (
+        SLIDER_CRANK,
+        swivel(point='T'),
+        'sliders.swivel.point',
+        "one link other than 'rod'",
+    ),
+    'a slider in no direction': (
+        SLIDER_CRANK,
+        swivel(direction=(0.0, 0.0)),
+        'sliders.swivel.direction',
+        'for example [1, 0]',
+    ),
+    'a slider the other way about': (
+        SLIDER_CRANK,
+        swivel(point='T', along='ground', through='C'),
+        'sliders.swivel',
+        'inverted slider-crank',
+    ),
+    'a rod without a pin on the crank': (
+        SLIDER_CRANK,
+        put('links', 'rod', {'Q': (0.0, 0.0), 'T': (0.3, 0.0)}),
+        'links.rod',
+        'inverted slider-crank',
+    ),
+    'a swivel on the crank pivot': (
+        SLIDER_CRANK,
+        put('links', 'ground', 'C', (0.0, 0.0)),
+        'links.ground.C',
+        'different places',
+    ),
+    'a joint of an unknown parent': (
+        FOUR_BAR,
+        put('joints', 'rocker_joint', RevoluteJoint('base', 'rocker')),
+        'joints.rocker_joint.parent',
+        'name one of ground, crank, coupler, rocker',
+    ),
+    'a joint of an unknown child': (
+        FOUR_BAR,
+        put('joints', 'rocker_joint', RevoluteJoint('ground', 'roker')),
+        'joints.rocker_joint.child',
+        'name one of ground, crank, coupler, rocker',
+    ),
+    'a joint of an unknown slider': (
+        SLIDER_CRANK,
+        put('joints', 'slide_joint', SlideJoint('swivle')),
+        'joints.slide_joint.slider',
+        'name one of swivel',
+    ),
+    'a slide of a linkage without sliders': (
+        FOUR_BAR,
+        put('joints', 'slide_joint', SlideJoint('swivel')),
+        'joints.slide_joint.slider',
+        'this linkage has none',
+    ),
+    'a link too many': (
+        FOUR_BAR,
+        put('links', 'fifth', {'B': (0.0, 0.0), 'E': (1.0, 0.0)}),
+        'links',
+        'four-bar',
+    ),
+    'a link too few': (FOUR_BAR, drop('links', 'rocker'), 'links', 'four-bar'),
+    'a four-bar that slides as well': (
+        FOUR_BAR,
+        put('sliders', 'slot', Slider('O', 'rocker', 'B', (1.0, 0.0))),
+        'sliders.slot.point',
+        "one link other than 'rocker'",
+    ),
+}

@@ -1,0 +1,132 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A four-bar is solved as well as its lengths and crank angle allow, in the right assembly."""
+
+from __future__ import annotations
+
+from math import cos, isclose, sin
+
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from linkage_ros.kinematics.dyads.rrr import RRRDyad
+from linkage_ros.kinematics.status import Status
+import pytest
+
+from .reference import four_bar, UNIT_ROUNDOFF
+from .samples import FOUR_BARS, four_bars
+from .tolerance import ANGLE, NEEDLE_RATE, RATE, TOGGLE, Worst
+
+COUNT = 2000
+
+length = st.floats(0.1, 10.0)
+crank = st.floats(-7.0, 7.0)
+side = st.sampled_from((1, -1))
+
+
+@pytest.mark.parametrize('family', FOUR_BARS)
+def test_positions_rates_and_status_are_right_in_every_family(family: str) -> None:
+    worst = Worst()
+    seen: dict[Status, int] = dict.fromkeys(Status, 0)
+    for case in four_bars(family, COUNT):
+        *lengths, phi, sign = case
+        truth = four_bar(*case)
+        dyad = RRRDyad(*lengths, sign)
+        pose = dyad.close(phi)
+        seen[pose.status] += 1
+        worst.note_status(pose.status, pose.gap, float(truth.gap), sum(lengths), case)
+        assert (pose.status is Status.TOGGLE) == (pose.cross == 0.0 and not pose.gap), case
+        if truth.gap > 0 or pose.status is Status.OPEN:
+            continue
+        limit = ANGLE if pose.status is Status.CLOSED else TOGGLE
+        worst.note('coupler', truth.coupler.half_turn_error_of(pose.coupler), limit, case)
+        worst.note('rocker', truth.rocker.half_turn_error_of(pose.rocker), limit, case)
+        if pose.status is Status.CLOSED:
+            assert pose.cross * sign > 0.0, case
+            limit = NEEDLE_RATE if family == 'needles' else RATE
+            coupler_rate, rocker_rate = dyad.rates(phi, pose, 1.0)
+            worst.note('ω3', truth.coupler_rate.error_of(coupler_rate), limit, case)
+            worst.note('ω4', truth.rocker_rate.error_of(rocker_rate), limit, case)
+    worst.check()
+    assert seen[Status.CLOSED] >= COUNT / 10, 'a sweep that closes nothing proves nothing'
+    assert seen[Status.INDETERMINATE] == 0
+
+
+def test_the_sweep_holds_open_loops_and_toggles_too() -> None:
+    found = {
+        RRRDyad(a, b, c, d, sign).close(phi).status
+        for family in FOUR_BARS
+        for a, b, c, d, phi, sign in four_bars(family, COUNT)
+    }
+    assert found == {Status.CLOSED, Status.TOGGLE, Status.OPEN}
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(length, length, length, length, crank, side)
+def test_walking_the_loop_ends_where_it_began(
+    a: float, b: float, c: float, d: float, phi: float, sign: int
+) -> None:
+    pose = RRRDyad(a, b, c, d, sign).close(phi)
+    assume(pose.status is Status.CLOSED)
+    x = a * cos(phi) + b * cos(pose.coupler) - c * cos(pose.rocker) - d
+    y = a * sin(phi) + b * sin(pose.coupler) - c * sin(pose.rocker)
+    # What four angles of up to 3π, each rounded a few times, can move the four links by.
+    reached = 64.0 * UNIT_ROUNDOFF * (a + b + c + d)
+    if abs(pose.cross) > 1e-3 * b * c:
+        assert abs(x) < reached
+        assert abs(y) < reached
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(length, length, length, length, crank, side)
+def test_the_closing_pin_lies_on_the_side_that_the_assembly_says(
+    a: float, b: float, c: float, d: float, phi: float, sign: int
+) -> None:
+    pose = RRRDyad(a, b, c, d, sign).close(phi)
+    assume(pose.status is Status.CLOSED)
+    # Twice change points turn over with the half angle, which their own tests hold.
+    assume(a + d != b + c and abs(a - d) != abs(b - c))
+    diagonal = d - a * cos(phi), -a * sin(phi)
+    left = diagonal[0] * sin(pose.coupler) - diagonal[1] * cos(pose.coupler)
+    assume(abs(left) > 1e-12 * (a + d))
+    assert left * sign > 0.0
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(length, length, length, length, crank, side)
+def test_a_mirrored_four_bar_moves_in_the_mirror(
+    a: float, b: float, c: float, d: float, phi: float, sign: int
+) -> None:
+    dyad, mirrored = RRRDyad(a, b, c, d, sign), RRRDyad(a, b, c, d, -sign)
+    pose, image = dyad.close(phi), mirrored.close(-phi)
+    assert (pose.status, pose.gap) == (image.status, image.gap)
+    if pose.status is Status.CLOSED:
+        # In a change-point linkage the half angle turns the assembly over with the mirror.
+        assume(pose.cross == -image.cross)
+        assert (pose.coupler, pose.rocker) == (-image.coupler, -image.rocker)
+        assert dyad.rates(phi, pose, 1.0) == mirrored.rates(-phi, image, 1.0)
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(length, length, length, length, crank, side, st.floats(-1e3, 1e3))
+def test_rates_are_proportional_to_the_crank_rate(
+    a: float, b: float, c: float, d: float, phi: float, sign: int, omega: float
+) -> None:
+    dyad = RRRDyad(a, b, c, d, sign)
+    pose = dyad.close(phi)
+    assume(pose.status is Status.CLOSED)
+    for rate, per_unit in zip(
+        dyad.rates(phi, pose, omega), dyad.rates(phi, pose, 1.0), strict=True
+    ):
+        assert isclose(rate, omega * per_unit, rel_tol=1e-15, abs_tol=0.0)

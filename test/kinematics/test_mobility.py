@@ -1,0 +1,168 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where the crank can turn: the ends of its range are where the loop stops closing."""
+
+from __future__ import annotations
+
+from math import pi
+import random
+
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.mobility import describe
+from linkage_ros.kinematics.status import Status
+from mpmath import mp, mpf
+import pytest
+
+from .linkages import four_bar_linkage, inverted_slider_crank_linkage
+from .reference import four_bar, inverted_slider_crank, UNIT_ROUNDOFF
+
+# Lengths a, b, c, d and what limits the crank: (folds, stretches).
+FOUR_BARS = {
+    'crank-rocker': ((2.0, 7.0, 9.0, 6.0), False, False),
+    'double crank': ((5.0, 4.0, 6.0, 2.0), False, False),
+    'parallelogram': ((1.0, 2.0, 1.0, 2.0), False, False),
+    'stretches': ((6.0, 4.0, 5.0, 4.5), False, True),
+    'folds': ((4.0, 8.0, 3.0, 6.0), True, False),
+    'both': ((4.0, 5.5, 2.5, 5.0), True, True),
+    'hardly opens': ((4.0, 1.0, 1.0 + 2**-20, 6.0 - 2**-22), False, True),
+    'hardly does not stretch': ((4.0, 6.0, 3.0, 5.0 - 2**-40), True, False),
+}
+ERROR = 8.0
+"""Limit for a range's ends, in u·κ."""
+
+
+def end_of_range(a: float, b: float, c: float, d: float, span: str) -> tuple[mpf, mpf]:
+    """Return the crank angle at which the diagonal is b + c, or |b - c| long, and its κ."""
+    with mp.workdps(60):
+        a, b, c, d = map(mpf, (a, b, c, d))
+        limit = b + c if span == 'stretch' else abs(b - c)
+        angle = mp.acos((a * a + d * d - limit * limit) / (2 * a * d))
+        # Of a² + d² − 2ad·cos φ = limit², by each length:
+        slope = a * d * mp.sin(angle)
+        condition = (
+            angle
+            + (
+                abs(a * (a - d * mp.cos(angle)))
+                + abs(d * (d - a * mp.cos(angle)))
+                + limit * (b + c)
+            )
+            / slope
+        )
+        return angle, condition
+
+
+def test_the_table_says_what_limits_each_crank() -> None:
+    for lengths, folds, stretches in FOUR_BARS.values():
+        a, b, c, d = lengths
+        assert folds == (abs(d - a) < abs(b - c))
+        assert stretches == (a + d > b + c)
+
+
+@pytest.mark.parametrize('name', FOUR_BARS)
+def test_a_four_bar_s_range_ends_where_it_folds_and_stretches(name: str) -> None:
+    lengths, folds, stretches = FOUR_BARS[name]
+    check_ranges(lengths, folds, stretches)
+
+
+def test_ranges_of_random_four_bars_end_where_they_fold_and_stretch() -> None:
+    rng = random.Random(4)
+    kinds = set()
+    while len(kinds) < 4 or rng.random() > 1e-3:
+        a, b, c, d = (10.0 ** rng.uniform(-1, 1) for _ in range(4))
+        if 2 * max(a, b, c, d) < a + b + c + d:
+            kinds.add((abs(d - a) < abs(b - c), a + d > b + c))
+            check_ranges((a, b, c, d), abs(d - a) < abs(b - c), a + d > b + c)
+
+
+def check_ranges(lengths: tuple[float, float, float, float], folds: bool, stretches: bool) -> None:
+    """Compare the ranges with the reference's limit angles."""
+    ranges = Closure(four_bar_linkage(lengths, 'left')).crank_ranges
+    for low, high in ranges:
+        if not folds and not stretches:
+            assert (low, high) == (-pi, pi)
+    ends = [abs(end) for crank_range in ranges for end in crank_range]
+    if folds:
+        angle, condition = end_of_range(*lengths, 'fold')
+        # Behind the far side of the ground a range goes on, up to the same angle beyond.
+        near = [end if end <= pi else 2 * pi - end for end in ends]
+        met = min(near, key=lambda end: abs(end - float(angle)))
+        # The far end is written as 2π less the near one, and rounded at that size.
+        assert abs(met - angle) < ERROR * UNIT_ROUNDOFF * (condition + 2 * mp.pi), lengths
+    if stretches:
+        angle, condition = end_of_range(*lengths, 'stretch')
+        met = min(ends, key=lambda end: abs(end - float(angle)))
+        assert abs(met - angle) < ERROR * UNIT_ROUNDOFF * condition, lengths
+    assert len(ranges) == (2 if folds and stretches else 1)
+
+
+@pytest.mark.parametrize('name', FOUR_BARS)
+def test_a_loop_closes_inside_its_ranges_and_nowhere_else(name: str) -> None:
+    lengths, _, _ = FOUR_BARS[name]
+    closure = Closure(four_bar_linkage(lengths, 'right'))
+    for i in range(1, 400):
+        phi = -pi + i * pi / 200 + 1e-4
+        inside = any(low <= phi + turn <= high for low, high in closure.crank_ranges
+                     for turn in (0.0, 2 * pi))  # fmt: skip
+        status = closure.position(phi).status
+        assert (status is not Status.OPEN) == inside
+        assert inside == (four_bar(*lengths, phi, 1).gap <= 0)
+
+
+@pytest.mark.parametrize(
+    ('lengths', 'whole'),
+    [
+        ((0.15, 0.27, 0.02), True),
+        ((0.27, 0.15, -0.12), True),
+        ((0.15, 0.27, 0.2), False),
+        ((0.2, 0.2, 0.3), False),
+        ((0.2, 0.2, 0.0), True),
+    ],
+)
+def test_a_rod_s_range_ends_where_it_cannot_reach_its_swivel(
+    lengths: tuple[float, float, float], whole: bool
+) -> None:
+    closure = Closure(inverted_slider_crank_linkage(lengths, 'ahead'))
+    ((low, high),) = closure.crank_ranges
+    if whole:
+        assert (low, high) == (-pi, pi)
+        return
+    a, d, h = lengths
+    angle, condition = end_of_range(a, abs(h), 0.0, d, 'stretch')
+    assert abs(low - angle) < ERROR * UNIT_ROUNDOFF * condition
+    assert abs(high - (2 * mp.pi - angle)) < ERROR * UNIT_ROUNDOFF * (condition + 2 * mp.pi)
+    for phi in (low - 1e-6, low + 1e-6, pi, high - 1e-6, high + 1e-6):
+        expected = inverted_slider_crank(*lengths, phi, 1).gap <= 0
+        assert (closure.position(phi).status is Status.CLOSED) == expected
+
+
+@pytest.mark.parametrize('angle', [0.7, -2.0])
+def test_ranges_are_of_the_input_joint_and_turn_with_its_frame(angle: float) -> None:
+    lengths, _, _ = FOUR_BARS['both']
+    plain = Closure(four_bar_linkage(lengths, 'left')).crank_ranges
+    turned = Closure(four_bar_linkage(lengths, 'left', {'crank': (0.1, 0.2, angle)})).crank_ranges
+    for (low, high), (turned_low, turned_high) in zip(plain, turned, strict=True):
+        assert (turned_low, turned_high) == pytest.approx((low - angle, high - angle), abs=1e-14)
+
+
+def test_ranges_are_told_in_words() -> None:
+    words = {
+        name: describe(Closure(four_bar_linkage(lengths, 'left')).crank_ranges)
+        for name, (lengths, _, _) in FOUR_BARS.items()
+    }
+    assert words['crank-rocker'] == 'every crank angle'
+    angle, _ = end_of_range(*FOUR_BARS['stretches'][0], 'stretch')
+    assert words['stretches'] == f'-{float(angle):.6g} to {float(angle):.6g} rad'
+    assert words['both'].count(' to ') == 2
+    assert ' or ' in words['both']
