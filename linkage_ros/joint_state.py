@@ -72,7 +72,6 @@ class CrankSample(NamedTuple):
 class _Layout(NamedTuple):
     """Where things stand in a message; two messages of one publisher have the same layout."""
 
-    start: int
     names: bytes  # from the frame_id up to the first position
     encapsulation: bytes
     stamp: Struct
@@ -109,7 +108,7 @@ class JointStateReader:
             layout is None
             or len(data) < layout.size
             or data[:2] != layout.encapsulation
-            or data[12 : layout.start] != layout.names
+            or not data.startswith(layout.names, 12)
             or layout.counter.unpack_from(data, layout.rates[0])[0] != layout.rates[1]
             or layout.counter.unpack_from(data, layout.efforts[0])[0] != layout.efforts[1]
         ):
@@ -142,8 +141,9 @@ def _find(data: bytes, joint: bytes) -> _Layout | Rejection:
         for _ in range(min(n_names, len(data))):
             at = _aligned(at, 4)
             length = count.unpack_from(data, at)[0]
-            names.append(data[at + 4 : at + 4 + length - 1])
-            at += 4 + length
+            name_start, at = at + 4, at + 4 + length
+            name_end = at - 1
+            names.append(data[name_start:name_end])
         arrays = []
         for _ in range(3):
             at = _aligned(at, 4)
@@ -164,7 +164,6 @@ def _find(data: bytes, joint: bytes) -> _Layout | Rejection:
         return Rejection.TWICE if joint in names else Rejection.MISSING
     index = names.index(joint)
     return _Layout(
-        positions,
         data[12:positions],
         data[:2],
         Struct(f'{order}iI'),

@@ -119,7 +119,7 @@ class Topic:
     """
 
     name: str
-    type: str
+    type: str  # noqa: A003
     definition: str
     type_hash: str
     qos: QosProfile = QosProfile()

@@ -223,7 +223,7 @@ class BagWriter:
 
     @property
     def size(self) -> int:
-        """The size of the MCAP file by now [bytes]."""
+        """Return the size of the MCAP file by now [bytes]."""
         return self._file.size
 
     def _finish(self, custom: Mapping[str, str]) -> OSError | None:

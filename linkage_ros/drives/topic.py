@@ -74,7 +74,7 @@ class TopicDrive:
 
     Parameters
     ----------
-    parameters
+    use
         How samples are used.
     needs_rate
         Whether something beyond carrying forward needs the crank's rate. Where nothing does,
@@ -84,11 +84,11 @@ class TopicDrive:
 
     __slots__ = ('_carry_forward', '_max_age', '_max_lead', '_needs_rate', '_sample')
 
-    def __init__(self, parameters: TopicParameters, needs_rate: bool) -> None:
-        self._carry_forward = parameters.carry_forward
-        self._max_age = parameters.max_age
-        self._max_lead = parameters.max_lead
-        self._needs_rate = needs_rate or parameters.carry_forward
+    def __init__(self, use: TopicParameters, needs_rate: bool) -> None:
+        self._carry_forward = use.carry_forward
+        self._max_age = use.max_age
+        self._max_lead = use.max_lead
+        self._needs_rate = needs_rate or use.carry_forward
         self._sample: tuple[int, float, float] | None = None
 
     @property

@@ -22,7 +22,7 @@ Position first; what a scene calls for beyond it starts from the position and re
 from __future__ import annotations
 
 from math import cos, hypot, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.assembly import find_loop, Loop
@@ -133,7 +133,8 @@ class Closure:
 
         """
         # The pose came out of this very dyad: the pair matches, which no annotation can say.
-        first, second = self._dyad.rates(position.phi, position.pose, crank_rate)  # type: ignore[arg-type]
+        pose: Any = position.pose
+        first, second = self._dyad.rates(position.phi, pose, crank_rate)
         return tuple([t * crank_rate + u * first + v * second for t, u, v, _ in self._terms])
 
     def residual(self, position: Position) -> float:

@@ -102,7 +102,7 @@ class Linkage:
     """
 
     links: Mapping[str, Mapping[str, Point]]
-    input: Input
+    input: Input  # noqa: A003
     assembly: Mapping[str, Side]
     joints: Mapping[str, RevoluteJoint | SlideJoint]
     sliders: Mapping[str, Slider]

@@ -121,7 +121,7 @@ class LinkageNode(LifecycleNode):
 
     @property
     def crank_topic(self) -> str:
-        """Resolved name of the topic from which the crank comes."""
+        """Return the resolved name of the topic from which the crank comes."""
         return str(self._crank.topic_name)
 
     # Transitions.

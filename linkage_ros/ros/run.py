@@ -50,7 +50,7 @@ class View(Protocol):
 def run_linkage_node(
     stop: Event,
     arguments: Sequence[str],
-    parameters: Mapping[str, str] | None = None,
+    overrides: Mapping[str, str] | None = None,
     *,
     seconds: float = inf,
     view: View | None = None,
@@ -65,7 +65,7 @@ def run_linkage_node(
         Ends the run; `linkage_ros.stop` sets it on signals.
     arguments
         Command line with ``--ros-args``, without the program's name.
-    parameters
+    overrides
         Parameters of the node, beside those of the command line.
     seconds
         How long the run lasts, in [s].
@@ -88,8 +88,8 @@ def run_linkage_node(
         rclpy.init(
             args=['linkage_node', *arguments], signal_handler_options=SignalHandlerOptions.NO
         )
-        overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
-        node = LinkageNode(parameter_overrides=overrides)
+        given = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
+        node = LinkageNode(parameter_overrides=given)
     except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
         print(f'linkage_node: {_first_line(error)}; see the README', file=sys.stderr)
         rclpy.try_shutdown()

@@ -62,7 +62,7 @@ class Counts:
     """When the newest good sample was taken, on the steady clock, in [ns]; 0 before the first."""
 
 
-Take = Callable[[], 'tuple[bytes, dict[str, Any]] | None']
+Take = Callable[[], tuple[bytes, dict[str, Any]] | None]
 Pace = Callable[['TickLoop', Event], None]
 """Runs a tick loop until the event: waits, and calls `tick_at` or `tick_samples`."""
 
@@ -134,7 +134,7 @@ class TickLoop:
         if taken is None:
             return None
         message, info = taken
-        if self._own and message[12 : 12 + len(self._own)] == self._own:
+        if self._own and message.startswith(self._own, 12):
             return False
         counts = self.counts
         counts.received += 1

@@ -21,8 +21,9 @@ import venv
 
 import pytest
 
-pytest.importorskip('pip', reason='a robot has no pip')
+# Setuptools first: once pip is imported, setuptools refuses to be (Python 3.11 and older).
 pytest.importorskip('setuptools', minversion='70.1', reason='older ones build no wheel alone')
+pytest.importorskip('pip', reason='a robot has no pip')
 
 ROS = ('rclpy', 'sensor_msgs', 'std_msgs', 'std_srvs', 'diagnostic_msgs', 'lifecycle_msgs')
 REPORT = ('matplotlib', 'rich')
