@@ -16,8 +16,9 @@
 """
 A run once more, from its bag: the same pipeline over the same samples in the same order.
 
-The bag holds the messages in the order in which the tick took and published them, with the time by
-which it judged them. So the pipeline, built from the scene in the bag, comes to the same states.
+The bag holds the messages in the order in which the tick took and published them. The log time is
+that by which the tick judged a sample, the publish time of a joint state that for which it solved.
+So the pipeline, built from the scene in the bag, comes to the same states.
 """
 
 from __future__ import annotations
@@ -81,8 +82,8 @@ def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
         if message.log_time < last and message.topic != '/diagnostics':
             pipeline = Pipeline(scene)
         if message.topic == run['joint_states_topic']:
-            tick = pipeline.tick(message.log_time)
-            yield ReplayedTick(message.log_time, message.data, tick)
+            tick = pipeline.tick(message.publish_time)
+            yield ReplayedTick(message.publish_time, message.data, tick)
         elif message.topic == run['crank_topic']:
             pipeline.offer(message.data, message.log_time)
         else:

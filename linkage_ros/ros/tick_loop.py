@@ -154,7 +154,7 @@ class TickLoop:
         while (taken := self.take(now)) is not None:
             good = good or taken
         self.counts.used += good
-        self._tick(now)
+        self._tick(now, now)
 
     def tick_samples(self, now: int) -> None:
         """Take every message that has come and tick once for each, at its stamp."""
@@ -162,7 +162,7 @@ class TickLoop:
         while (taken := self.take(now)) is not None:
             if taken:
                 self.counts.used += 1
-                self._tick(self._pipeline.newest_stamp)
+                self._tick(now, self._pipeline.newest_stamp)
 
     def _begin(self, now: int) -> None:
         """Build the pipeline anew where time has jumped back or one has asked."""
@@ -175,16 +175,16 @@ class TickLoop:
             self._pipeline = self._build()
         self._last_time = now
 
-    def _tick(self, now: int) -> None:
-        """Solve for a time, in [ns]; publish, record and count."""
+    def _tick(self, now: int, at: int) -> None:
+        """Solve now for a time, both in [ns]; publish, record and count."""
         counts = self.counts
-        tick = self._pipeline.tick(now)
+        tick = self._pipeline.tick(at)
         counts.ticks += 1
         counts.last = tick
         if tick.message:
             self._publish(tick.message)
             if self.recorder is not None:
-                self.recorder.offer(JOINT_STATES, now, now, tick.message)
+                self.recorder.offer(JOINT_STATES, now, at, tick.message)
             counts.published += 1
         if tick.position is None:
             counts.silent += 1

@@ -1,0 +1,149 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A bag of the tick, replayed, gives the same bytes; whatever woke the tick, and across a jump."""
+
+from __future__ import annotations
+
+from math import tau
+from pathlib import Path
+
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.replay import recorded_scene, replay, RUN_FILE
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import BagError
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.pipeline import Pipeline
+import pytest
+
+SECOND = 1_000_000_000
+LINKAGE = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
+RUN = b'{"scene": "s", "crank_topic": "/crank", "joint_states_topic": "/joint_states"}'
+CRANK = JointStateWriter(['other', 'crank_joint'])
+
+
+def sample(stamp: int, angle: float, rate: float) -> bytes:
+    return CRANK.write(stamp, (0.0, angle), (0.0, rate))
+
+
+def files(scene: str) -> dict[str, tuple[str, bytes]]:
+    return {
+        'scene.yaml': ('application/yaml', f'linkage: l.yaml\n{scene}'.encode()),
+        'linkage.yaml': ('application/yaml', LINKAGE),
+        RUN_FILE: ('application/json', RUN),
+    }
+
+
+class Run:
+    """A tick by hand: offers and ticks as the node's tick loop makes them, recorded."""
+
+    def __init__(self, folder: Path, scene: str) -> None:
+        topics = [
+            Topic(name, 'sensor_msgs/msg/JointState', '', '')
+            for name in ('/crank', '/joint_states')
+        ]
+        self.recorder = Recorder(BagWriter(folder, topics, files(scene)))
+        self.folder = folder
+        # The scene as the bag has it: what is tested is the order and the times, not the loading.
+        self.scene = recorded_scene(read_bag(folder, allow_truncated=True))
+        self.pipeline = Pipeline(self.scene)
+        self.published: list[bytes] = []
+
+    def offer(self, now: int, message: bytes) -> None:
+        self.recorder.offer(0, now, now - 1000, message)
+        self.pipeline.offer(message, now)
+
+    def tick(self, now: int, at: int) -> None:
+        message = self.pipeline.tick(at).message
+        if message:
+            self.recorder.offer(1, now, at, message)
+            self.published.append(message)
+
+    def replayed(self) -> list[tuple[bytes, bytes]]:
+        self.recorder.stop()
+        bag = read_bag(self.folder)
+        return [(r.recorded, r.tick.message) for r in replay(bag, recorded_scene(bag))]
+
+
+@pytest.mark.parametrize(
+    'scene',
+    [
+        'effects: {velocity: {}}\n',
+        'angles: wrapped\n',
+        'drive: {topic: {carry_forward: false}}\n',
+    ],
+)
+def test_ticks_on_a_clock_replay_to_the_same_bytes(tmp_path: Path, scene: str) -> None:
+    run = Run(tmp_path / 'bag', scene)
+    for k in range(2000):
+        now = SECOND + k * 1_000_000
+        if k % 2 == 0 and not 900 < k < 1200:  # silence, longer than max_age, then samples again
+            run.offer(now, sample(now - 137_000, tau * k * 1e-3, tau))
+        if k % 17 == 0:  # what the tick refuses is in the bag too
+            run.offer(now, sample(now + 10 * SECOND, 1.0, 1.0))
+            run.offer(now, b'\x00\x01\x00\x00rubbish')
+        run.tick(now, now)
+    assert 1500 < len(run.published) < 2000
+    assert run.replayed() == [(message, message) for message in run.published]
+
+
+def test_ticks_on_samples_replay_to_the_same_bytes(tmp_path: Path) -> None:
+    run = Run(tmp_path / 'bag', 'rate: 0\neffects: {velocity: {}}\n')
+    for k in range(500):
+        # Solved for the sample's stamp, which is older than the moment of the tick.
+        stamp = SECOND + k * 1_000_000
+        run.offer(stamp + 250_000, sample(stamp, 0.01 * k, 10.0))
+        run.tick(stamp + 250_000, stamp)
+    assert len(run.published) == 500
+    assert run.replayed() == [(message, message) for message in run.published]
+
+
+def test_a_jump_back_in_time_is_replayed_as_it_was_lived(tmp_path: Path) -> None:
+    run = Run(tmp_path / 'bag', 'effects: {velocity: {}}\n')
+    for begin in (5 * SECOND, 2 * SECOND):
+        for k in range(300):
+            now = begin + k * 1_000_000
+            run.offer(now, sample(now, 0.05 * k, 50.0))
+            run.tick(now, now)
+        run.pipeline = Pipeline(run.scene)  # as the tick loop does where time jumps back
+    assert len(run.published) == 600
+    assert run.replayed() == [(message, message) for message in run.published]
+
+
+def test_another_scene_replays_to_other_bytes(tmp_path: Path) -> None:
+    run = Run(tmp_path / 'bag', 'effects: {velocity: {}}\n')
+    run.offer(SECOND, sample(SECOND, 1.0, 1.0))
+    run.tick(SECOND, SECOND)
+    run.recorder.stop()
+    other = Run(tmp_path / 'other', 'angles: wrapped\n')
+    (again,) = replay(read_bag(run.folder), other.scene)
+    assert again.tick.message != again.recorded
+
+
+@pytest.mark.parametrize('missing', ['scene.yaml', 'linkage.yaml', RUN_FILE])
+def test_a_bag_that_does_not_say_what_ran_is_refused(tmp_path: Path, missing: str) -> None:
+    attached = {name: data for name, data in files('').items() if name != missing}
+    BagWriter(tmp_path / 'bag', [], attached).close()
+    with pytest.raises(BagError, match=missing):
+        recorded_scene(read_bag(tmp_path / 'bag'))
+
+
+def test_a_damaged_account_of_the_run_is_refused(tmp_path: Path) -> None:
+    attached = {**files(''), RUN_FILE: ('application/json', b'{"scene": 3')}
+    BagWriter(tmp_path / 'bag', [], attached).close()
+    with pytest.raises(BagError, match='damaged'):
+        recorded_scene(read_bag(tmp_path / 'bag'))
