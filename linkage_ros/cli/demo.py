@@ -31,6 +31,7 @@ from threading import Event
 
 from linkage_ros.cli.plot import draw
 from linkage_ros.cli.run import add_run_arguments, run_scene
+from linkage_ros.errors import LinkageError
 from linkage_ros.shipped import shipped
 
 _DOMAINS = 101
@@ -57,7 +58,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         [
             *(sys.executable, '-m', 'linkage_ros.ros.crank_source'),
             *('--ros-args', '-p', f'seconds:={arguments.seconds + 10.0:.1f}'),
-        ]
+        ],
+        start_new_session=True,  # Ctrl-C is for this process, which ends the other
     )
     try:
         code, bag = run_scene(str(scene), arguments, stop)
@@ -66,6 +68,11 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         crank.wait()
     if bag is not None:
         picture = Path(f'{bag}.png')
-        draw(bag, picture)
-        print(f'picture   {picture}')
+        try:
+            draw(bag, picture)
+        except LinkageError as error:
+            # A run that was ended before it began, or no matplotlib: the run itself was good.
+            print(f'picture   none: {error}')
+        else:
+            print(f'picture   {picture}')
     return code

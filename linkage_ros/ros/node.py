@@ -59,7 +59,7 @@ OUTPUT_QOS = QoSProfile(depth=10)
 
 _CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 _DIAGNOSTICS_QOS = QoSProfile(depth=1)
-_WATCH_PERIOD = 0.2
+_WATCH_PERIOD = 0.25
 
 Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
 

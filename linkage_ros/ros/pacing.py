@@ -57,19 +57,17 @@ def steady(rate: float) -> Pace:
             wait = due - monotonic_ns()
             if wait > _FINE and stopping.wait((wait - _FINE) * 1e-9):
                 return
+            wait = due - monotonic_ns()
             if wait > 0:
-                wait = due - monotonic_ns()
-                if wait > 0:
-                    sleep(wait * 1e-9)
-            elif wait < -CATCH_UP:
-                lost = int(-wait // period)
-                counts.lost += lost
-                number += lost
-                due = begin + round(number * period)
+                sleep(wait * 1e-9)
             lateness = monotonic_ns() - due
             counts.lateness.add(lateness)
             if lateness > period:
                 counts.late += 1
+                if lateness > CATCH_UP:
+                    lost = int(lateness // period)
+                    counts.lost += lost
+                    number += lost
             loop.tick_at(time_ns())
 
     return pace

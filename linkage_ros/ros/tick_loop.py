@@ -40,6 +40,9 @@ CRANK, JOINT_STATES, DIAGNOSTICS = range(3)
 """The recorder's topics."""
 
 
+_CLOSED = Status.CLOSED
+
+
 @dataclass(slots=True)
 class Counts:
     """What the tick has seen since it began; written by its thread alone."""
@@ -128,12 +131,8 @@ class TickLoop:
         """Whether it has been started and not stopped."""
         return self._thread is not None
 
-    def take(self, now: int) -> bool | None:
-        """Take the next message; return whether it was good, nothing where there is none."""
-        taken = self._take()
-        if taken is None:
-            return None
-        message, info = taken
+    def _offer(self, message: bytes, info: dict[str, Any], now: int) -> bool:
+        """Record a message and offer it to the pipeline; return whether it was good."""
         if self._own and message.startswith(self._own, 12):
             return False
         counts = self.counts
@@ -151,16 +150,16 @@ class TickLoop:
         """Take every message that has come and tick at a time, in [ns]."""
         self._begin(now)
         good = False
-        while (taken := self.take(now)) is not None:
-            good = good or taken
+        while (taken := self._take()) is not None:
+            good |= self._offer(*taken, now)
         self.counts.used += good
         self._tick(now, now)
 
     def tick_samples(self, now: int) -> None:
         """Take every message that has come and tick once for each, at its stamp."""
         self._begin(now)
-        while (taken := self.take(now)) is not None:
-            if taken:
+        while (taken := self._take()) is not None:
+            if self._offer(*taken, now):
                 self.counts.used += 1
                 self._tick(now, self._pipeline.newest_stamp)
 
@@ -178,19 +177,19 @@ class TickLoop:
     def _tick(self, now: int, at: int) -> None:
         """Solve now for a time, both in [ns]; publish, record and count."""
         counts = self.counts
-        tick = self._pipeline.tick(at)
-        counts.ticks += 1
-        counts.last = tick
-        if tick.message:
-            self._publish(tick.message)
+        counts.last = tick = self._pipeline.tick(at)
+        position, _, message = tick
+        if message:
+            self._publish(message)
             if self.recorder is not None:
-                self.recorder.offer(JOINT_STATES, now, at, tick.message)
+                self.recorder.offer(JOINT_STATES, now, at, message)
             counts.published += 1
-        if tick.position is None:
+        counts.ticks += 1
+        if position is None:
             counts.silent += 1
-        elif tick.position.status is not Status.CLOSED:
-            counts.unclosed[tick.position.status] += 1
-            counts.last_unclosed = tick.position
+        elif position.status is not _CLOSED:
+            counts.unclosed[position.status] += 1
+            counts.last_unclosed = position
 
     def _guarded(self, pace: Pace) -> None:
         # A defect here must neither vanish with its thread nor show a traceback.

@@ -1,0 +1,66 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The command line as its user types it, in processes of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+Run = Callable[..., 'subprocess.CompletedProcess[str]']
+
+if find_spec('rclpy') is None:
+    collect_ignore_glob = ['test_*.py']
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.ros)
+
+
+def environment(folder: Path) -> dict[str, str]:
+    """Return what a process of the tests sees; `linkage demo` chooses its own ROS domain."""
+    return os.environ | {
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        'ROS_DOMAIN_ID': str(1 + os.getpid() % 101),
+        'ROS_LOG_DIR': str(folder),
+        'RCUTILS_COLORIZED_OUTPUT': '0',
+    }
+
+
+@pytest.fixture
+def linkage(tmp_path: Path) -> Run:
+    """Return a function that runs ``linkage`` in an empty folder."""
+
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, '-m', 'linkage_ros.cli.main', *arguments],
+            cwd=tmp_path,
+            env=environment(tmp_path),
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+
+    return run

@@ -1,0 +1,120 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``linkage demo``: the whole of it, ended by its time and by Ctrl-C at any moment."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import pty
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import get_typestore, Stores
+
+from .conftest import environment, Run
+
+PNG = b'\x89PNG\r\n\x1a\n'
+
+
+def messages(folder: Path) -> dict[str, int]:
+    """Return how many messages a bag has, by topic, all of them read."""
+    with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        counts = dict.fromkeys((c.topic for c in reader.connections), 0)
+        for connection, _, data in reader.messages():
+            reader.deserialize(data, connection.msgtype)
+            counts[connection.topic] += 1
+    return counts
+
+
+def only_bag(runs: Path) -> Path:
+    (bag,) = (path for path in runs.iterdir() if path.is_dir())
+    return bag
+
+
+def test_the_demo_runs_records_proves_and_draws(linkage: Run, tmp_path: Path) -> None:
+    answer = linkage('demo', '--seconds', '4')
+    assert answer.returncode == 0, answer.stderr
+    bag = only_bag(tmp_path / 'runs')
+    counts = messages(bag)
+    assert counts['/joint_states'] > 1000
+    assert counts['/crank_states'] > 500
+    assert counts['/diagnostics'] >= 3
+
+    told = answer.stdout
+    assert f'/joint_states: {counts["/joint_states"]} of {counts["/joint_states"]}' in told
+    same, of = map(int, re.search(r'(\d+) of (\d+) joint states replay', told).groups())
+    assert same == of == counts['/joint_states']
+    residual = float(re.search(r'worst loop residual (\S+) m', told).group(1))
+    assert residual < 1e-15
+    for row in ('ticks', 'lateness', 'published', 'samples', 'ticks/s'):
+        assert row in told
+    picture = Path(f'{bag}.png')
+    assert str(picture.relative_to(tmp_path)) in told
+    assert picture.read_bytes().startswith(PNG)
+
+
+@pytest.mark.parametrize('after', [0.05, 0.4, 0.8, 1.2, 2.0])
+def test_ctrl_c_at_any_moment_leaves_no_open_bag(tmp_path: Path, after: float) -> None:
+    demo = subprocess.Popen(
+        [sys.executable, '-m', 'linkage_ros.cli.main', 'demo', '--seconds', '30'],
+        cwd=tmp_path,
+        env=environment(tmp_path),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+    begun = demo.stdout.readline()  # from here on, signals are the program's own
+    assert 'ROS_DOMAIN_ID' in begun
+    time.sleep(after)
+    os.killpg(demo.pid, signal.SIGINT)  # as a terminal does: to the crank's process as well
+    told, _ = demo.communicate(timeout=30)
+    assert demo.returncode == 0, told
+    assert 'Traceback' not in told
+    if (tmp_path / 'runs').exists():
+        messages(only_bag(tmp_path / 'runs'))
+
+
+def test_on_a_terminal_the_display_is_live(tmp_path: Path) -> None:
+    ours, theirs = pty.openpty()
+    demo = subprocess.Popen(
+        [sys.executable, '-m', 'linkage_ros.cli.main', 'demo', '--seconds', '3'],
+        cwd=tmp_path,
+        env=environment(tmp_path) | {'TERM': 'xterm-256color', 'COLUMNS': '120', 'LINES': '40'},
+        stdout=theirs,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(theirs)
+    shown = b''
+    while True:
+        try:
+            part = os.read(ours, 65536)
+        except OSError:  # a pty's way to say that the other end is closed
+            break
+        shown += part
+    os.close(ours)
+    assert demo.wait(30) == 0
+    text = re.sub(r'\x1b\[[0-9;?]*[A-Za-z]', '', shown.decode())
+    assert '\x1b[' in shown.decode()
+    for name in ('crank_joint', 'coupler_joint', 'rocker_joint', 'input age', 'lost', 'samples'):
+        assert name in text
+    assert 'joint states replay to the same bytes' in text
