@@ -22,8 +22,11 @@ would take the context away from under a bag that is being closed.
 
 from __future__ import annotations
 
+import atexit
 import signal
 from threading import Event
+
+_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
 def stop_on_signals() -> Event:
@@ -33,6 +36,13 @@ def stop_on_signals() -> Event:
     def handle(_number: int, _frame: object) -> None:
         stop.set()
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in _SIGNALS:
         signal.signal(number, handle)
+    # Python gives up its handlers some time before the process ends: a signal would kill it then.
+    atexit.register(_ignore)
     return stop
+
+
+def _ignore() -> None:
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)

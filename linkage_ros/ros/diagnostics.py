@@ -147,6 +147,9 @@ class Health:
         if age * NANOSECONDS > self.max_age:
             level = STALE
             message = f'No crank for {age:.1f} s' if counts.sample_at else 'No crank yet'
+        elif counts.last is not None and counts.last.position is None:
+            limit = self.max_age / NANOSECONDS
+            level, message = STALE, f'Samples are older than {limit:g} s; synchronise the clocks'
         elif len(self.publishers) > 1:
             level, message = WARN, f'Several publishers: {", ".join(self.publishers)}'
         elif rejected:

@@ -41,6 +41,7 @@ from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
 from linkage_ros.ros.warnings import Warnings
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -60,6 +61,7 @@ OUTPUT_QOS = QoSProfile(depth=10)
 _CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 _DIAGNOSTICS_QOS = QoSProfile(depth=1)
 _WATCH_PERIOD = 0.25
+_NOT_YET_KNOWN = '_NODE_NAME_UNKNOWN_'
 
 Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
 
@@ -116,6 +118,8 @@ class LinkageNode(LifecycleNode):
         # Not by the node's clock, which stands still where the simulation does.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_WATCH_PERIOD, self._watch, clock=steady)
+        change = self._service_change_state
+        change.callback = partial(self._on_change_state, change.callback)
         self._warnings = Warnings(self.get_logger())
         self._before = Snapshot()
 
@@ -234,6 +238,17 @@ class LinkageNode(LifecycleNode):
 
     # Services.
 
+    def _on_change_state(
+        self, change: Callable[[Any, Any], Any], request: Any, response: Any
+    ) -> Any:
+        """Answer where rclpy raises: to a transition that the state does not have."""
+        try:
+            return change(request, response)
+        except RCLError as error:
+            self.get_logger().error(f'change_state: {str(error).splitlines()[0]}')
+            response.success = False
+            return response
+
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self.loop is None or not self.loop.running:
             return _answer(response, False, 'not active: nothing to reset')
@@ -316,6 +331,7 @@ class LinkageNode(LifecycleNode):
         return [
             f'{info.node_namespace.rstrip("/")}/{info.node_name}'
             for info in self.get_publishers_info_by_topic(self.crank_topic)
+            if info.node_name != _NOT_YET_KNOWN
         ]
 
 

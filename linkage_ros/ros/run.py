@@ -128,26 +128,31 @@ def _spin(
     # The executor waits without a timeout, which no signal would end. So it has a thread of its
     # own, and polls for nothing: each of its rounds costs as much as five ticks.
     ended = Event()
-    serving = Thread(target=_serve, args=(executor, ended), name='executor', daemon=True)
+    serving = Thread(target=_serve, args=(node, executor, ended), name='executor', daemon=True)
     serving.start()
     while not stop.wait(_LOOK) and monotonic() < deadline and serving.is_alive():
         if view is not None:
             view.show(node)
         if node.loop is not None and node.loop.failure:
             break
+    served = serving.is_alive()
     ended.set()
     executor.shutdown()
     serving.join()
     if view is not None:
         view.close()
     node.end()
-    return EXIT_OK
+    return EXIT_OK if served else EXIT_INCOMPLETE
 
 
-def _serve(executor: SingleThreadedExecutor, ended: Event) -> None:
-    while not ended.is_set():
-        with suppress(ShutdownException):
-            executor.spin_once()
+def _serve(node: LinkageNode, executor: SingleThreadedExecutor, ended: Event) -> None:
+    # As the tick: a defect here must neither vanish with its thread nor show a traceback.
+    try:
+        while not ended.is_set():
+            with suppress(ShutdownException):
+                executor.spin_once()
+    except Exception as error:  # noqa: BLE001 (see above)
+        node.get_logger().error(f'the executor has stopped: {type(error).__name__}: {error}')
 
 
 def _first_line(error: Exception) -> str:

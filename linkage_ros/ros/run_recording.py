@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from datetime import datetime
 import json
+from os.path import exists
 from pathlib import Path
 import platform
 
@@ -127,7 +128,7 @@ def _folder(directory: Path, name: str, scene: str) -> Path:
         return directory / name
     dated = f'{scene}_{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}'
     folder, number = directory / dated, 1
-    while folder.exists():
+    while exists(folder):  # noqa: PTH110 (Path's raises where it may not look)
         number += 1
         folder = directory / f'{dated}_{number}'
     return folder

@@ -100,6 +100,7 @@ class TickLoop:
         self._publish = publish
         self._own = own
         self._last_time = 0
+        self._newest_stamp = 0
         self._pipeline = build()
         self._stopping = Event()
         self.closure = self._pipeline.closure
@@ -137,13 +138,15 @@ class TickLoop:
             return False
         counts = self.counts
         counts.received += 1
-        if self.recorder is not None:
-            self.recorder.offer(CRANK, now, info['source_timestamp'], message)
+        if (recorder := self.recorder) is not None:  # another thread takes it away
+            recorder.offer(CRANK, now, info['source_timestamp'], message)
         rejection = self._pipeline.offer(message, now)
         if rejection is not None:
             counts.rejected[rejection] += 1
             return False
-        counts.sample_at = monotonic_ns()
+        if self._pipeline.newest_stamp != self._newest_stamp:
+            self._newest_stamp = self._pipeline.newest_stamp
+            counts.sample_at = monotonic_ns()
         return True
 
     def tick_at(self, now: int) -> None:
@@ -181,8 +184,8 @@ class TickLoop:
         position, _, message = tick
         if message:
             self._publish(message)
-            if self.recorder is not None:
-                self.recorder.offer(JOINT_STATES, now, at, message)
+            if (recorder := self.recorder) is not None:
+                recorder.offer(JOINT_STATES, now, at, message)
             counts.published += 1
         counts.ticks += 1
         if position is None:

@@ -212,3 +212,17 @@ def test_lengths_that_cancel_but_for_their_last_digit_are_a_change_point() -> No
     assert RRRDyad(0.4, 0.2, 0.5, 0.1, 1).fold_margin == 0.0
     # Lengths that differ by more than rounding are what they are.
     assert RRRDyad(0.4, 0.2, nextafter(0.5, 1.0) + 1e-14, 0.1, 1).fold_margin != 0.0
+
+
+@pytest.mark.parametrize('b', [0.2, 1.0, 1.3, 7.0])
+@pytest.mark.parametrize('phi', [1e-9, -1e-9, 1e-15, 1e-16, 1e-20, -1e-100, 1e-200])
+@pytest.mark.parametrize('sign', [1, -1])
+def test_where_the_crank_pin_meets_the_ground_pivot_rates_stay_right(
+    b: float, phi: float, sign: int
+) -> None:
+    # a = d and b = c: the diagonal vanishes, and the triangle on it stands ever more upright. By
+    # hand, for a = d = 1 and φ → 0: θ3' = (1 ∓ 1/b)/2 and θ4' = (1 ± 1/b)/2, σ = ±1.
+    dyad = RRRDyad(1.0, b, b, 1.0, sign)
+    rates = dyad.rates(phi, dyad.close(phi), 1.0)
+    limits = (0.5 * (1.0 - sign / b), 0.5 * (1.0 + sign / b))
+    assert rates == pytest.approx(limits, rel=1e-15, abs=4e-16)

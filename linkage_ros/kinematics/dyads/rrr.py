@@ -51,7 +51,11 @@ taken along the diagonal and across it (p and q, as in `rpr`)::
     ω4 = −ω2·(OA × AB)/(AB × DB) = −ω2·(p − q·cot(σ·β))
     p = OA·AD/s² = a·((d − a)/s² − 2d·(sin(φ/2)/s)²)
     q = 2ad·sin(φ/2)·cos(φ/2)/s²
-    cot(σ·β) = (P·Fc − Fb·Fs)/(4·AB × DB)       cot(σ·γ') = (Fc·Fs − P·Fb)/(4·AB × DB)
+    cot(σ·β)  = (P·Fc − Fb·Fs)/(4·AB × DB) = (b² − c² + s²)/(2·AB × DB)
+    cot(σ·γ') = (Fc·Fs − P·Fb)/(4·AB × DB) = (b² − c² − s²)/(2·AB × DB)
+
+The first form is good for needles, where b or c is small. Where s is small, as where A meets D,
+the products of the first are nearly equal, and the second is taken.
 
 OA × DB = a·c·sin(θ4 − φ) says the same, but where crank and rocker are nearly parallel it takes
 the difference of two angles that were rounded at the size of a half-turn: 6,500 u·κ was measured.
@@ -174,13 +178,17 @@ class RRRDyad:
 
     def rates(self, _phi: float, pose: RRRPose, crank_rate: float) -> tuple[float, float]:
         """Return ω3 and ω4, in [rad/s], of a closed pose at the crank rate ω2, in [rad/s]."""
-        a, _, _, d = self.sides
+        a, b, c, d = self.sides
         s, _, _, _, half_sine, half_cosine = pose.diagonal
         beta_y, beta_x, gamma_y, gamma_x = pose.halves
         half_sine /= s
         p = a * ((d - a) / s / s - 2.0 * d * half_sine * half_sine)
         q = 2.0 * a * d * half_sine * (half_cosine / s)
-        area = 4.0 * pose.cross
-        cot_gamma = (gamma_x * gamma_x - gamma_y * gamma_y) / area
-        cot_beta = (beta_x * beta_x - beta_y * beta_y) / area
+        if s < min(b, c):
+            square, difference = s * (s / pose.cross), (b - c) * ((b + c) / pose.cross)
+            cot_beta, cot_gamma = 0.5 * (difference + square), 0.5 * (difference - square)
+        else:
+            area = 4.0 * pose.cross
+            cot_beta = (beta_x * beta_x - beta_y * beta_y) / area
+            cot_gamma = (gamma_x * gamma_x - gamma_y * gamma_y) / area
         return -crank_rate * (p - q * cot_gamma), -crank_rate * (p - q * cot_beta)

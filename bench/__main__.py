@@ -1,0 +1,117 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``python -m bench``: measure, print the tables beside their targets, and keep them in a file."""
+
+from __future__ import annotations
+
+import argparse
+from datetime import datetime
+import os
+from pathlib import Path
+import sys
+from tempfile import TemporaryDirectory
+import time
+
+from bench.latency import LatencyPlan, measure_latency
+from bench.machine import describe_machine
+from bench.processes import BenchError, Graph
+from bench.report import say, show, Table
+from bench.tick_tables import cost_table, lateness_table
+from bench.ticks import bare, idiomatic, measure_ticks, ours, TickPlan
+
+SLOW, FAST = 1000.0, 10_000.0
+
+_TICKS = TickPlan(rounds=5, warm_up=0.7, window=1.7)
+_TICKS_QUICK = TickPlan(rounds=1, warm_up=0.2, window=0.6)
+_LATENCY = LatencyPlan(rate=1000.0, size=500, parts=12)
+_LATENCY_QUICK = LatencyPlan(rate=1000.0, size=200, parts=3)
+
+
+def main() -> int:
+    """Measure what the command line asks for and return the exit code."""
+    parser = argparse.ArgumentParser('python -m bench', description=__doc__)
+    parser.add_argument('--quick', action='store_true', help='less than half a minute, rougher')
+    parser.add_argument('--only', choices='abc', help='only one of the comparisons')
+    parser.add_argument(
+        '--runs', type=Path, default=Path('runs'), help='where the tables are kept'
+    )
+    arguments = parser.parse_args()
+    wanted = arguments.only or 'abc'
+    started = time.monotonic()
+    begin = datetime.now().astimezone()
+    tables = [Table('machine', ('', ''), [*describe_machine(), ('begun', f'{begin:%F %T}')])]
+    try:
+        with TemporaryDirectory(prefix='linkage_ros_bench_') as name:
+            folder = Path(name)
+            # Below 102, so that the ports stay below those which the kernel hands out.
+            graph = Graph(2 + os.getpid() % 100, folder)
+            if 'c' in wanted:
+                plan = _LATENCY_QUICK if arguments.quick else _LATENCY
+                tables.append(measure_latency(graph, folder, plan))
+            if wanted != 'c':
+                tables += _ticks(graph, folder, wanted, arguments.quick)
+    except BenchError as error:
+        print(f'bench: {error}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        say('stopped')
+        return 130
+    for table in tables:
+        show(table)
+    arguments.runs.mkdir(parents=True, exist_ok=True)
+    file = arguments.runs / f'bench_{begin:%Y-%m-%d_%H-%M-%S}.md'
+    file.write_text('\n'.join(table.markdown() for table in tables), encoding='utf-8')
+    say(f'{time.monotonic() - started:.0f} s; kept in {file}')
+    return 0
+
+
+def _ticks(graph: Graph, folder: Path, wanted: str, quick: bool) -> list[Table]:
+    slow, fast = ours(folder, SLOW), ours(folder, FAST)
+    slow_idiomatic, fast_idiomatic = idiomatic(folder, SLOW), idiomatic(folder, FAST)
+    slow_bare, fast_bare = bare(SLOW), bare(FAST)
+    slow_recording, fast_recording = ours(folder, SLOW, True), ours(folder, FAST, True)
+    # Those that are compared stand next to each other.
+    contenders = [
+        *([slow_idiomatic] if 'a' in wanted else []),
+        slow,
+        *([slow_bare, fast_bare] if 'b' in wanted else []),
+        fast,
+        *([fast_idiomatic] if 'a' in wanted else []),
+        *([slow_recording, fast_recording] if wanted == 'abc' else []),
+    ]
+    say(f'CPU of a tick: {", ".join(f"{c.name} {c.rate:g} Hz" for c in contenders)}')
+    found = measure_ticks(graph, contenders, _TICKS_QUICK if quick else _TICKS)
+    tables = []
+    if 'a' in wanted:
+        title = '(a) CPU of a tick against the idiomatic node'
+        tables += [
+            cost_table(f'{title}, 1 kHz', slow, slow_idiomatic, '≤ 0.25', found),
+            cost_table(
+                f'{title}, 10 kHz wanted', fast, fast_idiomatic, '≤ 0.25 where reached', found
+            ),
+        ]
+    if 'b' in wanted:
+        title = '(b) CPU of a tick against the bare loop'
+        tables += [
+            cost_table(f'{title}, 1 kHz', slow, slow_bare, '≤ 1.25', found),
+            cost_table(f'{title}, 10 kHz', fast, fast_bare, '≤ 1.25', found),
+        ]
+    late = [c for c in (slow, fast, slow_recording, fast_recording) if c in found]
+    return [*tables, lateness_table(late, found)]
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,74 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Listens to ``joint_states`` and ``/diagnostics`` and says on request what it has heard.
+
+For every line on its standard input it answers a line of JSON: the steady time, the number that
+the publisher gave its last message (so that none is missed by counting), how many arrived, and
+the last diagnostics; where the line is ``forget``, it forgets those first. It polls, so that its
+own wake-ups take little of the processor.
+"""
+
+from __future__ import annotations
+
+import json
+import select
+import sys
+from time import monotonic_ns
+from typing import Any
+
+from bench.raw_node import keep_last, node, subscription, taker
+from diagnostic_msgs.msg import DiagnosticArray
+from linkage_ros.stop import stop_on_signals
+
+_POLL = 0.005
+_DEPTH = 2000
+
+
+def main() -> None:
+    """Listen until a signal or the end of the input."""
+    stop = stop_on_signals()
+    with node('listener') as listener:
+        take = taker(subscription(listener, 'joint_states', keep_last(_DEPTH)))
+        diagnostics = listener.create_subscription(
+            DiagnosticArray, '/diagnostics', lambda _: None, keep_last(10)
+        )
+        published = received = 0
+        health: dict[str, str] = {}
+        while not stop.is_set():
+            asked = bool(select.select([sys.stdin], [], [], _POLL)[0])
+            while (taken := take()) is not None:
+                published = taken[1]['publication_sequence_number']
+                received += 1
+            now = monotonic_ns()
+            while (heard := diagnostics.handle.take_message(DiagnosticArray, False)) is not None:
+                health = _values(heard[0])
+            if asked:
+                question = sys.stdin.readline().strip()
+                if not question:
+                    break
+                if question == 'forget':
+                    health = {}
+                answer = {'time': now, 'published': published, 'received': received}
+                print(json.dumps({**answer, 'health': health}), flush=True)
+
+
+def _values(message: DiagnosticArray) -> dict[str, Any]:
+    return {v.key: v.value for status in message.status for v in status.values}
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,49 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The scenes that are measured: a four-bar with rates, at any rate, recorded or not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bench.processes import ROOT
+
+
+def write_scene(folder: Path, rate: float, record: bool = False) -> Path:
+    """
+    Write a scene and return its file.
+
+    Parameters
+    ----------
+    folder
+        Where to; a bag goes there too.
+    rate
+        Ticks a second; 0 for one for every sample.
+    record
+        Whether it is recorded.
+
+    """
+    file = folder / f'four_bar_{rate:g}{"_recorded" if record else ""}.yaml'
+    lines = [
+        f'linkage: {ROOT / "config" / "linkages" / "four_bar.yaml"}',
+        f'rate: {rate:g}',
+        'drive: {topic: {carry_forward: true, max_age: 0.2}}',
+        'effects: {velocity: {}}',
+    ]
+    if record:
+        lines.append(f'record: {{directory: {folder / "bags"}}}')
+    file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    return file

@@ -1,0 +1,96 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The benchmark runs and prints finite ratios; nothing that is timed is asserted."""
+
+from __future__ import annotations
+
+from math import isfinite
+from pathlib import Path
+import re
+import subprocess
+import sys
+
+from bench.report import Table
+from bench.spread import percentile, ratios, spread
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_percentiles_lie_between_neighbours():
+    assert percentile([4.0, 1.0, 3.0, 2.0], 50.0) == 2.5
+    assert percentile([1.0, 2.0], 100.0) == 2.0
+    assert not isfinite(percentile([], 50.0))
+    assert spread([1.0]) == '1.0'
+    assert spread([1.0, 2.0, 3.0], 0) == '2 (2–2)'
+
+
+def test_ratios_are_taken_turn_by_turn():
+    assert ratios([2.0, 30.0], [1.0, 10.0]) == [2.0, 3.0]
+
+
+def test_table_is_the_same_as_text_and_as_markdown():
+    table = Table('t', ('', 'µs'), [('a', '1.0')])
+    assert table.plain() == 't\n   µs\n------\na  1.0\n'
+    assert table.markdown() == '## t\n\n|  | µs |\n| --- | ---: |\n| a | 1.0 |\n'
+
+
+@pytest.mark.ros
+@pytest.mark.timeout(90)
+def test_latency_is_measured_against_the_relay(tmp_path):
+    kept = _bench(tmp_path, '--only', 'c')
+    cells = _row(kept, 'linkage_node')
+    assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))
+    (ratio, *_) = _numbers([cells[5]])
+    assert isfinite(ratio)
+    assert ratio > 0.0
+    assert '≤ 1.25' in cells[6]
+
+
+@pytest.mark.ros
+@pytest.mark.timeout(90)
+def test_ticks_are_measured_against_the_bare_loop(tmp_path):
+    kept = _bench(tmp_path, '--only', 'b')
+    cells = _row(kept, 'linkage_node')
+    assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))
+    assert 'lateness' in kept
+    assert 'bare loop' in kept
+
+
+def _bench(runs: Path, *arguments: str) -> str:
+    """Run it and return the tables that it keeps."""
+    done = subprocess.run(
+        [sys.executable, '-m', 'bench', '--quick', '--runs', str(runs), *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=80,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert 'machine' in done.stdout
+    (file,) = runs.iterdir()
+    return file.read_text(encoding='utf-8')
+
+
+def _row(text: str, name: str) -> list[str]:
+    line = next(line for line in text.splitlines() if line.startswith(f'| {name} |'))
+    return [cell.strip() for cell in line.strip('|').split('|')]
+
+
+def _numbers(cells: list[str]) -> list[float]:
+    """Return the first number of each cell."""
+    return [float(re.match(r'[\d.]+', cell).group()) for cell in cells]

@@ -1,0 +1,223 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The crank from a topic, as timelines.
+
+Each line of a timeline is a time in ms and what happens then: a sample is offered, with its stamp
+in ms, angle and rate, and what becomes of it; or the state is asked for, and what it is.
+"""
+
+from __future__ import annotations
+
+from math import inf, nan
+
+from hypothesis import given
+from hypothesis import strategies as st
+from linkage_ros.drives.topic import CrankState, TopicDrive, TopicParameters
+from linkage_ros.joint_state import CrankSample, Rejection
+import pytest
+
+MS = 1_000_000
+SECOND = 1000 * MS
+NOW = 10 * SECOND
+
+CARRIED = TopicParameters(carry_forward=True, max_age=200 * MS, max_lead=100 * MS)
+HELD = TopicParameters(carry_forward=False, max_age=200 * MS, max_lead=100 * MS)
+
+SILENT = None
+GOOD = None
+
+
+def sample(stamp, angle, rate=0.0):
+    return CrankSample(stamp * MS, angle, rate)
+
+
+# Name: (parameters, [(time, sample or None, its rejection or (angle, rate, age in ms) or None)]).
+TIMELINES = {
+    'before the first sample there is no crank': (
+        CARRIED,
+        [(1000, None, SILENT), (5000, None, SILENT)],
+    ),
+    'carried forward by its rate': (
+        CARRIED,
+        [
+            (1000, sample(1000, 0.5, 2.0), GOOD),
+            (1000, None, (0.5, 2.0, 0)),
+            (1100, None, (0.7, 2.0, 100)),
+            (1200, None, (0.9, 2.0, 200)),
+        ],
+    ),
+    'held as measured': (
+        HELD,
+        [
+            (1000, sample(1000, 0.5, 2.0), GOOD),
+            (1100, None, (0.5, 2.0, 100)),
+            (1200, None, (0.5, 2.0, 200)),
+        ],
+    ),
+    'silent from the age limit on, until the next sample': (
+        CARRIED,
+        [
+            (1000, sample(1000, 0.5, 2.0), GOOD),
+            (1200, None, (0.9, 2.0, 200)),
+            (1201, None, SILENT),
+            (9000, None, SILENT),
+            (9001, sample(9001, 3.0), GOOD),
+            (9001, None, (3.0, 0.0, 0)),
+        ],
+    ),
+    'it is the stamp that ages, not the arrival': (
+        CARRIED,
+        [
+            (1150, sample(1000, 0.5, 2.0), GOOD),
+            (1150, None, (0.8, 2.0, 150)),
+            (1201, None, SILENT),
+        ],
+    ),
+    'a sample that comes too late is no crank': (
+        CARRIED,
+        [(2000, sample(1000, 0.5, 2.0), GOOD), (2000, None, SILENT)],
+    ),
+    'a repeat does not make it younger': (
+        HELD,
+        [
+            (1000, sample(1000, 0.5), GOOD),
+            (1150, sample(1000, 0.5), GOOD),
+            (1150, None, (0.5, 0.0, 150)),
+            (1250, sample(1000, 0.5), GOOD),
+            (1250, None, SILENT),
+        ],
+    ),
+    'a stamp a little ahead is carried back': (
+        CARRIED,
+        [(1000, sample(1100, 0.5, 2.0), GOOD), (1000, None, (0.3, 2.0, -100))],
+    ),
+    'a stamp further ahead is refused': (
+        CARRIED,
+        [
+            (1000, sample(1000, 0.5), GOOD),
+            (1010, sample(1111, 0.9), Rejection.STAMP_FUTURE),
+            (1010, None, (0.5, 0.0, 10)),
+            (1011, sample(1111, 0.9), GOOD),
+        ],
+    ),
+    'an older stamp is refused': (
+        CARRIED,
+        [
+            (1000, sample(1000, 0.5), GOOD),
+            (1010, sample(999, 0.9), Rejection.STAMP_OLD),
+            (1010, None, (0.5, 0.0, 10)),
+            (1020, sample(1005, 0.6), GOOD),
+            (1020, None, (0.6, 0.0, 15)),
+        ],
+    ),
+    'of several samples between two ticks the newest counts': (
+        CARRIED,
+        [
+            (1000, sample(998, 0.1), GOOD),
+            (1000, sample(999, 0.2), GOOD),
+            (1000, sample(1000, 0.3), GOOD),
+            (1000, None, (0.3, 0.0, 0)),
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize('name', TIMELINES)
+def test_timeline(name):
+    parameters, steps = TIMELINES[name]
+    drive = TopicDrive(parameters, needs_rate=False)
+    for time, offered, expected in steps:
+        if offered is not None:
+            assert drive.offer(offered, time * MS) is expected
+        elif expected is SILENT:
+            assert drive.state(time * MS) is None
+        else:
+            angle, rate, age = expected
+            assert drive.state(time * MS) == (pytest.approx(angle, abs=1e-12), rate, age * MS)
+
+
+@pytest.mark.parametrize(
+    ('bad', 'reason'),
+    [
+        (CrankSample(NOW, nan, 0.0), Rejection.NOT_FINITE),
+        (CrankSample(NOW, inf, 0.0), Rejection.NOT_FINITE),
+        (CrankSample(NOW, 0.0, nan), Rejection.NOT_FINITE),
+        (CrankSample(NOW, 0.0, -inf), Rejection.NOT_FINITE),
+        (CrankSample(NOW, 1.0000001e10, 0.0), Rejection.TOO_LARGE),
+        (CrankSample(NOW, -1e300, 0.0), Rejection.TOO_LARGE),
+        (CrankSample(NOW, 0.0, 1.0000001e10), Rejection.TOO_LARGE),
+        (CrankSample(0, 0.0, 0.0), Rejection.STAMP_ZERO),
+        (CrankSample(NOW + 101 * MS, 0.0, 0.0), Rejection.STAMP_FUTURE),
+        (CrankSample(2**31 * SECOND, 0.0, 0.0), Rejection.STAMP_FUTURE),
+        (CrankSample(NOW - 11 * MS, 0.0, 0.0), Rejection.STAMP_OLD),
+        (CrankSample(1, 0.0, 0.0), Rejection.STAMP_OLD),
+    ],
+)
+def test_a_bad_sample_changes_nothing(bad, reason):
+    drive = TopicDrive(CARRIED, needs_rate=True)
+    assert drive.offer(CrankSample(NOW - 10 * MS, 0.5, 2.0), NOW) is GOOD
+    before = drive.state(NOW)
+    assert drive.offer(bad, NOW) is reason
+    assert drive.state(NOW) == before
+    assert drive.stamp == NOW - 10 * MS
+    assert drive.offer(CrankSample(NOW, 0.6, 2.0), NOW) is GOOD
+    assert drive.state(NOW) == CrankState(0.6, 2.0, 0)
+
+
+@pytest.mark.parametrize('angle', [1e10, -1e10])
+def test_the_largest_numbers_are_good(angle):
+    drive = TopicDrive(CARRIED, needs_rate=True)
+    assert drive.offer(CrankSample(NOW, angle, angle), NOW) is GOOD
+    assert drive.state(NOW) == CrankState(angle, angle, 0)
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'needs_rate', 'good'),
+    [(CARRIED, False, False), (CARRIED, True, False), (HELD, True, False), (HELD, False, True)],
+)
+def test_without_a_rate(parameters, needs_rate, good):
+    drive = TopicDrive(parameters, needs_rate)
+    rejection = drive.offer(CrankSample(NOW, 0.5, None), NOW)
+    if good:
+        assert rejection is GOOD
+        assert drive.state(NOW) == CrankState(0.5, 0.0, 0)
+    else:
+        assert rejection is Rejection.NO_RATE
+        assert drive.state(NOW) is None
+
+
+samples = st.builds(
+    CrankSample,
+    st.integers(0, 2 * NOW) | st.sampled_from([0, NOW, NOW + 100 * MS]),
+    st.floats() | st.floats(-10, 10),
+    st.none() | st.floats() | st.floats(-10, 10),
+)
+
+
+@given(st.lists(samples, max_size=20))
+def test_whatever_is_offered_the_state_is_that_of_the_last_good_sample(offered):
+    drive = TopicDrive(HELD, needs_rate=True)
+    good = None
+    for each in offered:
+        if drive.offer(each, NOW) is GOOD:
+            assert good is None or each.stamp >= good.stamp
+            good = each
+    state = drive.state(NOW)
+    if good is None or NOW - good.stamp > HELD.max_age:
+        assert state is None
+    else:
+        assert state == CrankState(good.angle, good.rate, NOW - good.stamp)

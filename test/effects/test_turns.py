@@ -1,0 +1,115 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Angles that run on beyond a turn, and angles wrapped to (−π, π]."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import nextafter, pi, tau
+
+from hypothesis import given
+from hypothesis import strategies as st
+from linkage_ros.effects.stage import Motion
+from linkage_ros.effects.turns import Continuous, Wrapped, wrapped
+import pytest
+
+EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')
+
+steps = st.floats(-3.0, 3.0)
+
+
+def motion(*joints):
+    return Motion(None, None, joints, ())
+
+
+@given(st.lists(steps, min_size=1, max_size=60), st.floats(-pi, pi))
+def test_continuous_follows_from_any_turns(moves, start):
+    # What the loop knows of an angle is the angle up to turns.
+    stage = Continuous([True])
+    angle = wrapped(start)
+    assert stage(motion(angle)).joints == (angle,)
+    for move in moves:
+        angle += move
+        assert stage(motion(wrapped(angle))).joints[0] == pytest.approx(angle, abs=1e-12)
+
+
+@given(st.floats(-1e6, 1e6))
+def test_the_first_angle_is_wrapped(angle):
+    (first,) = Continuous([True])(motion(angle)).joints
+    assert -pi < first <= pi
+    assert first == wrapped(angle)
+
+
+@given(st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=20))
+def test_a_step_is_never_more_than_half_a_turn(angles):
+    stage = Continuous([True])
+    last = None
+    for angle in angles:
+        (now,) = stage(motion(angle)).joints
+        assert abs((now - angle) / tau - round((now - angle) / tau)) < 1e-12
+        assert last is None or abs(now - last) <= pi + 1e-12
+        last = now
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=20))
+def test_slides_are_left_alone(lengths):
+    for stage in (Continuous([False, True]), Wrapped([False, True])):
+        for length in lengths:
+            assert stage(motion(length, length)).joints[0] == length
+
+
+@given(st.floats(-1e9, 1e9))
+def test_wrapped_is_exact(angle):
+    rest = wrapped(angle)
+    assert -pi < rest <= pi
+    turns = round((Fraction(angle) - Fraction(rest)) / Fraction(tau))
+    assert Fraction(angle) - turns * Fraction(tau) == Fraction(rest) or rest == pi
+
+
+@pytest.mark.parametrize(
+    ('angle', 'rest'),
+    [
+        (0.0, 0.0),
+        (pi, pi),
+        (-pi, pi),
+        (nextafter(pi, 4), nextafter(-pi, 0)),
+        (nextafter(-pi, -4), nextafter(pi, 0)),
+        (tau, 0.0),
+        (3 * pi, pi),
+        (-3 * pi, pi),
+        (4.0, 4.0 - tau),
+    ],
+)
+def test_wrapped_at_the_edge(angle, rest):
+    assert wrapped(angle) == pytest.approx(rest, abs=1e-15)
+    assert -pi < wrapped(angle) <= pi
+    (now,) = Wrapped([True])(motion(angle)).joints
+    assert now == wrapped(angle)
+
+
+def test_many_turns_add_up_without_drift():
+    stage = Continuous([True])
+    for step in range(100_001):
+        (now,) = stage(motion(wrapped(step * 1.0))).joints
+    # The last is exact up to the rounding of tau, 2.4e-16, for each of 15915 turns.
+    assert abs(now - 100_000.0) < 1e-11
+
+
+def test_the_rest_of_the_motion_is_passed_on():
+    crank, position, rates = object(), object(), (1.0, 2.0)
+    for stage in (Continuous([True, False]), Wrapped([True, False])):
+        after = stage(Motion(crank, position, (0.5, 0.5), rates))
+        assert after == (crank, position, (0.5, 0.5), rates)

@@ -1,0 +1,100 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Velocity: the slope of the position, none at a toggle, and nothing in a scene without it."""
+
+from __future__ import annotations
+
+from math import isfinite, remainder, tau
+
+from hypothesis import given
+from hypothesis import strategies as st
+from linkage_ros.drives.topic import CrankState
+from linkage_ros.effects import velocity
+from linkage_ros.effects.stage import EFFECTS, Motion
+from linkage_ros.errors import FileError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.status import Status
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import parse_yaml
+import pytest
+
+
+def closure(text):
+    return Closure(read_linkage(parse_yaml(text.encode(), 'linkage.yaml')))
+
+
+FOUR_BAR = closure('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
+SLIDER = closure('inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}')
+STRETCHED_AT_0 = closure('four_bar: {a: 1, b: 1, c: 1, d: 3}')
+EVERY_OTHER = closure('four_bar: {a: 1, b: 1, c: 1, d: 2}')
+
+
+def moved(loop, angle, rate):
+    """Return the motion that leaves the stage."""
+    position = loop.position(angle)
+    motion = Motion(CrankState(angle, rate, 0), position, position.joints, ())
+    return velocity.build(velocity.VelocityParameters(), loop)(motion)
+
+
+@given(st.floats(-10.0, 10.0), st.floats(-100.0, 100.0))
+@pytest.mark.parametrize('loop', [FOUR_BAR, SLIDER], ids=['four-bar', 'slider-crank'])
+def test_it_is_the_slope_of_the_position(loop, angle, rate):
+    step = 1e-5
+    slopes = [
+        remainder(after - before, tau) / (2 * step)
+        for after, before in zip(
+            loop.position(angle + step).joints, loop.position(angle - step).joints, strict=True
+        )
+    ]
+    expected = [slope * rate for slope in slopes]
+    assert list(moved(loop, angle, rate).rates) == pytest.approx(expected, abs=1e-6 * abs(rate))
+
+
+@given(st.floats(-10.0, 10.0))
+def test_a_crank_at_rest_has_joints_at_rest(angle):
+    assert all(rate == 0.0 for rate in moved(FOUR_BAR, angle, 0.0).rates)
+
+
+def test_at_a_toggle_there_is_none():
+    motion = moved(STRETCHED_AT_0, 0.0, 1.0)
+    assert motion.position.status is Status.TOGGLE
+    assert len(motion.joints) == 2
+    assert motion.rates == ()
+
+
+@given(st.floats(-17.0, -1.0))
+def test_next_to_a_toggle_rates_are_finite_or_none(exponent):
+    limit = EVERY_OTHER.crank_ranges[0].highest
+    angle = limit - 10.0**exponent
+    if EVERY_OTHER.position(angle).joints:
+        assert all(map(isfinite, moved(EVERY_OTHER, angle, 1e10).rates))
+
+
+def test_the_rest_of_the_motion_is_passed_on():
+    position = FOUR_BAR.position(1.0)
+    motion = moved(FOUR_BAR, 1.0, 2.0)
+    assert motion[:3] == (CrankState(1.0, 2.0, 0), position, position.joints)
+
+
+def test_it_has_no_parameters():
+    assert velocity.read(parse_yaml(b'{}', 'scene.yaml')) == velocity.VelocityParameters()
+    with pytest.raises(FileError, match='gain: unknown key; leave it out'):
+        velocity.read(parse_yaml(b'gain: 2', 'scene.yaml'))
+
+
+def test_it_is_registered():
+    assert EFFECTS['velocity'] == velocity.__name__
+    assert velocity.NEEDS_CRANK_RATE

@@ -1,0 +1,237 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The life of a node: transitions, bags of a cycle, services and parameters."""
+
+import time
+
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+import pytest
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import DescribeParameters, SetParameters
+from rosbags.highlevel import AnyReader
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from .graph import crank, wait_for
+
+NODE = '/linkage_node'
+BY_HAND = '-p', 'autostart:=false'
+
+
+@pytest.fixture
+def change(graph):
+    """Return a function that asks for a transition and tells whether it succeeded."""
+
+    def change(transition):
+        request = ChangeState.Request()
+        request.transition.id = transition
+        return graph.call(ChangeState, f'{NODE}/change_state', request).success
+
+    return change
+
+
+@pytest.fixture
+def state(graph):
+    return lambda: graph.call(GetState, f'{NODE}/get_state').current_state.id
+
+
+@pytest.fixture
+def trigger(graph):
+    """Return a function that calls one of the node's services, and gives success and message."""
+
+    def trigger(service):
+        answer = graph.call(Trigger, f'{NODE}/{service}')
+        return answer.success, answer.message
+
+    return trigger
+
+
+@pytest.fixture
+def turn(graph):
+    """Return a function that publishes the crank for a time, or until it is heard of."""
+    publisher = graph.publisher(JointState, '/crank_states')
+    heard = graph.listen(JointState, '/joint_states')
+
+    def turn(seconds=None, angle=0.5):
+        heard.clear()
+        begin = time.monotonic()
+
+        def go_on():
+            publisher.publish(crank(angle))
+            time.sleep(0.01)
+            return len(heard) > 20 if seconds is None else time.monotonic() > begin + seconds
+
+        wait_for(go_on, 'joint states')
+        return heard
+
+    return turn
+
+
+def counts(bag):
+    """Return how many messages of a topic rosbags finds in a bag."""
+    with AnyReader([bag]) as reader:
+        for connection, _, data in reader.messages():
+            reader.deserialize(data, connection.msgtype)
+        return {topic: info.msgcount for topic, info in reader.topics.items()}
+
+
+def test_a_managed_life_with_two_bags(write_scene, start, folder, change, state, turn):
+    runs = folder / 'two_bags'
+    scene = write_scene('managed', f'rate: 100\nrecord: {{directory: {runs}}}')
+    node = start(scene, *BY_HAND, ready='')
+    assert state() == State.PRIMARY_STATE_UNCONFIGURED
+    assert not turn(0.2)
+    assert change(Transition.TRANSITION_CONFIGURE)
+    assert state() == State.PRIMARY_STATE_INACTIVE
+    assert not turn(0.2)
+    assert not runs.exists()
+    for _ in range(2):
+        assert change(Transition.TRANSITION_ACTIVATE)
+        assert state() == State.PRIMARY_STATE_ACTIVE
+        assert turn()
+        assert change(Transition.TRANSITION_DEACTIVATE)
+        time.sleep(0.1)
+        assert not turn(0.2)
+    assert change(Transition.TRANSITION_CLEANUP)
+    assert change(Transition.TRANSITION_CONFIGURE), 'it may be set up again'
+    assert node.end() == 0
+
+    bags = sorted(runs.iterdir())
+    assert len(bags) == 2
+    for bag in bags:
+        assert set(counts(bag)) == {'/crank_states', '/joint_states', '/diagnostics'}
+        assert min(counts(bag).values()) > 0
+
+
+def test_a_bad_scene_cannot_be_configured(write_scene, start, change, state):
+    node = start(write_scene('bad', 'rtae: 100'), *BY_HAND, ready='')
+    assert not change(Transition.TRANSITION_CONFIGURE)
+    assert state() == State.PRIMARY_STATE_UNCONFIGURED
+    (line,) = [line for line in node.log.splitlines() if 'bad.yaml' in line]
+    assert "bad.yaml:2: rtae: unknown key; did you mean 'rate'?" in line
+    assert node.end() == 0
+    assert 'Traceback' not in node.log
+
+
+def test_what_is_not_possible_is_refused(write_scene, start, change, state, trigger):
+    node = start(write_scene('refused', 'rate: 100'), *BY_HAND, ready='')
+    for transition in ('ACTIVATE', 'DEACTIVATE', 'CLEANUP', 'ACTIVE_SHUTDOWN'):
+        assert not change(getattr(Transition, f'TRANSITION_{transition}'))
+        assert state() == State.PRIMARY_STATE_UNCONFIGURED
+    assert change(Transition.TRANSITION_CONFIGURE)
+    assert not change(Transition.TRANSITION_CONFIGURE)
+    for service in ('reset', 'start_recording', 'stop_recording'):
+        success, message = trigger(service)
+        assert not success
+        assert 'not ' in message
+    assert node.end() == 0
+    assert 'Traceback' not in node.log
+
+
+def test_shutdown_by_service_closes_the_bag(write_scene, start, folder, change, state, turn):
+    runs = folder / 'shut'
+    node = start(write_scene('shut', f'rate: 100\nrecord: {{directory: {runs}}}'))
+    turn()
+    assert change(Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    assert state() == State.PRIMARY_STATE_FINALIZED
+    (bag,) = runs.iterdir()
+    assert counts(bag)['/joint_states'] > 0
+    assert node.end() == 0
+
+
+def test_reset_forgets_turns_and_stamps(graph, write_scene, start, trigger, turn):
+    start(write_scene('reset', 'rate: 100\ndrive: {topic: {max_age: 60, carry_forward: false}}'))
+    # Three turns, a third at a time: the coupler unwinds against the crank.
+    heard = turn(angle=0.0)
+    first = heard[-1].position[0]
+    for third in range(1, 10):
+        heard = turn(angle=third * 2.0943951)
+    assert heard[-1].position[0] - first == pytest.approx(-18.85, abs=0.01)
+
+    success, message = trigger('reset')
+    assert success, message
+    time.sleep(0.2)
+    heard.clear()
+    time.sleep(0.2)
+    assert heard == [], 'the crank is forgotten'
+    assert turn(angle=0.0)[-1].position[0] == pytest.approx(first, abs=1e-6)
+    graph.diagnostics.clear()
+    wait_for(lambda: graph.value('tick', 'Resets') == '1', 'the count of resets')
+
+
+def test_recording_by_service(write_scene, start, folder, trigger, turn):
+    runs = folder / 'asked'
+    node = start(write_scene('asked', 'rate: 100'), '-p', f'runs_directory:={runs}')
+    success, message = trigger('stop_recording')
+    assert not success
+    assert 'not recording' in message
+    bags = []
+    for _ in range(2):
+        success, message = trigger('start_recording')
+        assert success, message
+        assert str(runs) in message
+        success, message = trigger('start_recording')
+        assert not success
+        assert 'already recording' in message
+        turn()
+        success, message = trigger('stop_recording')
+        assert success, message
+        bags = sorted(runs.iterdir())
+        assert str(bags[-1]) in message
+    assert len(bags) == 2
+    assert all(counts(bag)['/joint_states'] > 0 for bag in bags)
+    assert node.end() == 0
+
+
+def parameter(name, **value):
+    kind = {
+        'double_value': ParameterType.PARAMETER_DOUBLE,
+        'string_value': ParameterType.PARAMETER_STRING,
+        'bool_value': ParameterType.PARAMETER_BOOL,
+    }[next(iter(value))]
+    return Parameter(name=name, value=ParameterValue(type=kind, **value))
+
+
+def test_a_refused_parameter_says_why(graph, write_scene, start):
+    node = start(write_scene('parameters', 'rate: 100'))
+
+    def change(changed):
+        request = SetParameters.Request(parameters=[changed])
+        (result,) = graph.call(SetParameters, f'{NODE}/set_parameters', request).results
+        return result.successful, result.reason
+
+    assert change(parameter('warning_period', double_value=2.0)) == (True, '')
+    for refused in (
+        parameter('scene', string_value='other.yaml'),
+        parameter('autostart', bool_value=False),
+        parameter('diagnostics_period', double_value=0.0),
+        parameter('diagnostics_period', double_value=float('nan')),
+        parameter('diagnostics_period', double_value=float('inf')),
+        parameter('warning_period', double_value=-1.0),
+        parameter('warning_period', string_value='often'),
+        parameter('rtae', double_value=1.0),
+    ):
+        successful, reason = change(refused)
+        assert not successful, refused
+        assert len(reason.splitlines()) == 1
+
+    names = ['scene', 'autostart', 'diagnostics_period', 'warning_period', 'runs_directory']
+    request = DescribeParameters.Request(names=names)
+    answer = graph.call(DescribeParameters, f'{NODE}/describe_parameters', request)
+    assert all(descriptor.description for descriptor in answer.descriptors)
+    assert node.end() == 0
+    assert 'Traceback' not in node.log

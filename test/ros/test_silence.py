@@ -1,0 +1,135 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A crank that falls silent, hangs or is doubled: said, and never dressed up as fresh."""
+
+from contextlib import contextmanager
+from threading import Event, Thread
+import time
+
+import pytest
+from sensor_msgs.msg import JointState
+
+from .graph import crank, NS, stamp_of, wait_for
+
+OK, WARN, STALE = b'\0', b'\1', b'\3'
+TICKING = 'rate: 100\ndrive: {topic: {max_age: 0.3}}'
+
+
+@pytest.fixture
+def joint_states(graph):
+    return graph.listen(JointState, '/joint_states')
+
+
+@pytest.fixture
+def publisher(graph):
+    return graph.publisher(JointState, '/crank_states')
+
+
+@contextmanager
+def publishing(publisher, make=lambda: crank(0.5)):
+    """Publish 100 times a second; give the list of what has been published."""
+    published, ending = [], Event()
+
+    def publish():
+        while not ending.wait(0.01):
+            published.append(make())
+            publisher.publish(published[-1])
+
+    thread = Thread(target=publish)
+    thread.start()
+    try:
+        yield published
+    finally:
+        ending.set()
+        thread.join()
+
+
+def wait_until_taken(graph):
+    """Wait until the diagnostics have counted samples."""
+    wait_for(lambda: graph.value('crank', 'Samples received') > '0', 'samples')
+
+
+def test_silence(graph, write_scene, start, publisher, joint_states):
+    node = start(write_scene('silence', TICKING))
+    assert graph.wait_for_level('crank', STALE).message == 'No crank yet'
+    assert joint_states == []
+    with publishing(publisher) as published:
+        wait_for(lambda: joint_states, 'joint states')
+        graph.wait_for_level('crank', OK)
+    last = stamp_of(published[-1])
+    assert 'No crank for' in graph.wait_for_level('crank', STALE).message
+    time.sleep(0.3)
+    assert stamp_of(joint_states[-1]) <= last + 0.3 * NS
+    count = len(joint_states)
+    time.sleep(0.3)
+    assert len(joint_states) == count
+
+    with publishing(publisher):
+        wait_for(lambda: len(joint_states) > count, 'joint states again')
+        graph.wait_for_level('crank', OK)
+    assert node.end() == 0
+
+
+def test_a_publisher_that_hangs_is_silence(graph, write_scene, start, publisher, joint_states):
+    # The same message again and again, as a driver sends it that has lost its sensor.
+    start(write_scene('hangs', TICKING))
+    message = crank(0.5)
+    with publishing(publisher, lambda: message):
+        wait_until_taken(graph)
+        time.sleep(0.5)
+        assert graph.next_status('crank').level == STALE
+    assert all(stamp_of(state) <= stamp_of(message) + 0.3 * NS for state in joint_states)
+
+
+def test_samples_that_come_too_late_are_silence(
+    graph, write_scene, start, publisher, joint_states
+):
+    # As from a machine whose clock lags.
+    start(write_scene('late', TICKING))
+    with publishing(publisher, lambda: crank(0.5, stamp=time.time_ns() - NS)):
+        wait_until_taken(graph)
+        assert graph.next_status('crank').level == STALE
+    assert joint_states == []
+
+
+def test_at_rate_0_a_repeat_keeps_its_stamp_and_is_silence_too(
+    graph, write_scene, start, publisher, joint_states
+):
+    start(write_scene('repeat', 'rate: 0\ndrive: {topic: {max_age: 0.3}}'))
+    with publishing(publisher):
+        graph.wait_for_level('crank', OK)
+    graph.wait_for_level('crank', STALE)
+    message = crank(0.5)
+    joint_states.clear()
+    with publishing(publisher, lambda: message):
+        wait_for(lambda: joint_states, 'a joint state')
+        time.sleep(0.7)
+        assert graph.next_status('crank').level == STALE
+    assert {stamp_of(state) for state in joint_states} == {stamp_of(message)}
+
+
+def test_two_publishers_are_named(graph, write_scene, start, publisher):
+    node = start(write_scene('two', TICKING))
+    graph.publisher(JointState, '/crank_states', node='impostor')
+    with publishing(publisher):
+        status = graph.wait_for_level('crank', WARN)
+    assert '/tester' in status.message
+    assert '/impostor' in status.message
+    (line,) = [line for line in node.log.splitlines() if 'several publishers' in line]
+    assert 'WARN' in line
+    assert '/tester' in line
+    assert '/impostor' in line
+    assert 'stop all but one' in line

@@ -1,0 +1,151 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A scene that cannot be used: one line that says where, what, and what would help.
+
+Linkages follow in `test_bad_linkages`; `test_damaged_files` damages the shipped files at random.
+"""
+
+from __future__ import annotations
+
+import re
+
+from linkage_ros.errors import FileError
+from linkage_ros.scene.load import load_scene
+import pytest
+
+from .files import is_one_line, SCENE
+
+BOMB = b'a: &a [1, 1]\n' + b''.join(
+    b'%c: &%c [%s]\n' % (k, k, b', '.join([b'*%c' % (k - 1)] * 9))
+    for k in range(ord('b'), ord('p'))
+)
+
+# Appended to a good scene; the error's place and reason, and a part of its remedy.
+SCENES = {
+    'unknown key': (b'rtae: 5', ":2: rtae: unknown key; did you mean 'rate'?"),
+    'unlike any key': (b'x: 5', ':2: x: unknown key; known: angles, drive, effects, linkage'),
+    'key twice': (b'rate: 1\nrate: 2', ':3: rate: stands twice (first in line 2); remove one'),
+    'key twice, deep': (
+        b'drive: {topic: {max_age: 1, max_age: 2}}',
+        ':2: max_age: stands twice (first in line 2); remove one',
+    ),
+    'text for a number': (b'rate: fast', ":2: rate: 'fast' is not a number; write a number"),
+    'flag for a number': (b'rate: true', ':2: rate: True is not a number; write a number'),
+    'nothing for a number': (b'rate:', ':2: rate: None is not a number; write a number'),
+    'NaN': (b'rate: .nan', ':2: rate: nan is out of bounds; write a finite number, at least 0'),
+    'infinite': (b'rate: .inf', ':2: rate: inf is out of bounds; write a finite number'),
+    'negative rate': (b'rate: -1', ':2: rate: -1 is out of bounds; write a finite number'),
+    'absurd rate': (b'rate: 1e9', ':2: rate: 1000000000.0 is out of bounds; write a finite'),
+    'hardly a rate': (b'rate: 1e-9', ':2: rate: 1e-09 is out of bounds; write 0.01 to 20000 [Hz]'),
+    'beyond doubles': (b'rate: 1e999', ':2: rate: inf is out of bounds; write a finite number'),
+    '400 digits': (b'rate: ' + b'9' * 400, ':2: rate: inf is out of bounds; write a finite'),
+    '9000 digits': (b'rate: ' + b'9' * 9000, ':2: rate: inf is out of bounds; write a finite'),
+    'YAML 1.1 flag': (
+        b'drive: {topic: {carry_forward: yes}}',
+        ":2: drive.topic.carry_forward: 'yes' is not a flag; write true or false",
+    ),
+    'YAML 1.1 off': (b'rate: off', ":2: rate: 'off' is not a number; write a number"),
+    'YAML 1.1 time': (b'rate: 1:30', ":2: rate: '1:30' is not a number; write a number"),
+    'YAML 1.1 thousands': (b'rate: 1_000', ":2: rate: '1_000' is not a number; write a number"),
+    'YAML 1.1 date': (b'rate: 2026-01-01', ":2: rate: '2026-01-01' is not a number; write"),
+    'merge key': (b'<<: {rate: 1}', ':2: <<: unknown key; known:'),
+    'choice': (b'angles: unwrapped', ":2: angles: 'unwrapped' is none; write continuous or"),
+    'list for a mapping': (
+        b'effects: [velocity]',
+        ":2: effects: ['velocity'] is not a mapping; write effects: {…}",
+    ),
+    'nothing for a mapping': (
+        b'effects: {velocity: }',
+        ':2: effects.velocity: None is not a mapping; write velocity: {…}',
+    ),
+    'unknown effect': (
+        b'effects: {velocty: {}}',
+        ":2: effects.velocty: unknown key; did you mean 'velocity'?",
+    ),
+    'unknown parameter of an effect': (
+        b'effects: {velocity: {gain: 2}}',
+        ':2: effects.velocity.gain: unknown key; leave it out',
+    ),
+    'unknown drive': (b'drive: {tropic: {}}', ':2: drive.tropic: unknown key; did you mean'),
+    'age of zero': (
+        b'drive: {topic: {max_age: 0}}',
+        ':2: drive.topic.max_age: 0 is out of bounds;',
+    ),
+    'bag in a folder': (
+        b'record: {name: a/b}',
+        ":2: record.name: 'a/b' is not a plain name; leave out the folders",
+    ),
+    'bag above': (b'record: {name: ..}', ":2: record.name: '..' is not a plain name; leave out"),
+    'bag name a number': (b'record: {name: 7}', ':2: record.name: 7 is not a text; write a name'),
+    'line break in a name': (
+        b'record: {name: "a\\nb"}',
+        ":2: record.name: 'a\\nb' is not a text; write a name",
+    ),
+    'half a message': (b'record: {queue: 100.5}', ':2: record.queue: 100.5 is no number of'),
+    'tab': (b'drive:\n\ttopic: {}', ':3: is not valid YAML (found character'),
+    'open bracket': (b'effects: {velocity: {}', ':2: is not valid YAML (expected'),
+    'two documents': (b'---\nrate: 1', ':2: is not valid YAML (but found another document);'),
+    'alias loop': (b'rate: &a [*a]', ':2: is not valid YAML (aliases are not read); correct'),
+    'alias bomb': (BOMB + b'rate: *o', ':3: is not valid YAML (aliases are not read); correct'),
+    'Python object': (b'rate: !!python/name:os.system', ':2: is not valid YAML (could not'),
+    'tagged list': (b'rate: !!int [1]', ':2: is not valid YAML (expected a scalar node'),
+    'tagged text': (b'drive: !!map [a, b]', ':2: is not valid YAML (expected a mapping);'),
+    'tag that does not fit': (b'rate: !!int fast', ': is not valid YAML (invalid literal for int'),
+    'deep nesting': (b'rate: ' + b'[' * 3000, ': is nested too deeply; write it flatter'),
+    'NUL': (b'rate: \0', ': is not valid YAML (unacceptable character #x0000'),
+    'NUL in a key': (b'"ra\\0te": 1', ":2: the key 'ra\\x00te' is not a name; write a name"),
+    'half a surrogate': (b'"\\ud800": 1', ":2: the key '\\ud800' is not a name; write a name"),
+    'number as a key': (b'5: 1', ':2: the key 5 is not a name; write a name'),
+    'nothing as a key': (b'~: 1', ':2: the key None is not a name; write a name'),
+    'mapping as a key': (b'? {a: 1}\n: 1', ":2: the key {'a': 1} is not a name; write a name"),
+    'not UTF-8': ('# Schönfließ'.encode('latin-1'), ': is not UTF-8 (byte 27); save it as UTF-8'),
+    'huge': (b'# ' + b'x' * 1_000_000, ': is larger than 1000000 bytes; name a YAML file'),
+}
+
+
+@pytest.mark.parametrize('kind', SCENES)
+def test_bad_scene(build, kind):
+    text, expected = SCENES[kind]
+    with pytest.raises(FileError) as caught:
+        build(SCENE + text)
+    assert is_one_line(caught.value)
+    assert f'scene.yaml{expected}' in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ('named', 'shown'),
+    [
+        (b'nowhere.yaml', 'nowhere.yaml'),
+        (b'.', ''),
+        (b'/dev/full', '/dev/full'),
+        (b'n' * 1000, 'nnn'),
+    ],
+)
+def test_a_linkage_that_is_no_file(build, named, shown):
+    with pytest.raises(FileError) as caught:
+        build(b'rate: 5\nlinkage: ' + named)
+    assert is_one_line(caught.value)
+    assert re.search(rf':2: linkage: .*{shown}.* is not a file; name one', str(caught.value))
+
+
+@pytest.mark.parametrize('name', ['nowhere.yaml', '.', 'n' * 1000, 'nul\0', 'scene.yaml/x'])
+def test_a_scene_that_cannot_be_read(tmp_path, name):
+    (tmp_path / 'scene.yaml').write_bytes(SCENE)
+    with pytest.raises(FileError) as caught:
+        load_scene(f'{tmp_path}/{name}')
+    assert len(str(caught.value).splitlines()) == 1
+    assert 'name a file' in str(caught.value)

@@ -1,0 +1,195 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What scene and linkage files say: the shipped ones, defaults, numbers, shorthands."""
+
+from __future__ import annotations
+
+from math import pi
+
+from linkage_ros.drives.topic import TopicParameters
+from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene, parse_scene
+from linkage_ros.scene.scene import RecordParameters
+import pytest
+
+from .files import CONFIG, FOUR_BAR, SCENE
+
+ANGLES = [-7.0, -pi, -1.0, 0.0, 1e-9, 0.5, 2.0, 3.0, 100.0]
+
+
+@pytest.mark.parametrize('file', sorted((CONFIG / 'scenes').glob('*.yaml')), ids=lambda f: f.stem)
+def test_shipped_scene(file):
+    scene = load_scene(file)
+    assert scene.name == file.stem
+    closure = Pipeline(scene).closure
+    assert all(closure.position(angle).joints for angle in ANGLES)
+
+
+@pytest.mark.parametrize(
+    'file', sorted((CONFIG / 'linkages').glob('*.yaml')), ids=lambda f: f.stem
+)
+def test_shipped_linkage(build, file):
+    _, pipeline = build(SCENE, file.read_bytes())
+    assert all(pipeline.closure.position(angle).joints for angle in ANGLES)
+
+
+def test_a_scene_that_says_nothing(build):
+    scene, _ = build()
+    assert scene.rate == 1000.0
+    assert not scene.wrapped
+    assert scene.drive == TopicParameters(
+        carry_forward=True, max_age=200_000_000, max_lead=100_000_000
+    )
+    assert list(scene.effects) == []
+    assert scene.record is None
+    assert scene.files == {'scene.yaml': SCENE, 'linkage.yaml': FOUR_BAR}
+
+
+def test_a_scene_that_says_all(build):
+    scene, _ = build(
+        SCENE
+        + b"""
+rate: 0
+angles: wrapped
+drive: {topic: {carry_forward: false, max_age: 0.5, max_lead: 0}}
+effects: {velocity: {}}
+record: {directory: bags, name: first, queue: 1000}
+"""
+    )
+    assert scene.rate == 0.0
+    assert scene.wrapped
+    assert scene.drive == TopicParameters(carry_forward=False, max_age=500_000_000, max_lead=0)
+    assert list(scene.effects) == ['velocity']
+    assert scene.record == RecordParameters(directory='bags', name='first', queue=1000)
+
+
+def test_a_record_that_says_nothing(build):
+    scene, _ = build(SCENE + b'record: {}')
+    assert scene.record == RecordParameters(directory='runs', name='', queue=20_000)
+
+
+@pytest.mark.parametrize(
+    ('text', 'value'),
+    [('1e3', 1000.0), ('2E+1', 20.0), ('1e-1', 0.1), ('.5', 0.5), ('7.', 7.0), ('010', 10.0)],
+)
+def test_numbers_are_those_of_yaml_1_2(build, text, value):
+    scene, _ = build(SCENE + f'rate: {text}'.encode())
+    assert scene.rate == value
+
+
+@pytest.mark.parametrize('name', ['yes', 'off', 'NO', '1:30', '1_000', 'gelenk_ä', '関節', "a'b"])
+def test_what_yaml_1_1_would_change_is_a_name(build, name):
+    joint = f'{{parent: ground, child: {name}}}'
+    linkage = (CONFIG / 'linkages' / 'four_bar.yaml').read_text()
+    linkage = linkage.replace('rocker:', f'{name}:')
+    linkage = linkage.replace('{parent: ground, child: rocker}', joint)
+    scene, _ = build(SCENE, linkage.encode())
+    assert name in scene.linkage.links
+
+
+@pytest.mark.parametrize(
+    'rewrite',
+    [
+        lambda data: b'\xef\xbb\xbf' + data,
+        lambda data: data.replace(b'\n', b'\r\n'),
+        lambda data: b'--- # a document\n' + data + b'...\n',
+        lambda data: b'{' + data.replace(b'\n', b' ') + b'}',
+    ],
+    ids=['byte order mark', 'CRLF', 'document marks', 'flow style'],
+)
+def test_the_same_file_written_otherwise(build, rewrite):
+    assert build(rewrite(SCENE), rewrite(FOUR_BAR))[0].linkage == build()[0].linkage
+
+
+FOUR_BAR_WRITTEN_OUT = b"""
+links:
+  ground: {O2: [0, 0], O4: [0.1, 0]}
+  crank: {O2: [0, 0], A: [0.04, 0]}
+  coupler: {A: [0, 0], B: [0.12, 0]}
+  rocker: {O4: [0, 0], B: [0.08, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {B: %s}
+joints:
+  coupler_joint: {parent: crank, child: coupler}
+  rocker_joint: {parent: ground, child: rocker}
+"""
+
+SLIDER_WRITTEN_OUT = b"""
+links:
+  ground: {O: [0, 0], C: [0.25, 0.1]}
+  crank: {O: [0, 0], B: [0.15, 0]}
+  rod: {B: [0, 0], tip: [0.4, 0]}
+sliders: {swivel: {point: C, along: rod, through: B, direction: [1, 0]}}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {swivel: %s}
+joints:
+  rod_joint: {parent: crank, child: rod}
+  rod_slide: {slider: swivel}
+"""
+
+
+@pytest.mark.parametrize(
+    ('shorthand', 'written_out', 'sides'),
+    [
+        (FOUR_BAR, FOUR_BAR_WRITTEN_OUT, (b'left', b'right')),
+        (
+            b'inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}',
+            SLIDER_WRITTEN_OUT,
+            (b'ahead', b'behind'),
+        ),
+    ],
+    ids=['four_bar', 'inverted_slider_crank'],
+)
+def test_a_shorthand_stands_for_the_file_written_out(build, shorthand, written_out, sides):
+    default = build(SCENE, shorthand)
+    for side in sides:
+        short, short_pipeline = build(SCENE, shorthand.replace(b'}', b', assembly: %s}' % side))
+        full, full_pipeline = build(SCENE, written_out % side)
+        assert short.linkage.input == full.linkage.input
+        assert list(short.linkage.joints.items()) == list(full.linkage.joints.items())
+        assert short.linkage.assembly == full.linkage.assembly
+        for angle in ANGLES:
+            assert short_pipeline.closure.position(angle) == full_pipeline.closure.position(angle)
+        if side == sides[0]:
+            assert default[0].linkage == short.linkage
+
+
+def test_joints_come_in_the_order_of_the_file(build):
+    full = FOUR_BAR_WRITTEN_OUT % b'left'
+    scene, pipeline = build(SCENE, full)
+    assert list(scene.linkage.joints) == ['coupler_joint', 'rocker_joint']
+    lines = full.splitlines()
+    swapped, other = build(SCENE, b'\n'.join([*lines[:-2], lines[-1], lines[-2]]))
+    assert list(swapped.linkage.joints) == ['rocker_joint', 'coupler_joint']
+    assert pipeline.closure.position(1.0).joints == other.closure.position(1.0).joints[::-1]
+
+
+def test_joints_turn_or_slide(build):
+    scene, pipeline = build(SCENE, SLIDER_WRITTEN_OUT % b'ahead')
+    assert scene.linkage.joints == {
+        'rod_joint': RevoluteJoint('crank', 'rod'),
+        'rod_slide': SlideJoint('swivel'),
+    }
+    assert pipeline.closure.turning == (True, False)
+
+
+def test_a_bag_holds_enough_to_build_the_scene_again(build):
+    scene, pipeline = build(SCENE + b'effects: {velocity: {}}')
+    again = parse_scene(scene.name, 'a bag', scene.files)
+    assert again.linkage == scene.linkage
+    assert again.drive == scene.drive
+    assert Pipeline(again).closure.position(1.0) == pipeline.closure.position(1.0)

@@ -1,0 +1,181 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A scene at work: crank messages in, joint states out, and the same again to the last bit."""
+
+from __future__ import annotations
+
+from math import pi, remainder, tau
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from linkage_ros.joint_state import JointStateWriter, Rejection
+from linkage_ros.kinematics.status import Status
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import parse_scene
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+MS = 1_000_000
+BEGIN = 1_700_000_000_000_000_000
+CRANK = JointStateWriter(['crank_joint'])
+FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
+DRAG_LINK = b'four_bar: {a: 0.08, b: 0.07, c: 0.09, d: 0.04}'
+SLIDER_CRANK = b'inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}'
+ROOT = Path(__file__).parents[1]
+
+
+def pipeline(scene=b'effects: {velocity: {}}', linkage=FOUR_BAR):
+    files = {'scene.yaml': b'linkage: linkage.yaml\n' + scene, 'linkage.yaml': linkage}
+    return Pipeline(parse_scene('test', 'test', files))
+
+
+def turn(pipeline, angle_at, seconds=3.0, wrap=False):
+    """Return the messages of ticks at 500 Hz, with a crank message for every third of them."""
+    messages = []
+    for number in range(int(500 * seconds)):
+        now = BEGIN + number * 2 * MS
+        if number % 3 == 0:
+            angle = angle_at((now - BEGIN) * 1e-9)
+            rate = (angle_at((now - BEGIN) * 1e-9 + 1e-6) - angle) / 1e-6
+            angle = remainder(angle, tau) if wrap else angle
+            assert pipeline.offer(CRANK.write(now, [angle], [rate]), now) is None
+        messages.append(pipeline.tick(now).message)
+    return messages
+
+
+def read(message):
+    return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+
+
+def swinging(t):
+    return 9.0 * t - 0.5 * t * t
+
+
+def test_the_same_input_gives_the_same_bytes():
+    first, second = (turn(pipeline(), swinging) for _ in range(2))
+    assert len(set(first)) == len(first)
+    assert first == second
+
+
+@pytest.mark.parametrize('wrap_input', [False, True])
+@pytest.mark.parametrize('direction', [1, -1])
+@pytest.mark.parametrize(
+    'linkage',
+    [FOUR_BAR, DRAG_LINK, SLIDER_CRANK],
+    ids=['crank-rocker', 'drag link', 'slider-crank'],
+)
+def test_over_several_turns_angles_run_on_or_stay_wrapped(wrap_input, direction, linkage):
+    def angle_at(t):
+        return direction * 11.0 * t
+
+    continuous = turn(pipeline(linkage=linkage), angle_at, wrap=wrap_input)
+    wrapped = turn(pipeline(b'angles: wrapped', linkage), angle_at, wrap=wrap_input)
+    slides = not pipeline(linkage=linkage).closure.turning[1]
+    previous = None
+    for long, short in zip(map(read, continuous), map(read, wrapped), strict=True):
+        if previous is not None:
+            assert all(abs(long.position - previous.position) < 0.5)
+        previous = long
+        assert all(-pi < angle <= pi for angle in short.position)
+        turns = (long.position - short.position) / tau
+        assert turns == pytest.approx([round(turn) for turn in turns], abs=1e-9)
+        assert not slides or turns[1] == 0.0
+    first, last = read(continuous[0]).position, read(continuous[-1]).position
+    # In 33 rad the coupler falls behind the crank by five turns, but in a drag link it goes along.
+    assert abs(last[0] - first[0]) > 5 * tau or abs(last[1] - first[1]) > 5 * tau
+
+
+def test_without_velocity_the_array_is_empty():
+    bare, full = pipeline(b''), pipeline()
+    for message, with_rates in zip(turn(bare, swinging), turn(full, swinging), strict=True):
+        assert len(read(message).velocity) == len(read(message).effort) == 0
+        assert len(read(with_rates).velocity) == 2
+        assert list(read(message).position) == list(read(with_rates).position)
+
+
+@pytest.mark.parametrize(('effects', 'imported'), [('{}', False), ('{velocity: {}}', True)])
+def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
+    (tmp_path / 'linkage.yaml').write_bytes(FOUR_BAR)
+    (tmp_path / 'scene.yaml').write_text(f'linkage: linkage.yaml\neffects: {effects}')
+    program = (
+        'import sys; from linkage_ros.pipeline import Pipeline; '
+        'from linkage_ros.scene.load import load_scene; '
+        f'Pipeline(load_scene({str(tmp_path / "scene.yaml")!r})); '
+        'print("linkage_ros.effects.velocity" in sys.modules, "rclpy" in sys.modules)'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', program],
+        cwd=ROOT,
+        env=os.environ | {'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == [str(imported), 'False']
+
+
+def test_before_the_first_sample_and_after_the_last_there_is_silence():
+    silent = pipeline()
+    assert silent.tick(BEGIN) == (None, None, b'')
+    silent.offer(CRANK.write(BEGIN, [0.5], [1.0]), BEGIN)
+    assert silent.tick(BEGIN + 200 * MS).message
+    assert silent.tick(BEGIN + 201 * MS) == (None, None, b'')
+
+
+@pytest.mark.parametrize(
+    ('linkage', 'angle', 'status', 'gap'),
+    [
+        (b'four_bar: {a: 1, b: 1, c: 1, d: 2}', pi, Status.OPEN, 1.0),
+        (b'inverted_slider_crank: {a: 0.25, swivel: [0.25, 0]}', 0.0, Status.INDETERMINATE, 0.0),
+    ],
+)
+def test_where_there_is_no_pose_nothing_is_published(linkage, angle, status, gap):
+    stuck = pipeline(linkage=linkage)
+    stuck.offer(CRANK.write(BEGIN, [angle], [1.0]), BEGIN)
+    position, motion, message = stuck.tick(BEGIN)
+    assert position.status is status
+    assert position.gap == pytest.approx(gap)
+    assert motion is None
+    assert message == b''
+
+
+def test_at_a_toggle_positions_are_published_and_rates_are_not():
+    toggle = pipeline(linkage=b'four_bar: {a: 1, b: 1, c: 1, d: 3}')
+    toggle.offer(CRANK.write(BEGIN, [0.0], [1.0]), BEGIN)
+    position, _, message = toggle.tick(BEGIN)
+    assert position.status is Status.TOGGLE
+    assert len(read(message).position) == 2
+    assert len(read(message).velocity) == 0
+
+
+def test_a_rejected_message_leaves_the_next_ticks_as_they_were():
+    bad = [
+        (b'', Rejection.MALFORMED),
+        (CRANK.write(BEGIN, [float('nan')], [0.0]), Rejection.NOT_FINITE),
+        (CRANK.write(0, [1.0], [0.0]), Rejection.STAMP_ZERO),
+        (CRANK.write(BEGIN - 1, [1.0], [0.0]), Rejection.STAMP_OLD),
+        (CRANK.write(BEGIN, [1.0], []), Rejection.NO_RATE),
+        (JointStateWriter(['x']).write(BEGIN, [1.0], [0.0]), Rejection.MISSING),
+    ]
+    clean, disturbed = pipeline(), pipeline()
+    for each in (clean, disturbed):
+        each.offer(CRANK.write(BEGIN, [0.5], [1.0]), BEGIN)
+    for message, reason in bad:
+        assert disturbed.offer(message, BEGIN) is reason
+        assert disturbed.tick(BEGIN) == clean.tick(BEGIN)
