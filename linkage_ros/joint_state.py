@@ -29,6 +29,8 @@ from struct import error as StructError
 from struct import Struct
 from typing import NamedTuple
 
+from linkage_ros.tuples import new
+
 NANOSECONDS = 1_000_000_000
 
 
@@ -72,15 +74,9 @@ class CrankSample(NamedTuple):
 class _Layout(NamedTuple):
     """Where things stand in a message; two messages of one publisher have the same layout."""
 
-    names: bytes  # from the frame_id up to the first position
-    encapsulation: bytes
-    stamp: Struct
-    counter: Struct
-    value: Struct
-    angle: int
-    rates: tuple[int, int]  # where their count stands, and the count
-    rate: int
-    efforts: tuple[int, int]
+    fields: Struct
+    fixed: tuple[bytes, bytes, int, int]
+    """Encapsulation, all from the frame_id up to the first position, and two counts."""
     size: int
 
 
@@ -104,33 +100,27 @@ class JointStateReader:
     def read(self, data: bytes) -> CrankSample | Rejection:
         """Return the joint's sample, or why there is none."""
         layout = self._layout
-        if (
-            layout is None
-            or len(data) < layout.size
-            or data[:2] != layout.encapsulation
-            or not data.startswith(layout.names, 12)
-            or layout.counter.unpack_from(data, layout.rates[0])[0] != layout.rates[1]
-            or layout.counter.unpack_from(data, layout.efforts[0])[0] != layout.efforts[1]
-        ):
-            found = _find(data, self._joint)
-            if isinstance(found, Rejection):
-                return found
-            layout = self._layout = found
-        seconds, nanoseconds = layout.stamp.unpack_from(data, 4)
-        if seconds < 0 or nanoseconds >= NANOSECONDS:
-            return Rejection.STAMP_INVALID
-        return CrankSample(
-            seconds * NANOSECONDS + nanoseconds,
-            layout.value.unpack_from(data, layout.angle)[0],
-            layout.value.unpack_from(data, layout.rate)[0] if layout.rates[1] else None,
-        )
+        if layout is not None and len(data) >= layout.size:
+            kind, seconds, nanoseconds, head, angle, rates, *rate, efforts = (
+                layout.fields.unpack_from(data)
+            )
+            if (kind, head, rates, efforts) == layout.fixed:
+                if seconds < 0 or nanoseconds >= NANOSECONDS:
+                    return Rejection.STAMP_INVALID
+                stamp = seconds * NANOSECONDS + nanoseconds
+                return new(CrankSample, (stamp, angle, rate[0] if rate else None))
+        found = _find(data, self._joint)
+        if isinstance(found, Rejection):
+            return found
+        self._layout = found
+        return self.read(data)
 
 
 def _find(data: bytes, joint: bytes) -> _Layout | Rejection:
     order = {b'\x00\x00': '>', b'\x00\x01': '<'}.get(data[:2])
     if order is None:
         return Rejection.MALFORMED
-    count, value = Struct(f'{order}I'), Struct(f'{order}d')
+    count = Struct(f'{order}I')
     try:
         at = 12 + 4 + count.unpack_from(data, 12)[0]
         at = _aligned(at, 4)
@@ -162,17 +152,16 @@ def _find(data: bytes, joint: bytes) -> _Layout | Rejection:
         return Rejection.UNEQUAL
     if names.count(joint) != 1:
         return Rejection.TWICE if joint in names else Rejection.MISSING
-    index = names.index(joint)
+    skip = 8 * names.index(joint)
+    angle = positions + skip
+    layout = f'{order}2s2xiI{positions - 12}s{skip}xd{rate_at - angle - 8}xI'
+    after = rate_at + 4
+    if n_rates:
+        layout += f'{rates + skip - after}xd'
+        after = rates + skip + 8
     return _Layout(
-        data[12:positions],
-        data[:2],
-        Struct(f'{order}iI'),
-        count,
-        value,
-        positions + 8 * index,
-        (rate_at, n_rates),
-        rates + 8 * index,
-        (effort_at, n_efforts),
+        Struct(f'{layout}{effort_at - after}xI'),
+        (data[:2], data[12:positions], n_rates, n_efforts),
         at,
     )
 

@@ -30,6 +30,7 @@ from linkage_ros.effects.turns import Continuous, Wrapped
 from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.scene.scene import Scene
+from linkage_ros.tuples import new
 
 
 class Tick(NamedTuple):
@@ -73,12 +74,11 @@ class Pipeline:
 
     """
 
-    __slots__ = ('_drive', '_reader', '_stages', '_writer', 'closure')
+    __slots__ = ('_drive', '_path', '_reader', 'closure')
 
     def __init__(self, scene: Scene) -> None:
         self.closure = Closure(scene.linkage)
         self._reader = JointStateReader(scene.linkage.input.joint)
-        self._writer = JointStateWriter(list(scene.linkage.joints))
         effects = {name: import_module(EFFECTS[name]) for name in EFFECTS if name in scene.effects}
         stages: list[Stage] = [
             effect.build(effect.read(scene.effects.section(name)), self.closure)
@@ -86,10 +86,12 @@ class Pipeline:
         ]
         scene.effects.finish(tuple(EFFECTS))
         turns = Wrapped if scene.wrapped else Continuous
-        self._stages = (*stages, turns(self.closure.turning))
+        stages.append(turns(self.closure.turning))
         self._drive = TopicDrive(
             scene.drive, needs_rate=any(e.NEEDS_CRANK_RATE for e in effects.values())
         )
+        write = JointStateWriter(list(scene.linkage.joints)).write
+        self._path = (self._drive.state, self.closure.position, tuple(stages), write)
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """
@@ -118,16 +120,19 @@ class Pipeline:
             The time, and the stamp of the message, in [ns].
 
         """
-        crank = self._drive.state(now)
+        state, close, stages, write = self._path
+        crank = state(now)
         if crank is None:
             return _SILENT
-        position = self.closure.position(crank.angle)
-        if not position.joints:
+        position = close(crank[0])
+        joints = position[2]
+        if not joints:
             return Tick(position, None, b'')
-        motion = Motion(crank, position, position.joints, ())
-        for stage in self._stages:
+        motion = new(Motion, (crank, position, joints, ()))
+        for stage in stages:
             motion = stage(motion)
-        return Tick(position, motion, self._writer.write(now, motion.joints, motion.rates))
+        _, _, joints, rates = motion
+        return new(Tick, (position, motion, write(now, joints, rates)))
 
     @property
     def newest_stamp(self) -> int:

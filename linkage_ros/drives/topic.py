@@ -22,6 +22,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from linkage_ros.joint_state import CrankSample, Rejection
+from linkage_ros.tuples import new
 
 LARGEST = 1e10
 """Angles beyond this, in [rad], are 2e-6 rad apart as doubles: none of a machine. So for rates."""
@@ -136,4 +137,4 @@ class TopicDrive:
             return None
         if self._carry_forward:
             angle += rate * (age * 1e-9)
-        return CrankState(angle, rate, age)
+        return new(CrankState, (angle, rate, age))

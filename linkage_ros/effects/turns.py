@@ -27,6 +27,7 @@ from collections.abc import Sequence
 from math import pi, remainder, tau
 
 from linkage_ros.effects.stage import Motion
+from linkage_ros.tuples import new
 
 
 class Continuous:
@@ -55,11 +56,10 @@ class Continuous:
         else:
             now = list(joints)
             for i in self._turning:
-                turns = round((last[i] - now[i]) / tau)
-                if turns:
-                    now[i] += turns * tau
+                if not -pi < last[i] - now[i] < pi:
+                    now[i] += round((last[i] - now[i]) / tau) * tau
         self._last = now
-        return Motion(crank, position, tuple(now), rates)
+        return new(Motion, (crank, position, tuple(now), rates))
 
 
 class Wrapped:
@@ -82,7 +82,7 @@ class Wrapped:
         """Return the motion with whole turns left out."""
         crank, position, joints, rates = motion
         now = [wrapped(v) if turns else v for v, turns in zip(joints, self._turning, strict=True)]
-        return Motion(crank, position, tuple(now), rates)
+        return new(Motion, (crank, position, tuple(now), rates))
 
 
 def wrapped(angle: float) -> float:

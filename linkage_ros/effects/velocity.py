@@ -27,6 +27,7 @@ from linkage_ros.effects.stage import Motion, Stage
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.scene.yaml_file import Section
+from linkage_ros.tuples import new
 
 NEEDS_CRANK_RATE = True
 
@@ -50,6 +51,6 @@ def build(_parameters: VelocityParameters, closure: Closure) -> Stage:
         crank, position, joints, _ = motion
         if position.status is toggle:
             return motion
-        return Motion(crank, position, joints, rates(position, crank.rate))
+        return new(Motion, (crank, position, joints, rates(position, crank.rate)))
 
     return velocity

@@ -31,6 +31,9 @@ from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.mobility import crank_ranges, CrankRange
 from linkage_ros.kinematics.status import Status
+from linkage_ros.tuples import new
+
+_CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
 
 
 class Position(NamedTuple):
@@ -112,13 +115,13 @@ class Closure:
         """
         phi = crank_angle + self._crank_offset
         pose = self._dyad.close(phi)
-        status, gap, first, second = pose[:4]
-        if status is Status.CLOSED or status is Status.TOGGLE:
-            joints = tuple(
-                [t * crank_angle + u * first + v * second + w for t, u, v, w in self._terms]
-            )
-            return Position(status, 0.0, joints, phi, pose)
-        return Position(status, gap * self.loop.scale, (), phi, pose)
+        status, gap, first, second, *_ = pose
+        if status is not _CLOSED and status is not _TOGGLE:
+            return Position(status, gap * self.loop.scale, (), phi, pose)
+        joints: tuple[float, ...] = ()
+        for t, u, v, w in self._terms:
+            joints += (t * crank_angle + u * first + v * second + w,)
+        return new(Position, (status, 0.0, joints, phi, pose))
 
     def rates(self, position: Position, crank_rate: float) -> tuple[float, ...]:
         """
@@ -135,7 +138,10 @@ class Closure:
         # The pose came out of this very dyad: the pair matches, which no annotation can say.
         pose: Any = position.pose
         first, second = self._dyad.rates(position.phi, pose, crank_rate)
-        return tuple([t * crank_rate + u * first + v * second for t, u, v, _ in self._terms])
+        rates: tuple[float, ...] = ()
+        for t, u, v, _ in self._terms:
+            rates += (t * crank_rate + u * first + v * second,)
+        return rates
 
     def residual(self, position: Position) -> float:
         """

@@ -26,6 +26,8 @@ from __future__ import annotations
 from math import atan2, cos, fsum, hypot, sin, sqrt
 from typing import NamedTuple
 
+from linkage_ros.tuples import new
+
 UNIT_ROUNDOFF = 2.0**-53
 
 SMALLEST = 2.0**-1020
@@ -130,13 +132,8 @@ class CrankDiagonal:
         half_sine = sin(half)
         half_cosine = cos(half)
         near = root * half_sine
-        return Diagonal(
-            hypot(difference, near),
-            atan2(
-                -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
-            ),
-            near,
-            root * half_cosine,
-            half_sine,
-            half_cosine,
-        )
+        x = difference + 2.0 * a * half_sine * half_sine
+        y = -2.0 * a * half_sine * half_cosine
+        far = root * half_cosine
+        length = hypot(difference, near)
+        return new(Diagonal, (length, atan2(y, x), near, far, half_sine, half_cosine))

@@ -72,6 +72,8 @@ class Health:
         Name of the node.
     rate
         Ticks wanted a second; 0 for one for every sample.
+    clock
+        Time by the node's clock, in [ns].
     max_age
         Age beyond which a sample is no crank, in [ns].
     crank_topic
@@ -90,6 +92,7 @@ class Health:
     node: str
     scene: str
     rate: float
+    clock: int
     max_age: int
     crank_topic: str
     publishers: Sequence[str]
@@ -141,15 +144,13 @@ class Health:
 
     def _crank(self) -> DiagnosticStatus:
         counts = self.loop.counts
-        age = (self.now.time - counts.sample_at) / NANOSECONDS if counts.sample_at else inf
+        stamp = self.loop.newest_stamp
+        age = (self.clock - stamp) / NANOSECONDS if stamp else inf
         rejected = self.now.rejected - self.before.rejected
         level, message = OK, 'Samples arriving'
         if age * NANOSECONDS > self.max_age:
             level = STALE
-            message = f'No crank for {age:.1f} s' if counts.sample_at else 'No crank yet'
-        elif counts.last is not None and counts.last.position is None:
-            limit = self.max_age / NANOSECONDS
-            level, message = STALE, f'Samples are older than {limit:g} s; synchronise the clocks'
+            message = f'No crank for {age:.1f} s, by its stamps' if stamp else 'No crank yet'
         elif len(self.publishers) > 1:
             level, message = WARN, f'Several publishers: {", ".join(self.publishers)}'
         elif rejected:
@@ -160,7 +161,7 @@ class Health:
             'Samples received': counts.received,
             'Samples used': counts.used,
             'Samples rejected': self.now.rejected,
-            'Newest sample taken before (s)': f'{age:.3f}',
+            'Age of the newest sample (s)': f'{age:.3f}',
         }
         values |= {f'Rejected: {why.value}': n for why, n in counts.rejected.items() if n}
         return self._status('crank', level, message, values)

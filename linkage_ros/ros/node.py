@@ -307,6 +307,7 @@ class LinkageNode(LifecycleNode):
             node=self.get_name(),
             scene=self.scene.name,
             rate=0.0 if simulated else self.scene.rate,
+            clock=self.get_clock().now().nanoseconds,
             max_age=self.scene.drive.max_age,
             crank_topic=self.crank_topic,
             publishers=publishers,

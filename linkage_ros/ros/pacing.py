@@ -49,6 +49,7 @@ def steady(rate: float) -> Pace:
 
     def pace(loop: TickLoop, stopping: Event) -> None:
         counts = loop.counts
+        add, tick_at = counts.lateness.add, loop.tick_at
         begin = monotonic_ns()
         number = 0
         while not stopping.is_set():
@@ -61,14 +62,14 @@ def steady(rate: float) -> Pace:
             if wait > 0:
                 sleep(wait * 1e-9)
             lateness = monotonic_ns() - due
-            counts.lateness.add(lateness)
+            add(lateness)
             if lateness > period:
                 counts.late += 1
                 if lateness > CATCH_UP:
                     lost = int(lateness // period)
                     counts.lost += lost
                     number += lost
-            loop.tick_at(time_ns())
+            tick_at(time_ns())
 
     return pace
 

@@ -61,8 +61,6 @@ class Counts:
     last: Tick | None = None
     unclosed: dict[Status, int] = field(default_factory=lambda: dict.fromkeys(Status, 0))
     last_unclosed: Position | None = None
-    sample_at: int = 0
-    """When the newest good sample was taken, on the steady clock, in [ns]; 0 before the first."""
 
 
 Take = Callable[[], tuple[bytes, dict[str, Any]] | None]
@@ -100,7 +98,6 @@ class TickLoop:
         self._publish = publish
         self._own = own
         self._last_time = 0
-        self._newest_stamp = 0
         self._pipeline = build()
         self._stopping = Event()
         self.closure = self._pipeline.closure
@@ -132,6 +129,11 @@ class TickLoop:
         """Whether it has been started and not stopped."""
         return self._thread is not None
 
+    @property
+    def newest_stamp(self) -> int:
+        """Stamp of the newest good sample, in [ns]; 0 before the first."""
+        return self._pipeline.newest_stamp
+
     def _offer(self, message: bytes, info: dict[str, Any], now: int) -> bool:
         """Record a message and offer it to the pipeline; return whether it was good."""
         if self._own and message.startswith(self._own, 12):
@@ -144,14 +146,13 @@ class TickLoop:
         if rejection is not None:
             counts.rejected[rejection] += 1
             return False
-        if self._pipeline.newest_stamp != self._newest_stamp:
-            self._newest_stamp = self._pipeline.newest_stamp
-            counts.sample_at = monotonic_ns()
         return True
 
     def tick_at(self, now: int) -> None:
         """Take every message that has come and tick at a time, in [ns]."""
-        self._begin(now)
+        if now < self._last_time or self.reset_requested:
+            self._rebuild(now)
+        self._last_time = now
         good = False
         while (taken := self._take()) is not None:
             good |= self._offer(*taken, now)
@@ -160,22 +161,22 @@ class TickLoop:
 
     def tick_samples(self, now: int) -> None:
         """Take every message that has come and tick once for each, at its stamp."""
-        self._begin(now)
+        if now < self._last_time or self.reset_requested:
+            self._rebuild(now)
+        self._last_time = now
         while (taken := self._take()) is not None:
             if self._offer(*taken, now):
                 self.counts.used += 1
                 self._tick(now, self._pipeline.newest_stamp)
 
-    def _begin(self, now: int) -> None:
-        """Build the pipeline anew where time has jumped back or one has asked."""
+    def _rebuild(self, now: int) -> None:
+        """Build the pipeline anew, since time has jumped back or one has asked."""
         if now < self._last_time:
             self.counts.clock_jumps += 1
-            self._pipeline = self._build()
-        elif self.reset_requested:
+        if self.reset_requested:
             self.reset_requested = False
             self.counts.resets += 1
-            self._pipeline = self._build()
-        self._last_time = now
+        self._pipeline = self._build()
 
     def _tick(self, now: int, at: int) -> None:
         """Solve now for a time, both in [ns]; publish, record and count."""

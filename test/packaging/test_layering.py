@@ -27,7 +27,7 @@ PACKAGE = 'linkage_ros'
 # Rooms by height: a room may import from below its own height, and from its neighbours as long
 # as no two import each other.
 HEIGHTS = (
-    ('errors', 'stop'),
+    ('errors', 'stop', 'tuples'),
     ('kinematics', 'shipped'),
     ('synthesis', 'scene', 'drives', 'joint_state'),
     ('effects',),

@@ -62,10 +62,12 @@ def test_damaged_bytes(data):
         if kind == 'flip':
             damaged[place] ^= 1 << data.draw(st.integers(0, 7))
         elif kind == 'cut':
-            del damaged[place : place + data.draw(st.integers(1, 20))]
+            end = place + data.draw(st.integers(1, 20))
+            del damaged[place:end]
             damaged += b'\n'
         else:
-            damaged[place:place] = damaged[place : place + 10]
+            end = place + 10
+            damaged[place:place] = damaged[place:end]
     either_runs_or_says_why(*map(bytes, files))
 
 

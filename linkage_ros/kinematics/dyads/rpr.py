@@ -47,6 +47,9 @@ from typing import NamedTuple
 
 from linkage_ros.kinematics.diagonal import CrankDiagonal, margin, reach, SMALLEST
 from linkage_ros.kinematics.status import Status
+from linkage_ros.tuples import new
+
+_CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
 
 
 class RPRPose(NamedTuple):
@@ -114,15 +117,11 @@ class RPRDyad:
             return RPRPose(Status.OPEN, gap, 0.0, 0.0, 0.0, 0.0)
 
         slide = sign * root_fold * sqrt(s + abs(offset))
+        rod = direction - atan2(offset, slide)
         half_sine /= s
-        return RPRPose(
-            Status.CLOSED if slide else Status.TOGGLE,
-            0.0,
-            direction - atan2(offset, slide),
-            slide,
-            a * ((d - a) / s / s - 2.0 * d * half_sine * half_sine),
-            2.0 * a * d * half_sine * (half_cosine / s),
-        )
+        p = a * ((d - a) / s / s - 2.0 * d * half_sine * half_sine)
+        q = 2.0 * a * d * half_sine * (half_cosine / s)
+        return new(RPRPose, (_CLOSED if slide else _TOGGLE, 0.0, rod, slide, p, q))
 
     def rates(self, _phi: float, pose: RPRPose, crank_rate: float) -> tuple[float, float]:
         """Return ω3, in [rad/s], and ṙ, in lengths a second, at the crank rate ω2, in [rad/s]."""

@@ -74,6 +74,9 @@ from linkage_ros.kinematics.diagonal import (
     SMALLEST,
 )
 from linkage_ros.kinematics.status import Status
+from linkage_ros.tuples import new
+
+_CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
 
 
 class RRRPose(NamedTuple):
@@ -166,15 +169,11 @@ class RRRDyad:
         cross = 0.5 * sign * beta_y * beta_x
         if -SMALLEST < cross < SMALLEST:
             cross = 0.0
-        return RRRPose(
-            Status.CLOSED if cross else Status.TOGGLE,
-            0.0,
-            direction + 2.0 * sign * atan2(beta_y, beta_x),
-            direction + 2.0 * sign * atan2(gamma_y, gamma_x),
-            cross,
-            diagonal,
-            (beta_y, beta_x, gamma_y, gamma_x),
-        )
+        coupler = direction + 2.0 * sign * atan2(beta_y, beta_x)
+        rocker = direction + 2.0 * sign * atan2(gamma_y, gamma_x)
+        halves = (beta_y, beta_x, gamma_y, gamma_x)
+        status = _CLOSED if cross else _TOGGLE
+        return new(RRRPose, (status, 0.0, coupler, rocker, cross, diagonal, halves))
 
     def rates(self, _phi: float, pose: RRRPose, crank_rate: float) -> tuple[float, float]:
         """Return ω3 and ω4, in [rad/s], of a closed pose at the crank rate ω2, in [rad/s]."""
