@@ -22,6 +22,7 @@ benchmark's scene does; it neither counts, checks nor records.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 import sys
 
@@ -78,8 +79,14 @@ def main() -> None:
         rclpy.spin(IdiomaticNode(Path(sys.argv[1]), float(sys.argv[2])))
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except RuntimeError:
+        # rclpy's own, where its signal handler takes the context away while a message is taken.
+        if rclpy.ok():
+            raise
     finally:
-        rclpy.try_shutdown()
+        # The handler of the signal shuts down at the same time.
+        with suppress(RuntimeError):
+            rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

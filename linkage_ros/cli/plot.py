@@ -89,7 +89,9 @@ def draw(bag_path: Path, picture: Path) -> None:
     if not states:
         raise BagError(bag_path, 'holds no joint states', 'record a run with a crank')
     title = f'{scene.name}: dependent joints over one turn of {scene.linkage.input.joint}'
-    _figure(f'{title} ({states} joint states)', positions, rates, picture)
+    turns = [isinstance(joint, RevoluteJoint) for joint in scene.linkage.joints.values()]
+    units = [unit for unit, used in (('rad', any(turns)), ('m', not all(turns))) if used]
+    _figure(f'{title} ({states} joint states)', units, positions, rates, picture)
 
 
 def _add(curve: tuple[list[float], list[float]], x: float, y: float, turning: bool) -> None:
@@ -102,15 +104,16 @@ def _add(curve: tuple[list[float], list[float]], x: float, y: float, turning: bo
     ys.append(y)
 
 
-def _figure(title: str, positions: Curves, rates: Curves, picture: Path) -> None:
+def _figure(title: str, units: list[str], positions: Curves, rates: Curves, picture: Path) -> None:
     import matplotlib as mpl  # local import: an extra, and slow to load
 
     mpl.use('Agg')
     from matplotlib import pyplot as plt
 
-    panels = [('joint position [rad, m]', positions)]
+    panels = [(f'joint position [{", ".join(units)}]', positions)]
     if any(xs for xs, _ in rates.values()):
-        panels.append(('joint rate [rad/s, m/s]', rates))
+        per_second = ', '.join(f'{unit}/s' for unit in units)
+        panels.append((f'joint rate [{per_second}]', rates))
     figure, axes = plt.subplots(
         len(panels), 1, sharex=True, squeeze=False, figsize=(8, 1 + 3 * len(panels)), dpi=120
     )
