@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Where the scenes and linkages that come with the package lie."""
+"""Where the files lie that come with this package, and with others that are installed."""
 
 from __future__ import annotations
 
@@ -24,12 +24,25 @@ import sys
 from linkage_ros.errors import FileError
 
 
+def share_folders(package: str) -> list[Path]:
+    """
+    Return where a ROS package's files may lie: under a robot's prefixes, then the interpreter's.
+
+    Parameters
+    ----------
+    package
+        Name of the package.
+
+    """
+    prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
+    return [Path(prefix, 'share', package) for prefix in prefixes if prefix]
+
+
 def shipped(name: str) -> Path:
     """
     Return the path of a file under ``config/``.
 
-    A checkout comes first, since an editable install's copies go stale; then a robot's prefixes,
-    then the interpreter's.
+    A checkout comes first, since an editable install's copies go stale.
 
     Raises
     ------
@@ -38,11 +51,7 @@ def shipped(name: str) -> Path:
 
     """
     checkout = Path(__file__).parent.parent
-    prefixes = [
-        *filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)),
-        sys.prefix,
-    ]
-    folders = [Path(prefix, 'share', 'linkage_ros') for prefix in prefixes]
+    folders = share_folders('linkage_ros')
     if (checkout / 'package.xml').is_file():
         folders.insert(0, checkout)
     for folder in folders:

@@ -91,9 +91,10 @@ class Closure:
         self.loop = find_loop(linkage)
         self.crank_ranges = crank_ranges(self.loop)
         if not self.crank_ranges:
+            sides = ', '.join(f'{side * self.loop.scale:g}' for side in self.loop.dyad.sides)
             raise DefinitionError(
                 'links',
-                'the loop closes at no crank angle',
+                f'the loop of {sides} m closes at no crank angle',
                 'the longest link must be shorter than the other three together',
             )
         self.turning = tuple(isinstance(j, RevoluteJoint) for j in linkage.joints.values())
@@ -137,7 +138,7 @@ class Closure:
         """
         # The pose came out of this very dyad: the pair matches, which no annotation can say.
         pose: Any = position.pose
-        first, second = self._dyad.rates(position.phi, pose, crank_rate)
+        first, second = self._dyad.rates(pose, crank_rate)
         rates: tuple[float, ...] = ()
         for t, u, v, _ in self._terms:
             rates += (t * crank_rate + u * first + v * second,)

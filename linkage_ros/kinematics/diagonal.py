@@ -123,11 +123,11 @@ class CrankDiagonal:
         self.least = abs(d - a)
         self.greatest = a + d
         # Two roots, since a·d may underflow where the lengths differ by many decades.
-        self._constants = (a, d - a, 2.0 * sqrt(a) * sqrt(d))
+        self._constants = (a, d, d - a, 2.0 * sqrt(a) * sqrt(d))
 
     def at(self, phi: float) -> Diagonal:
         """Return the diagonal for the crank direction φ, in [rad] from the x axis of the loop."""
-        a, difference, root = self._constants
+        a, _, difference, root = self._constants
         half = 0.5 * phi
         half_sine = sin(half)
         half_cosine = cos(half)
@@ -137,3 +137,20 @@ class CrankDiagonal:
         far = root * half_cosine
         length = hypot(difference, near)
         return new(Diagonal, (length, atan2(y, x), near, far, half_sine, half_cosine))
+
+    def swing(self, diagonal: Diagonal) -> tuple[float, float]:
+        """
+        Return p and q: how the diagonal turns and grows with the crank.
+
+        With OA the crank and n̂ the diagonal's direction turned left::
+
+            p = OA·AD/s² = −d(direction)/dφ = a·((d − a)/s² − 2d·(sin(φ/2)/s)²)
+            q = OA·n̂/s   = (ds/dφ)/s        = 2ad·sin(φ/2)·cos(φ/2)/s²
+
+        Where A meets D, OA·AD and s² vanish together; written with the half angle, p does not.
+        """
+        a, d, difference, _ = self._constants
+        s = diagonal.length
+        half_sine = diagonal.half_sine / s
+        p = a * (difference / s / s - 2.0 * d * half_sine * half_sine)
+        return p, 2.0 * a * d * half_sine * (diagonal.half_cosine / s)

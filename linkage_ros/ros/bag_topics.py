@@ -19,14 +19,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import json
-import os
 from pathlib import Path
 import re
-import sys
 from typing import Any
 
 from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.errors import RecordingError
+from linkage_ros.shipped import share_folders
 from rclpy.qos import QoSProfile
 
 _FIELD = re.compile(r'^\s*(?P<type>[A-Za-z]\w*(?:/\w+)*)(?:<=\d+)?(?:\[[^\]]*\])?\s+[a-z]\w*')
@@ -105,16 +104,9 @@ def _type_hash(package: str, kind: str) -> str:
 
 
 def _share(package: str, file: str) -> Path:
-    # A robot's packages lie under the prefixes of its environment, the wheels' under the
-    # interpreter.
-    prefixes = [
-        *filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)),
-        sys.prefix,
-    ]
-    for prefix in prefixes:
-        path = Path(prefix, 'share', package, 'msg', file)
-        if path.is_file():
-            return path
+    for folder in share_folders(package):
+        if (folder / 'msg' / file).is_file():
+            return folder / 'msg' / file
     raise RecordingError(
         f'{package}/msg/{file}', 'is not installed', f'install the ROS package {package}'
     )

@@ -63,7 +63,7 @@ def test_a_parallelogram_passes_zero_as_a_parallelogram(name: str, near: float, 
         assert pose.rocker == pytest.approx(phi, rel=1e-15, abs=0.0)
     assert off(pose.coupler, 0.0) < 1e-15
     assert off(pose.rocker, phi) < 1e-15
-    assert dyad.rates(phi, pose, 1.0) == pytest.approx((0.0, 1.0), rel=8e-16, abs=8e-16)
+    assert dyad.rates(pose, 1.0) == pytest.approx((0.0, 1.0), rel=8e-16, abs=8e-16)
 
 
 @pytest.mark.parametrize('name', PARALLELOGRAMS)
@@ -77,7 +77,7 @@ def test_a_parallelogram_passes_half_a_turn_as_a_parallelogram(
     assert pose.status is Status.CLOSED
     assert off(pose.coupler, 0.0) < 2e-15
     assert off(pose.rocker, phi) < 2e-15
-    assert dyad.rates(phi, pose, 1.0) == pytest.approx((0.0, 1.0), rel=8e-16, abs=8e-16)
+    assert dyad.rates(pose, 1.0) == pytest.approx((0.0, 1.0), rel=8e-16, abs=8e-16)
 
 
 @pytest.mark.parametrize('name', PARALLELOGRAMS)
@@ -107,7 +107,7 @@ def test_a_parallelogram_stays_one_at_any_step_in_either_direction(
         assert off(pose.coupler, 0.0) < 2e-15
         # The angle itself is rounded at its size.
         assert off(pose.rocker, phi) < 2e-15 + 2.0**-53 * abs(phi)
-        assert dyad.rates(phi, pose, 1.0) == pytest.approx((0.0, 1.0), rel=4e-15, abs=4e-15)
+        assert dyad.rates(pose, 1.0) == pytest.approx((0.0, 1.0), rel=4e-15, abs=4e-15)
 
 
 @pytest.mark.parametrize('near', [1e-3, 1e-6, 1e-9, 1e-12, 1e-300, 0.5, 3.0])
@@ -119,7 +119,7 @@ def test_a_folded_kite_turns_as_one_link_about_the_crank_pivot(near: float, sign
     assert pose.status is Status.CLOSED
     assert off(pose.coupler, phi + pi) < 2e-15
     assert off(pose.rocker, pi) < 2e-15
-    assert dyad.rates(phi, pose, 1.0) == pytest.approx((1.0, 0.0), rel=2e-15, abs=2e-15)
+    assert dyad.rates(pose, 1.0) == pytest.approx((1.0, 0.0), rel=2e-15, abs=2e-15)
 
 
 @pytest.mark.parametrize('near', [1e-3, 1e-6, 1e-9, 1e-12, 1e-100, 0.5, 3.0])
@@ -136,7 +136,7 @@ def test_a_kite_whose_pins_meet_goes_through_with_its_links_in_line(
     assert pose.status is Status.CLOSED
     assert truth.coupler.angle_error_of(pose.coupler) < ANGLE
     assert truth.rocker.angle_error_of(pose.rocker) < ANGLE
-    rates = dyad.rates(phi, pose, 1.0)
+    rates = dyad.rates(pose, 1.0)
     assert truth.coupler_rate.error_of(rates[0]) < RATE
     assert truth.rocker_rate.error_of(rates[1]) < RATE
 
@@ -166,7 +166,7 @@ def test_a_single_change_point_is_passed_steadily_over_two_turns(name: str, side
     poses = [dyad.close(phi) for phi in angles]
     assert {pose.status for pose in poses} == {Status.CLOSED}
     for (phi, one), (_, other) in pairwise(zip(angles, poses, strict=True)):
-        rates = [max(map(abs, dyad.rates(phi, pose, 1.0))) for pose in (one, other)]
+        rates = [max(map(abs, dyad.rates(pose, 1.0))) for pose in (one, other)]
         moved = max(off(one.coupler, other.coupler), off(one.rocker, other.rocker))
         assert moved < 1.5 * step * (max(rates) + 1e-9), phi
     for phi, pose in zip(angles, poses, strict=True):
@@ -187,7 +187,7 @@ def test_a_single_change_point_has_the_reference_s_poses_on_both_turns(
     assert truth.coupler.half_turn_error_of(pose.coupler) < ANGLE
     assert truth.rocker.half_turn_error_of(pose.rocker) < ANGLE
     for rate, expected in zip(
-        dyad.rates(phi, pose, 1.0), (truth.coupler_rate, truth.rocker_rate), strict=True
+        dyad.rates(pose, 1.0), (truth.coupler_rate, truth.rocker_rate), strict=True
     ):
         assert expected.error_of(rate) < RATE
 
@@ -201,7 +201,7 @@ def test_next_to_a_single_change_point_poses_keep_their_digits(near: float, sign
     # Each angle is there proportional to the crank's, up to a half-turn: absolute errors count.
     assert off(pose.coupler, float(truth.coupler.value)) < 2e-15
     assert off(pose.rocker, float(truth.rocker.value)) < 2e-15
-    coupler_rate, rocker_rate = RRRDyad(*lengths, 1).rates(phi, pose, 1.0)
+    coupler_rate, rocker_rate = RRRDyad(*lengths, 1).rates(pose, 1.0)
     assert coupler_rate == pytest.approx(float(truth.coupler_rate.value), rel=4e-15)
     assert rocker_rate == pytest.approx(float(truth.rocker_rate.value), rel=4e-15)
 
@@ -223,6 +223,6 @@ def test_where_the_crank_pin_meets_the_ground_pivot_rates_stay_right(
     # a = d and b = c: the diagonal vanishes, and the triangle on it stands ever more upright. By
     # hand, for a = d = 1 and φ → 0: θ3' = (1 ∓ 1/b)/2 and θ4' = (1 ± 1/b)/2, σ = ±1.
     dyad = RRRDyad(1.0, b, b, 1.0, sign)
-    rates = dyad.rates(phi, dyad.close(phi), 1.0)
+    rates = dyad.rates(dyad.close(phi), 1.0)
     limits = (0.5 * (1.0 - sign / b), 0.5 * (1.0 + sign / b))
     assert rates == pytest.approx(limits, rel=1e-15, abs=4e-16)

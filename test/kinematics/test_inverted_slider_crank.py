@@ -53,7 +53,7 @@ def test_positions_rates_and_status_are_right_in_every_family(family: str) -> No
         worst.note('rod', truth.rod.half_turn_error_of(pose.rod), ANGLE, case)
         worst.note('slide', truth.slide.error_of(pose.slide), LENGTH, case)
         limit = NEEDLE_RATE if family == 'needles' else RATE
-        rod_rate, slide_rate = dyad.rates(phi, pose, 1.0)
+        rod_rate, slide_rate = dyad.rates(pose, 1.0)
         worst.note('ω3', truth.rod_rate.error_of(rod_rate), limit, case)
         worst.note('slide rate', truth.slide_rate.error_of(slide_rate), limit, case)
     worst.check()
@@ -94,8 +94,8 @@ def test_a_mirrored_linkage_moves_in_the_mirror(
     pose, image = dyad.close(phi), mirrored.close(-phi)
     assert (pose.status, pose.gap, pose.slide) == (image.status, image.gap, image.slide)
     if pose.status is Status.CLOSED:
-        rod_rate, slide_rate = dyad.rates(phi, pose, 1.0)
-        assert mirrored.rates(-phi, image, 1.0) == (rod_rate, -slide_rate)
+        rod_rate, slide_rate = dyad.rates(pose, 1.0)
+        assert mirrored.rates(image, 1.0) == (rod_rate, -slide_rate)
         # A rod along the ground points at π from either side of the mirror.
         assume(sin(pose.rod) != 0.0 and phi != 0.0)
         assert cos(pose.rod) == pytest.approx(cos(image.rod), rel=1e-14, abs=1e-15)
@@ -112,8 +112,8 @@ def test_a_straight_rod_behind_is_the_one_ahead_turned_round(
     one, other = ahead.close(phi), behind.close(phi)
     assert other.slide == -one.slide
     assert cos(other.rod - one.rod) == pytest.approx(-1.0)
-    rate, slide_rate = ahead.rates(phi, one, 1.0)
-    assert behind.rates(phi, other, 1.0) == (rate, -slide_rate)
+    rate, slide_rate = ahead.rates(one, 1.0)
+    assert behind.rates(other, 1.0) == (rate, -slide_rate)
 
 
 @pytest.mark.parametrize(('a', 'd', 'h'), [(1.0, 2.0, 1.0), (2.0, 1.0, -1.0), (0.75, 2.0, 1.25)])

@@ -129,7 +129,7 @@ def check_four_bar(lengths: tuple[float, ...], phi: float, side: int, rate_limit
     assert position.status is Status.CLOSED
     assert truth.coupler.half_turn_error_of(position.pose.coupler) < ANGLE
     assert truth.rocker.half_turn_error_of(position.pose.rocker) < ANGLE
-    coupler_rate, rocker_rate = closure.loop.dyad.rates(phi, position.pose, 1.0)
+    coupler_rate, rocker_rate = closure.loop.dyad.rates(position.pose, 1.0)
     assert truth.coupler_rate.error_of(coupler_rate) < rate_limit
     assert truth.rocker_rate.error_of(rocker_rate) < rate_limit
     return True

@@ -125,7 +125,7 @@ def test_the_rates_of_the_third_text_are_what_its_loop_equation_says(name: str, 
             shared = -mpf(omega) * a / mp.sin(theta4 - theta3)
             omega3 = shared * mp.sin(theta4 - phi) / b
             omega4 = shared * mp.sin(theta3 - phi) / c
-        found3, found4 = dyad.rates(phi, pose, omega)
+        found3, found4 = dyad.rates(pose, omega)
         assert truth.coupler_rate._replace(value=omega3 / omega).error_of(found3 / omega) < RATE
         assert truth.rocker_rate._replace(value=omega4 / omega).error_of(found4 / omega) < RATE
         compared += 1
@@ -148,7 +148,7 @@ def test_a_crank_pin_square_above_the_ground_pivot_is_an_ordinary_pose(
         assert pose.status is Status.CLOSED
         assert truth.coupler.angle_error_of(pose.coupler) < ANGLE
         assert truth.rocker.angle_error_of(pose.rocker) < ANGLE
-        coupler_rate, rocker_rate = dyad.rates(phi, pose, 1.0)
+        coupler_rate, rocker_rate = dyad.rates(pose, 1.0)
         assert truth.coupler_rate.error_of(coupler_rate) < RATE
         assert truth.rocker_rate.error_of(rocker_rate) < RATE
 
@@ -172,7 +172,7 @@ def test_a_rocker_along_the_ground_has_a_rate(
     assert pose.status is Status.CLOSED
     assert truth.rocker.half_turn_error_of(pose.rocker) < ANGLE
     assert abs(turned(mpf(pose.rocker) - mpf(rocker))) < 10 * abs(offset) + 2e-15
-    coupler_rate, rocker_rate = dyad.rates(phi, pose, 1.0)
+    coupler_rate, rocker_rate = dyad.rates(pose, 1.0)
     assert truth.coupler_rate.error_of(coupler_rate) < RATE
     assert truth.rocker_rate.error_of(rocker_rate) < RATE
 
@@ -201,7 +201,7 @@ def test_a_crank_pin_next_to_the_swivel_is_an_ordinary_pose(
     assert float(turned(mpf(pose.rod) - (mpf(phi) - side * mp.pi) / 2)) == pytest.approx(
         0, abs=1e-15
     )
-    rod_rate, slide_rate = dyad.rates(phi, pose, 2.0)
+    rod_rate, slide_rate = dyad.rates(pose, 2.0)
     assert rod_rate == pytest.approx(1.0, rel=1e-15)
     assert slide_rate == pytest.approx(side * 2.0 * a * cos(phi / 2), rel=1e-15)
 

@@ -72,7 +72,7 @@ def test_inside_the_limit_the_loop_closes_to_the_last_digit(
     if distance > 1e-13:
         assert pose.status is Status.CLOSED
     if pose.status is Status.CLOSED:
-        coupler_rate, rocker_rate = dyad.rates(phi, pose, 1.0)
+        coupler_rate, rocker_rate = dyad.rates(pose, 1.0)
         assert truth.coupler_rate.error_of(coupler_rate) < RATE
         assert truth.rocker_rate.error_of(rocker_rate) < RATE
 
@@ -135,7 +135,7 @@ def test_a_bent_rod_reaches_its_swivel_inside_the_limit_and_misses_it_outside(
     assert truth.rod.half_turn_error_of(pose.rod) < error
     assert truth.slide.error_of(pose.slide) < error
     if pose.status is Status.CLOSED:
-        rod_rate, slide_rate = dyad.rates(inside, pose, 1.0)
+        rod_rate, slide_rate = dyad.rates(pose, 1.0)
         assert truth.rod_rate.error_of(rod_rate) < RATE
         assert truth.slide_rate.error_of(slide_rate) < RATE
 

@@ -29,15 +29,11 @@ zero with the sign of the half angle, as the rod itself does. At r = 0 a straigh
 direction that could be told: the pose is indeterminate, not zero. A bent one (h ≠ 0) is at a
 toggle.
 
-Rates, from the velocity of the rod's point at D, which is along û. With OA the crank::
+Rates, from the velocity of the rod's point at D, which is along û. With OA the crank, and p and q
+of `CrankDiagonal.swing`, which are OA along AD and across it, in parts of s::
 
-    OA·AD / s² = a·((d − a)/s² − 2d·(sin(φ/2)/s)²)        =: p
-    OA·n̂AD/ s² = 2ad·sin(φ/2)·cos(φ/2)/s²                 =: q     (n̂AD: AD turned left)
     ω3 = −ω2·(OA·û)/r        = −ω2·(p − q·h/r)
     ṙ  = ω3·h + ω2·(OA·n̂)    = ω3·h + ω2·(r·q + h·p) = ω2·q·(r + h²/r)
-
-p is written with the half angle: where A meets D both OA·AD and s² vanish, and their quotient does
-not.
 """
 
 from __future__ import annotations
@@ -45,7 +41,7 @@ from __future__ import annotations
 from math import atan2, sqrt
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import CrankDiagonal, margin, reach, SMALLEST
+from linkage_ros.kinematics.diagonal import CrankDiagonal, Diagonal, margin, reach, SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.tuples import new
 
@@ -68,8 +64,8 @@ class RPRPose(NamedTuple):
     slide
         r, from the foot of A on the line to the swivel, along the line, in the unit of the
         lengths.
-    p, q
-        The quotients of the derivation, of which the rates consist.
+    diagonal
+        From A to D.
 
     """
 
@@ -77,8 +73,7 @@ class RPRPose(NamedTuple):
     gap: float
     rod: float
     slide: float
-    p: float
-    q: float
+    diagonal: Diagonal
 
 
 class RPRDyad:
@@ -103,30 +98,29 @@ class RPRDyad:
         self._diagonal = CrankDiagonal(a, d)
         self.sides = (a, d, offset)
         self.fold_margin = margin(max(a, d), -min(a, d), -abs(offset))
-        self._constants = (a, d, offset, float(sign), self.fold_margin, self._diagonal.least)
+        self._constants = (offset, float(sign), self.fold_margin, self._diagonal.least)
 
     def close(self, phi: float) -> RPRPose:
         """Return the pose for the crank direction φ, in [rad] in the frame of the loop."""
-        a, d, offset, sign, fold, least = self._constants
-        s, direction, near, _, half_sine, half_cosine = self._diagonal.at(phi)
+        offset, sign, fold, least = self._constants
+        diagonal = self._diagonal.at(phi)
+        s, direction, near, _, _, _ = diagonal
         if s < SMALLEST:
             status = Status.OPEN if fold < 0.0 else Status.INDETERMINATE
-            return RPRPose(status, -fold, 0.0, 0.0, 0.0, 0.0)
+            return RPRPose(status, -fold, 0.0, 0.0, diagonal)
         root_fold, gap = reach(fold, near, s + least)
         if gap:
-            return RPRPose(Status.OPEN, gap, 0.0, 0.0, 0.0, 0.0)
+            return RPRPose(Status.OPEN, gap, 0.0, 0.0, diagonal)
 
         slide = sign * root_fold * sqrt(s + abs(offset))
         rod = direction - atan2(offset, slide)
-        half_sine /= s
-        p = a * ((d - a) / s / s - 2.0 * d * half_sine * half_sine)
-        q = 2.0 * a * d * half_sine * (half_cosine / s)
-        return new(RPRPose, (_CLOSED if slide else _TOGGLE, 0.0, rod, slide, p, q))
+        return new(RPRPose, (_CLOSED if slide else _TOGGLE, 0.0, rod, slide, diagonal))
 
-    def rates(self, _phi: float, pose: RPRPose, crank_rate: float) -> tuple[float, float]:
+    def rates(self, pose: RPRPose, crank_rate: float) -> tuple[float, float]:
         """Return ω3, in [rad/s], and ṙ, in lengths a second, at the crank rate ω2, in [rad/s]."""
-        _, _, offset, _, _, _ = self._constants
-        _, _, _, slide, p, q = pose
+        _, _, offset = self.sides
+        p, q = self._diagonal.swing(pose.diagonal)
+        slide = pose.slide
         slope = offset / slide
         # ω3·h and ω2·h·p would cancel: all of ṙ, where the rod's rate is at its extreme.
         return -crank_rate * (p - q * slope), crank_rate * q * (slide + offset * slope)

@@ -45,12 +45,10 @@ a|), or far/√(s + a + d), which changes sign with the half angle: the motion p
 point as the linkage itself does, at any step and with no memory (`reach`).
 
 Rates, with OA the crank, from the loop's velocity equation multiplied by DB and by AB, and with OA
-taken along the diagonal and across it (p and q, as in `rpr`)::
+taken along the diagonal and across it (p and q of `CrankDiagonal.swing`)::
 
     ω3 = −ω2·(OA × DB)/(AB × DB) = −ω2·(p − q·cot(σ·γ'))
     ω4 = −ω2·(OA × AB)/(AB × DB) = −ω2·(p − q·cot(σ·β))
-    p = OA·AD/s² = a·((d − a)/s² − 2d·(sin(φ/2)/s)²)
-    q = 2ad·sin(φ/2)·cos(φ/2)/s²
     cot(σ·β)  = (P·Fc − Fb·Fs)/(4·AB × DB) = (b² − c² + s²)/(2·AB × DB)
     cot(σ·γ') = (Fc·Fs − P·Fb)/(4·AB × DB) = (b² − c² − s²)/(2·AB × DB)
 
@@ -175,14 +173,12 @@ class RRRDyad:
         status = _CLOSED if cross else _TOGGLE
         return new(RRRPose, (status, 0.0, coupler, rocker, cross, diagonal, halves))
 
-    def rates(self, _phi: float, pose: RRRPose, crank_rate: float) -> tuple[float, float]:
+    def rates(self, pose: RRRPose, crank_rate: float) -> tuple[float, float]:
         """Return ω3 and ω4, in [rad/s], of a closed pose at the crank rate ω2, in [rad/s]."""
-        a, b, c, d = self.sides
-        s, _, _, _, half_sine, half_cosine = pose.diagonal
+        _, b, c, _ = self.sides
+        s = pose.diagonal.length
+        p, q = self._diagonal.swing(pose.diagonal)
         beta_y, beta_x, gamma_y, gamma_x = pose.halves
-        half_sine /= s
-        p = a * ((d - a) / s / s - 2.0 * d * half_sine * half_sine)
-        q = 2.0 * a * d * half_sine * (half_cosine / s)
         if s < min(b, c):
             square, difference = s * (s / pose.cross), (b - c) * ((b + c) / pose.cross)
             cot_beta, cot_gamma = 0.5 * (difference + square), 0.5 * (difference - square)
