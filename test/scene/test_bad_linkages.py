@@ -56,7 +56,7 @@ LINKAGES = {
     'shorthand and links': (FOUR_BAR + b'links: {}', ':2: links: unknown key; known: four_bar'),
     'closes nowhere': (
         FOUR_BAR.replace(b'0.1}', b'1.0}'),
-        ':1: four_bar: the loop of 0.04, 0.12, 0.08, 1 m closes at no crank angle; the longest link',
+        ':1: four_bar: the loop of 0.04, 0.12, 0.08, 1 m closes at no crank angle; the longest',
     ),
     'swivel that is no point': (
         SLIDER.replace(b', 0.1', b''),
