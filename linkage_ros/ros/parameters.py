@@ -21,16 +21,14 @@ from rcl_interfaces.msg import (
     FloatingPointRange,
     ParameterDescriptor,
     ParameterType,
-    SetParametersResult,
 )
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 _PERIOD = FloatingPointRange(from_value=0.1, to_value=3600.0)
 
 
 def declare_parameters(node: Node) -> None:
-    """Declare the parameters of the linkage node."""
+    """Declare the parameters of the linkage node; rclpy itself refuses what is out of bounds."""
     for name, default, description in (
         ('scene', '', 'Path of the scene file'),
         ('runs_directory', '', "Folder of the bags; '' for the scene's own"),
@@ -65,18 +63,3 @@ def declare_parameters(node: Node) -> None:
                 additional_constraints='may be changed at any time',
             ),
         )
-    node.add_on_set_parameters_callback(_explain)
-
-
-def _explain(parameters: list[Parameter]) -> SetParametersResult:
-    """Say why a period is refused: rclpy's own answer to a NaN is to take it."""
-    for parameter in parameters:
-        if parameter.name in ('diagnostics_period', 'warning_period'):
-            value = parameter.value
-            if not _PERIOD.from_value <= value <= _PERIOD.to_value:
-                return SetParametersResult(
-                    successful=False,
-                    reason=f'{parameter.name}: {value} is out of bounds; '
-                    f'set {_PERIOD.from_value} to {_PERIOD.to_value} s',
-                )
-    return SetParametersResult(successful=True)
