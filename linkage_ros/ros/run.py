@@ -18,7 +18,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from math import inf
 import sys
 from threading import Event, Thread
@@ -27,7 +26,7 @@ from typing import Protocol
 
 from linkage_ros.ros.node import LinkageNode
 import rclpy
-from rclpy.executors import ShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
@@ -136,8 +135,9 @@ def _spin(
         if node.loop is not None and node.loop.failure:
             break
     served = serving.is_alive()
+    # To shut the executor down while it waits is a race that it can lose, and then waits for ever.
+    # The node's watch wakes it, several times a second.
     ended.set()
-    executor.shutdown()
     serving.join()
     if view is not None:
         view.close()
@@ -149,8 +149,7 @@ def _serve(node: LinkageNode, executor: SingleThreadedExecutor, ended: Event) ->
     # As the tick: a defect here must neither vanish with its thread nor show a traceback.
     try:
         while not ended.is_set():
-            with suppress(ShutdownException):
-                executor.spin_once()
+            executor.spin_once()
     except Exception as error:  # noqa: BLE001 (see above)
         node.get_logger().error(f'the executor has stopped: {type(error).__name__}: {error}')
 
