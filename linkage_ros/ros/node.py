@@ -132,7 +132,7 @@ class LinkageNode(LifecycleNode):
 
     @_reporting
     def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
-        """Load the scene and build what it calls for."""
+        """Load the scene and prove that it can be built."""
         file = self.get_parameter('scene').value
         try:
             if not file:
@@ -140,12 +140,12 @@ class LinkageNode(LifecycleNode):
                     'parameter scene', "'' names no file", 'start with --ros-args -p scene:=FILE'
                 )
             scene = load_scene(file)
-            loop = self._build_loop(scene)
+            Pipeline(scene)  # what it calls for is proven now, not at the first tick
         except LinkageError as error:
             self.failure = error
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
-        self.failure, self.scene, self.loop = None, scene, loop
+        self.failure, self.scene = None, scene
         return TransitionCallbackReturn.SUCCESS
 
     @_reporting
@@ -153,6 +153,7 @@ class LinkageNode(LifecycleNode):
         """Start to tick, and to record where the scene says so."""
         assert self.scene is not None
         self.loop = self._build_loop(self.scene)
+        self._warnings = Warnings(self.get_logger())  # as new as the counts that it compares
         while self._crank.handle.take_message(JointState, True) is not None:
             pass  # what came before this moment is not of this run
         self._before = Snapshot.of(self.loop.counts, time.monotonic_ns())
@@ -302,12 +303,13 @@ class LinkageNode(LifecycleNode):
                 self.get_parameter('warning_period').value,
             )
         simulated = self.get_parameter('use_sim_time').value
+        clock = self.get_clock().now()
         now = Snapshot.of(self.loop.counts, time.monotonic_ns())
         health = Health(
             node=self.get_name(),
             scene=self.scene.name,
             rate=0.0 if simulated else self.scene.rate,
-            clock=self.get_clock().now().nanoseconds,
+            clock=clock.nanoseconds,
             max_age=self.scene.drive.max_age,
             crank_topic=self.crank_topic,
             publishers=publishers,
@@ -318,12 +320,11 @@ class LinkageNode(LifecycleNode):
         )
         self._before = now
         message = DiagnosticArray(status=health.statuses())
-        message.header.stamp = self.get_clock().now().to_msg()
+        message.header.stamp = clock.to_msg()
         data = serialize_message(message)
         self._diagnostics.publish(data)
         if self.loop.recorder is not None:
-            stamp = time.time_ns()
-            self.loop.recorder.offer(DIAGNOSTICS, stamp, stamp, data)
+            self.loop.recorder.offer(DIAGNOSTICS, clock.nanoseconds, clock.nanoseconds, data)
 
     def _crank_publishers(self) -> list[str]:
         """Return who publishes the crank; where others share the topic, no one can tell."""

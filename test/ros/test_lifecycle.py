@@ -235,3 +235,19 @@ def test_a_refused_parameter_says_why(graph, write_scene, start):
     assert all(descriptor.description for descriptor in answer.descriptors)
     assert node.end() == 0
     assert 'Traceback' not in node.log
+
+
+def test_a_second_activation_warns_of_its_own_ticks(write_scene, start, change, turn):
+    # Reachable within 1.32 rad only; the first run is open for longer than the second.
+    linkage = 'four_bar: {a: 1.0, b: 1.0, c: 1.0, d: 2.0}'
+    scene = write_scene('again', 'rate: 200', linkage)
+    node = start(scene, *BY_HAND, '-p', 'warning_period:=60.0', ready='')
+    assert change(Transition.TRANSITION_CONFIGURE)
+    for number, seconds in ((1, 2.0), (2, 0.8)):
+        assert change(Transition.TRANSITION_ACTIVATE)
+        turn(seconds, angle=3.0)
+        assert change(Transition.TRANSITION_DEACTIVATE)
+        warnings = [line for line in node.log.splitlines() if ' ticks open by ' in line]
+        assert len(warnings) == number
+        assert int(warnings[-1].split(' ticks open')[0].split()[-1]) > 0
+    assert node.end() == 0
