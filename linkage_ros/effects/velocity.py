@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from linkage_ros.effects.stage import Motion, Stage
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.scene.yaml_file import Section
+from linkage_ros.scene.section import Section
 from linkage_ros.tuples import new
 
 NEEDS_CRANK_RATE = True

@@ -14,23 +14,25 @@
 
 
 """
-The loop closure of a linkage: from the crank's angle to the published joints.
+The loop closure of a linkage: from its inputs to its joints, and to every point of its links.
 
 Position first; what a scene calls for beyond it starts from the position and repeats nothing.
 """
 
 from __future__ import annotations
 
-from math import cos, hypot, sin
+from cmath import rect
+from functools import cached_property
 from typing import Any, NamedTuple
 
-from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.assembly import find_loop, Loop
-from linkage_ros.kinematics.dyads.rpr import RPRPose
-from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose
+from linkage_ros.kinematics.checks import check
+from linkage_ros.kinematics.groups import find_groups, Structure
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.mobility import crank_ranges, CrankRange
+from linkage_ros.kinematics.nearness import critical_inputs, Nearness, nearness
+from linkage_ros.kinematics.ranges import input_ranges, InputRange
+from linkage_ros.kinematics.solution import Planner
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import Pose, State
 from linkage_ros.tuples import new
 
 _CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
@@ -38,29 +40,72 @@ _CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
 
 class Position(NamedTuple):
     """
-    The linkage at one crank angle.
+    The linkage at one state of its inputs.
 
     Attributes
     ----------
     status
-        Whether the loop closes.
+        Whether every loop closes.
     gap
-        What the links miss each other by where it is open, else 0, in [m].
+        What links miss each other by where one does not, else 0, in [m].
     joints
-        Values of the published joints, in the order of the linkage, in [rad] or [m]; empty where
-        the loop is open or indeterminate.
-    phi
-        Direction of the crank in the frame of the loop, in [rad].
-    pose
-        The dyad's own coordinates.
+        Values of the published joints, in the order of the linkage, in [rad] or [m]; empty where a
+        loop is open or indeterminate.
+    state
+        What the steps have found.
+    poses
+        The steps' own poses; the last one is that of the step that failed, if one did.
 
     """
 
     status: Status
     gap: float
     joints: tuple[float, ...]
-    phi: float
-    pose: RRRPose | RPRPose
+    state: State
+    poses: list[Pose]
+
+
+class Velocity(NamedTuple):
+    """
+    The rates of a linkage.
+
+    Attributes
+    ----------
+    joints
+        Of the published joints, in [rad/s] or [m/s].
+    state, rates
+        What the steps have found.
+
+    """
+
+    joints: tuple[float, ...]
+    state: State
+    rates: list[Any]
+
+
+class Acceleration(NamedTuple):
+    """
+    The accelerations of a linkage.
+
+    Attributes
+    ----------
+    joints
+        Of the published joints, in [rad/s²] or [m/s²].
+    state
+        What the steps have found.
+
+    """
+
+    joints: tuple[float, ...]
+    state: State
+
+
+class PointMotion(NamedTuple):
+    """Place, velocity and acceleration of a point in the frame of the ground, in [m]."""
+
+    place: complex
+    velocity: complex
+    acceleration: complex
 
 
 class Closure:
@@ -75,110 +120,197 @@ class Closure:
     Raises
     ------
     DefinitionError
-        Where no dyad closes the linkage, or where it closes at no crank angle.
+        Where the parts do not make a linkage that the inputs move, or that closes nowhere.
 
     """
 
-    __slots__ = ('_crank_offset', '_dyad', '_terms', 'crank_ranges', 'loop', 'turning')
-
-    loop: Loop
-    turning: tuple[bool, ...]
-    """For each published joint: whether it turns (an angle) or slides (a length)."""
-    crank_ranges: tuple[CrankRange, ...]
-    """Where the loop closes."""
-
     def __init__(self, linkage: Linkage) -> None:
-        self.loop = find_loop(linkage)
-        self.crank_ranges = crank_ranges(self.loop)
-        if not self.crank_ranges:
-            sides = ', '.join(f'{side * self.loop.scale:g}' for side in self.loop.dyad.sides)
-            raise DefinitionError(
-                'links',
-                f'the loop of {sides} m closes at no crank angle',
-                'the longest link must be shorter than the other three together',
-            )
+        check(linkage)
+        self.linkage = linkage
+        self.structure: Structure = find_groups(linkage)
+        planner = Planner(linkage, self.structure)
+        self.scale = planner.scale
+        """Metres in the unit of length of the steps."""
+        steps = tuple(planner.steps)
+        self.step_groups = tuple(planner.step_groups)
+        """For each step the number of the group that it belongs to."""
         self.turning = tuple(isinstance(j, RevoluteJoint) for j in linkage.joints.values())
-        self._dyad = self.loop.dyad
-        self._crank_offset = self.loop.crank_offset
-        self._terms = tuple(
-            tuple(self._joint(name, joint)) for name, joint in linkage.joints.items()
-        )
+        """For each published joint: whether it turns (an angle) or slides (a length)."""
+        self.angles, self.slides = planner.angles, planner.slides
+        self._terms = tuple(self._term(joint) for joint in linkage.joints.values())
+        self._rate_terms = tuple((i, j, factor) for i, j, factor, _ in self._terms)
+        self._point_index = {
+            (link, name): planner.place(link, point)
+            for link, points in planner.points.items()
+            for name, point in points.items()
+        }
+        self.steps = steps
+        self._more_steps = tuple(planner.steps[len(steps) :])
+        self._closing = tuple(step.close for step in steps)
+        self._rating = tuple(step.rates for step in steps)
+        self._accelerating = tuple(step.accelerations for step in steps)
+        factors = [1.0 / self.scale if given.slider else 1.0 for given in linkage.inputs]
+        self._factors = None if set(factors) == {1.0} else factors
 
-    def position(self, crank_angle: float) -> Position:
+    def position(self, *inputs: float) -> Position:
         """
-        Close the loop at a crank angle.
+        Close the loops.
 
         Parameters
         ----------
-        crank_angle
-            Angle of the input joint, in [rad], finite.
+        *inputs
+            Values of the driven joints, in [rad] or [m], finite.
 
         """
-        phi = crank_angle + self._crank_offset
-        pose = self._dyad.close(phi)
-        status, gap, first, second, *_ = pose
-        if status is not _CLOSED and status is not _TOGGLE:
-            return Position(status, gap * self.loop.scale, (), phi, pose)
+        x = [0.0, *inputs] if self._factors is None else self._scaled(inputs)
+        state = new(State, (x, []))
+        poses: list[Pose] = []
+        status = _CLOSED
+        for close in self._closing:
+            pose = close(state)
+            poses.append(pose)
+            found = pose[0]
+            if found is not _CLOSED:
+                if found is not _TOGGLE:
+                    return Position(found, pose[1] * self.scale, (), state, poses)
+                status = _TOGGLE
         joints: tuple[float, ...] = ()
-        for t, u, v, w in self._terms:
-            joints += (t * crank_angle + u * first + v * second + w,)
-        return new(Position, (status, 0.0, joints, phi, pose))
+        for i, j, factor, constant in self._terms:
+            joints += (factor * (x[i] - x[j]) + constant,)
+        return new(Position, (status, 0.0, joints, state, poses))
 
-    def rates(self, position: Position, crank_rate: float) -> tuple[float, ...]:
+    def velocity(self, position: Position, *rates: float) -> Velocity:
         """
-        Return the rates of the published joints, in [rad/s] or [m/s].
+        Return the rates at a closed position; at a toggle there are none.
 
         Parameters
         ----------
         position
-            A closed position; a rate at a toggle does not exist.
-        crank_rate
-            Rate of the input joint, in [rad/s].
+            A closed position.
+        *rates
+            Of the driven joints, in [rad/s] or [m/s].
 
         """
-        # The pose came out of this very dyad: the pair matches, which no annotation can say.
-        pose: Any = position.pose
-        first, second = self._dyad.rates(pose, crank_rate)
-        rates: tuple[float, ...] = ()
-        for t, u, v, _ in self._terms:
-            rates += (t * crank_rate + u * first + v * second,)
-        return rates
+        v = [0.0, *rates] if self._factors is None else self._scaled(rates)
+        _, _, _, state, poses = position
+        speeds = new(State, (v, []))
+        found = []
+        for rate, pose in zip(self._rating, poses, strict=True):
+            found.append(rate(pose, state, speeds))
+        return new(Velocity, (self._joints(v), speeds, found))
+
+    def acceleration(
+        self, position: Position, velocity: Velocity, *accelerations: float
+    ) -> Acceleration:
+        """
+        Return the accelerations at a closed position.
+
+        Parameters
+        ----------
+        position, velocity
+            As this closure has found them.
+        *accelerations
+            Of the driven joints, in [rad/s²] or [m/s²].
+
+        """
+        a = [0.0, *accelerations] if self._factors is None else self._scaled(accelerations)
+        _, _, _, state, poses = position
+        _, speeds, rates = velocity
+        changes = new(State, (a, []))
+        for accelerate, pose, rate in zip(self._accelerating, poses, rates, strict=True):
+            accelerate(pose, rate, state, speeds, changes)
+        return new(Acceleration, (self._joints(a), changes))
+
+    def points(self, position: Position) -> dict[tuple[str, str], complex]:
+        """Return every point of every link, by link and name, in the ground's frame, in [m]."""
+        places = self._all(position).pins
+        return {key: places[i] * self.scale for key, i in self._point_index.items()}
+
+    def point_motion(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> dict[tuple[str, str], PointMotion]:
+        """Return place, velocity and acceleration of every point of every link."""
+        state = self._all(position)
+        speeds = State(velocity.state.coordinates, list(velocity.state.pins))
+        changes = State(acceleration.state.coordinates, list(acceleration.state.pins))
+        for step in self._more_steps:
+            step.rates((), state, speeds)
+            step.accelerations((), None, state, speeds, changes)
+        return {
+            key: PointMotion(*(values.pins[i] * self.scale for values in (state, speeds, changes)))
+            for key, i in self._point_index.items()
+        }
+
+    def link_angles(self, position: Position) -> dict[str, float]:
+        """Return the angle of every link to the ground, in [rad], not wrapped."""
+        x = position.state.coordinates
+        return {link: x[angle.coordinate] + angle.constant for link, angle in self.angles.items()}
+
+    def slide_values(self, position: Position) -> dict[str, float]:
+        """Return the slide of every slider, in [m]."""
+        x = position.state.coordinates
+        return {
+            name: self.scale * (slide.sign * x[slide.coordinate] + slide.constant)
+            for name, slide in self.slides.items()
+        }
 
     def residual(self, position: Position) -> float:
         """
         Return what is left open by a closed position, in [m].
 
-        The loop is walked from the crank's pivot along crank, dyad and ground, with the angles
-        alone.
+        Every link is walked from where it is held, with its angle alone: the farthest that two of
+        them miss a pin of theirs by, or a slider its place.
         """
-        _, _, first, second, *_ = position.pose
-        x, y = cos(position.phi), sin(position.phi)
-        if isinstance(self._dyad, RRRDyad):
-            a, b, c, d = self._dyad.sides
-            x = a * x + b * cos(first) - c * cos(second) - d
-            y = a * y + b * sin(first) - c * sin(second)
-        else:
-            a, d, offset = self._dyad.sides
-            x = a * x + second * cos(first) - offset * sin(first) - d
-            y = a * y + second * sin(first) + offset * cos(first)
-        return hypot(x, y) * self.loop.scale
+        points, angles = self.points(position), self.link_angles(position)
+        worst = 0.0
+        for joint in self.structure.joints:
+            if joint.kind == 'R':
+                error = points[joint.link, joint.name] - points[joint.to, joint.name]
+            else:
+                slider = self.linkage.sliders[joint.name]
+                between = points[joint.link, slider.point] - points[joint.to, slider.through]
+                line = complex(*slider.direction) * rect(1.0, angles[joint.to])
+                along = self.slide_values(position)[joint.name]
+                error = between - along * line / abs(line)
+            worst = max(worst, abs(error))
+        return worst
 
-    def _joint(self, name: str, joint: RevoluteJoint | SlideJoint) -> list[float]:
-        """Return a published joint as a sum over crank angle and dyad coordinates."""
+    @cached_property
+    def input_ranges(self) -> tuple[InputRange, ...]:
+        """Where the single input closes every loop, in [rad] or [m]; of several inputs, none."""
+        return input_ranges(self)
+
+    @cached_property
+    def critical_inputs(self) -> tuple[float, ...]:
+        """Values of a single input at which a toggle or a change point lies, in [rad] or [m]."""
+        return critical_inputs(self)
+
+    def nearness(self, position: Position) -> Nearness:
+        """Return how near trouble a closed position is."""
+        return nearness(self, position)
+
+    def _all(self, position: Position) -> State:
+        """Return a position with all points placed, also those that no loop needs."""
+        state = State(position.state.coordinates, list(position.state.pins))
+        for step in self._more_steps:
+            step.close(state)
+        return state
+
+    def _scaled(self, values: tuple[float, ...]) -> list[float]:
+        assert self._factors is not None
+        return [0.0, *(v * factor for v, factor in zip(values, self._factors, strict=True))]
+
+    def _joints(self, values: list[float]) -> tuple[float, ...]:
+        """Return the derivatives of the published joints."""
+        joints: tuple[float, ...] = ()
+        for i, j, factor in self._rate_terms:
+            joints += (factor * (values[i] - values[j]),)
+        return joints
+
+    def _term(self, joint: RevoluteJoint | SlideJoint) -> tuple[int, int, float, float]:
+        """Return a published joint as factor·(x[i] − x[j]) + constant."""
         if isinstance(joint, SlideJoint):
-            if joint.slider not in self.loop.slides:
-                raise DefinitionError(
-                    f'joints.{name}.slider',
-                    f'{joint.slider!r} is not a slider',
-                    f'name one of {", ".join(self.loop.slides) or "(this linkage has none)"}',
-                )
-            return list(self.loop.slides[joint.slider])
-        for end in ('parent', 'child'):
-            if getattr(joint, end) not in self.loop.angles:
-                raise DefinitionError(
-                    f'joints.{name}.{end}',
-                    f'{getattr(joint, end)!r} is not a link',
-                    f'name one of {", ".join(self.loop.angles)}',
-                )
-        child, parent = self.loop.angles[joint.child], self.loop.angles[joint.parent]
-        return [c - p for c, p in zip(child, parent, strict=True)]
+            slide = self.slides[joint.slider]
+            return slide.coordinate, 0, slide.sign * self.scale, slide.constant * self.scale
+        child, parent = self.angles[joint.child], self.angles[joint.parent]
+        return child.coordinate, parent.coordinate, 1.0, child.constant - parent.constant

@@ -14,9 +14,9 @@
 
 
 """
-What a linkage is: links with named points, pins, sliders, the input and the joints to publish.
+What a linkage is: links with named points, pins, sliders, inputs and the joints to publish.
 
-Lengths are in metres, angles in radians. A point named on two links is a pin between them.
+Lengths are in metres, angles in radians. A point named on two or more links is a pin of them.
 """
 
 from __future__ import annotations
@@ -36,18 +36,23 @@ Side = Literal['left', 'right', 'ahead', 'behind']
 @dataclass(frozen=True, slots=True)
 class Slider:
     """
-    A point of one link that stays on a line of another (a pin in a slot, a rod in a swivel).
+    A point of one link that stays on a line of another.
 
     Attributes
     ----------
     point
-        Name of the point; it is named on one link only.
+        Name of the point; no point of ``along``.
     along
         Name of the link that carries the line.
     through
         Name of a point of ``along`` on the line; the slide is measured from it, in [m].
     direction
         Direction of the line in the frame of ``along``, any length but zero.
+    block
+        Name of the link that slides without turning against the line; '' where what carries the
+        point may turn about it (a pin in a slot, a rod in a swivel).
+    angle
+        Of the block less that of ``along``, in [rad].
 
     """
 
@@ -55,15 +60,23 @@ class Slider:
     along: str
     through: str
     direction: Point
+    block: str = ''
+    angle: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """The driven joint: the angle of ``child`` less that of ``parent``, named ``joint``."""
+    """
+    A driven joint, named ``joint``.
+
+    It is the angle of ``child`` less that of ``parent``, which share a pin, in [rad]; or, where
+    ``slider`` is named, the slide of that one, in [m].
+    """
 
     joint: str
-    parent: str
-    child: str
+    parent: str = ''
+    child: str = ''
+    slider: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +95,24 @@ class SlideJoint:
 
 
 @dataclass(frozen=True, slots=True)
+class Pose:
+    """
+    Where points lie, roughly, at given inputs: where an iteration starts.
+
+    Attributes
+    ----------
+    inputs
+        One value for each input, in [rad] or [m].
+    points
+        Points in the frame of the ground, in [m].
+
+    """
+
+    inputs: tuple[float, ...]
+    points: Mapping[str, Point]
+
+
+@dataclass(frozen=True, slots=True)
 class Linkage:
     """
     A planar linkage, as a linkage file says it.
@@ -90,19 +121,25 @@ class Linkage:
     ----------
     links
         For each link its points, by name, in the link's own frame, in [m].
-    input
-        The driven joint.
+    inputs
+        The driven joints.
     assembly
         For the pin or slider that closes a dyad, the side on which it lies.
     joints
         What is published, in this order.
     sliders
         The sliders, by name.
+    traced
+        Names of points whose curves matter.
+    pose
+        Where an iteration starts; only for what no dyad covers.
 
     """
 
     links: Mapping[str, Mapping[str, Point]]
-    input: Input  # noqa: A003
+    inputs: tuple[Input, ...]
     assembly: Mapping[str, Side]
     joints: Mapping[str, RevoluteJoint | SlideJoint]
     sliders: Mapping[str, Slider]
+    traced: tuple[str, ...] = ()
+    pose: Pose | None = None

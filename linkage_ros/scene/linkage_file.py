@@ -21,10 +21,17 @@ from typing import Any
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
-from linkage_ros.scene.yaml_file import Section
+from linkage_ros.kinematics.linkage import (
+    Input,
+    Linkage,
+    Pose,
+    RevoluteJoint,
+    SlideJoint,
+    Slider,
+)
+from linkage_ros.scene.section import Section
 
-_KEYS = ('links', 'input', 'assembly', 'sliders', 'joints')
+_KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose')
 _FARTHEST = 1e9
 """Coordinates beyond this, in [m], are no machine's; below it no square overflows."""
 
@@ -57,11 +64,9 @@ def _linkage(content: Section) -> Linkage:
         link = links.section(name)
         points[name] = {point: link.point(point, most=_FARTHEST) for point in link}
 
-    driven = content.section('input')
-    crank = Input(driven.text('joint'), driven.text('parent'), driven.text('child'))
-    driven.finish()
+    inputs = tuple(_input(driven) for driven in content.sections('input'))
 
-    assembly = content.section('assembly')
+    assembly = content.section('assembly', required=False)
     sides = {
         name: assembly.choice(name, ('left', 'right', 'ahead', 'behind')) for name in assembly
     }
@@ -70,25 +75,50 @@ def _linkage(content: Section) -> Linkage:
     joints = content.section('joints')
     if not list(joints):
         raise content.error('joints', 'publishes nothing', 'name a joint')
-    if crank.joint in joints:
-        raise joints.error(crank.joint, 'is the input joint', 'publish the dependent joints')
+    for driven in inputs:
+        if driven.joint in joints:
+            raise joints.error(driven.joint, 'is the input joint', 'publish the dependent joints')
     return Linkage(
         points,
-        crank,
+        inputs,
         sides,  # type: ignore[arg-type]  # the choice above is the Literal
         {name: _joint(joints.section(name)) for name in joints},
         {name: _slider(sliders.section(name)) for name in sliders},
+        tuple(content.texts('traced')),
+        _pose(content.section('pose')) if 'pose' in content else None,
     )
 
 
+def _input(content: Section) -> Input:
+    if 'slider' in content:
+        driven = Input(content.text('joint'), slider=content.text('slider'))
+    else:
+        driven = Input(content.text('joint'), content.text('parent'), content.text('child'))
+    content.finish(('slider',))
+    return driven
+
+
+def _pose(content: Section) -> Pose:
+    inputs = tuple(content.numbers('inputs', most=_FARTHEST))
+    points = content.section('points')
+    pose = Pose(inputs, {name: points.point(name, most=_FARTHEST) for name in points})
+    content.finish()
+    return pose
+
+
 def _slider(content: Section) -> Slider:
+    block = content.text('block', '')
     slider = Slider(
         content.text('point'),
         content.text('along'),
         content.text('through'),
         content.point('direction', most=_FARTHEST),
+        block,
+        content.number('angle', 0.0, least=-_FARTHEST, most=_FARTHEST, unit='rad')
+        if block
+        else 0.0,
     )
-    content.finish()
+    content.finish(('block', 'angle'))
     return slider
 
 
@@ -104,7 +134,13 @@ def _joint(content: Section) -> RevoluteJoint | SlideJoint:
 
 def _closable(content: Section, linkage: Linkage, shorthand: str = '') -> Linkage:
     try:
-        Closure(linkage)
+        closure = Closure(linkage)
+        if len(linkage.inputs) == 1 and not closure.input_ranges:
+            raise DefinitionError(
+                'links',
+                'the loops close at no value of the input',
+                'no link may be longer than the others of its loop together; see also assembly',
+            )
     except DefinitionError as error:
         raise content.error(shorthand or error.where, error.reason, error.remedy) from None
     return linkage

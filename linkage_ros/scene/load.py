@@ -25,7 +25,8 @@ from linkage_ros.drives.topic import TopicParameters
 from linkage_ros.errors import quoted
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.scene import RecordParameters, Scene
-from linkage_ros.scene.yaml_file import parse_yaml, read_yaml, Section
+from linkage_ros.scene.section import Section
+from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
 """Names of the files of a scene where a bag carries them."""

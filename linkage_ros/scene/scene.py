@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 from linkage_ros.drives.topic import TopicParameters
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.scene.yaml_file import Section
+from linkage_ros.scene.section import Section
 
 
 @dataclass(frozen=True, slots=True)

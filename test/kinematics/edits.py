@@ -29,10 +29,12 @@ def fields(linkage: Linkage) -> Fields:
     """Return the fields of a linkage, which may be changed."""
     return {
         'links': {name: dict(points) for name, points in linkage.links.items()},
-        'input': linkage.input,
+        'inputs': linkage.inputs,
         'assembly': dict(linkage.assembly),
         'joints': dict(linkage.joints),
         'sliders': dict(linkage.sliders),
+        'traced': linkage.traced,
+        'pose': linkage.pose,
     }
 
 

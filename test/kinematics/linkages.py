@@ -22,6 +22,7 @@ from linkage_ros.kinematics.linkage import (
     Input,
     Linkage,
     Point,
+    Pose,
     RevoluteJoint,
     Side,
     SlideJoint,
@@ -59,7 +60,7 @@ def four_bar_linkage(
             name: placed(frames.get(name, PLAIN), points) if frames else points
             for name, points in plain.items()
         },
-        input=Input('crank_joint', 'ground', 'crank'),
+        inputs=(Input('crank_joint', 'ground', 'crank'),),
         assembly={'B': side},
         joints={
             'coupler_joint': RevoluteJoint('crank', 'coupler'),
@@ -94,11 +95,50 @@ def inverted_slider_crank_linkage(
             name: placed(frames.get(name, PLAIN), points) if frames else points
             for name, points in plain.items()
         },
-        input=Input('crank_joint', 'ground', 'crank'),
+        inputs=(Input('crank_joint', 'ground', 'crank'),),
         assembly={'swivel': side},
         joints={
             'rod_joint': RevoluteJoint('crank', 'rod'),
             'slide_joint': SlideJoint('swivel'),
         },
         sliders={'swivel': Slider('C', 'rod', 'T', (3.0 * cos(angle), 3.0 * sin(angle)))},
+    )
+
+
+def scotch_yoke_linkage(a: float) -> Linkage:
+    """Return a Scotch yoke: a crank pin in the upright slot of a yoke that slides along x."""
+    return Linkage(
+        links={
+            'ground': {'O': (0.0, 0.0)},
+            'crank': {'O': (0.0, 0.0), 'A': (a, 0.0)},
+            'yoke': {'U': (0.0, 0.0)},
+        },
+        inputs=(Input('crank_joint', 'ground', 'crank'),),
+        assembly={},
+        joints={'stroke': SlideJoint('way'), 'slot_joint': SlideJoint('slot')},
+        sliders={
+            'slot': Slider('A', 'yoke', 'U', (0.0, 1.0)),
+            'way': Slider('U', 'ground', 'O', (1.0, 0.0), 'yoke'),
+        },
+    )
+
+
+def class_3_linkage() -> Linkage:
+    """Return a platform on three arms, one of them on the crank: no dyad covers it."""
+    return Linkage(
+        links={
+            'ground': {'O': (0.0, 0.0), 'E': (1.8, 0.6), 'F': (0.5, 1.6)},
+            'crank': {'O': (0.0, 0.0), 'A': (0.4, 0.0)},
+            'platform': {'P1': (0.0, 0.0), 'P2': (0.8, 0.0), 'P3': (0.4, 0.5)},
+            'arm_1': {'A': (0.0, 0.0), 'P1': (0.6, 0.0)},
+            'arm_2': {'E': (0.0, 0.0), 'P2': (0.7, 0.0)},
+            'arm_3': {'F': (0.0, 0.0), 'P3': (0.6, 0.0)},
+        },
+        inputs=(Input('crank_joint', 'ground', 'crank'),),
+        assembly={},
+        joints={
+            name: RevoluteJoint('ground', name) for name in ('platform', 'arm_1', 'arm_2', 'arm_3')
+        },
+        sliders={},
+        pose=Pose((1.0,), {'P1': (0.4, 0.7), 'P2': (1.2, 0.8), 'P3': (0.8, 1.2)}),
     )

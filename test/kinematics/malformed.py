@@ -18,13 +18,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkage_ros.kinematics.linkage import Input, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.kinematics.linkage import Input, Pose, RevoluteJoint, SlideJoint, Slider
 
 from .edits import Change, drop, Fields, fields, put, rename
-from .linkages import four_bar_linkage, inverted_slider_crank_linkage
+from .linkages import (
+    class_3_linkage,
+    four_bar_linkage,
+    inverted_slider_crank_linkage,
+    scotch_yoke_linkage,
+)
 
 FOUR_BAR = fields(four_bar_linkage((0.04, 0.12, 0.08, 0.1), 'left'))
 SLIDER_CRANK = fields(inverted_slider_crank_linkage((0.15, 0.27, 0.0), 'ahead', along=0.3))
+CLASS_3 = fields(class_3_linkage())
+YOKE = fields(scotch_yoke_linkage(0.04))
 
 
 def swivel(**changes: Any) -> Change:
@@ -36,23 +43,59 @@ def swivel(**changes: Any) -> Change:
 # What is wrong: the linkage it is wrong in, the change, the key named, and words of the remedy.
 MALFORMED: dict[str, tuple[Fields, Change, str, str]] = {
     'no ground': (FOUR_BAR, rename('ground', 'frame'), 'links', "name the frame 'ground'"),
-    'a crank that is not on the ground': (
+    'no input': (FOUR_BAR, put('inputs', ()), 'input', 'name a joint that is'),
+    'an input between links without a pin': (
         FOUR_BAR,
-        put('input', Input('crank_joint', 'rocker', 'crank')),
-        'input.parent',
-        'parent: ground',
+        put('inputs', (Input('crank_joint', 'rocker', 'crank'),)),
+        'links.crank',
+        "name the pin about which 'crank_joint' turns on both",
     ),
-    'an unknown crank': (
+    'an input of an unknown link': (
         FOUR_BAR,
-        put('input', Input('crank_joint', 'ground', 'krank')),
+        put('inputs', (Input('crank_joint', 'ground', 'krank'),)),
         'input.child',
-        'name one of coupler, crank, rocker',
+        'name one of coupler, crank, ground, rocker',
     ),
-    'a ground that is driven': (
+    'an input of a link against itself': (
         FOUR_BAR,
-        put('input', Input('crank_joint', 'ground', 'ground')),
+        put('inputs', (Input('crank_joint', 'ground', 'ground'),)),
         'input.child',
-        'name one of coupler, crank, rocker',
+        'name two links',
+    ),
+    'an input of an unknown slider': (
+        FOUR_BAR,
+        put('inputs', (Input('cylinder', slider='bore'),)),
+        'input.slider',
+        'this linkage has none',
+    ),
+    'an input twice': (
+        FOUR_BAR,
+        put('inputs', (Input('crank_joint', 'ground', 'crank'),) * 2),
+        'input',
+        'give each input its own name',
+    ),
+    'one input too many': (
+        FOUR_BAR,
+        put(
+            'inputs',
+            (Input('crank_joint', 'ground', 'crank'), Input('rocker_joint', 'ground', 'rocker')),
+        ),
+        'links.coupler',
+        'take one of them away',
+    ),
+    'a loop of inputs': (
+        FOUR_BAR,
+        put(
+            'inputs',
+            (
+                Input('one', 'ground', 'crank'),
+                Input('two', 'crank', 'coupler'),
+                Input('three', 'coupler', 'rocker'),
+                Input('four', 'rocker', 'ground'),
+            ),
+        ),
+        'input.four',
+        'leave one of the inputs out',
     ),
     'a link of one point': (
         FOUR_BAR,
@@ -81,26 +124,44 @@ MALFORMED: dict[str, tuple[Fields, Change, str, str]] = {
     'a crank without a pin on the ground': (
         FOUR_BAR,
         put('links', 'crank', {'Q': (0.0, 0.0), 'A': (0.04, 0.0)}),
-        'links',
-        'the crank turns about a point of the ground',
+        'links.crank',
+        'name the pin about which',
     ),
     'a coupler without a pin on the crank': (
         FOUR_BAR,
         put('links', 'crank', {'O': (0.0, 0.0), 'Q': (0.04, 0.0)}),
-        'links.rocker',
-        'four-bar',
+        'links.coupler',
+        'join it to one more link',
     ),
     'a rocker without a pin on the ground': (
         FOUR_BAR,
         put('links', 'ground', {'O': (0.0, 0.0), 'Q': (0.1, 0.0)}),
         'links.rocker',
-        'four-bar',
+        'join it to one more link',
     ),
     'a coupler and a rocker that are not pinned': (
         FOUR_BAR,
         put('links', 'rocker', {'D': (0.0, 0.0), 'Q': (0.08, 0.0)}),
-        'links.rocker',
-        'four-bar',
+        'links.coupler',
+        'join it to one more link',
+    ),
+    'a part that hangs in the air': (
+        FOUR_BAR,
+        put('links', 'fifth', {'S': (0.0, 0.0), 'T': (0.08, 0.0)}),
+        'links.fifth',
+        'name one of its points on another link too',
+    ),
+    'a link that swings from a pin': (
+        FOUR_BAR,
+        put('links', 'fifth', {'B': (0.0, 0.0), 'E': (1.0, 0.0)}),
+        'links.fifth',
+        'join it to one more link',
+    ),
+    'a link that holds crank and ground': (
+        FOUR_BAR,
+        put('links', 'fifth', {'A': (0.0, 0.0), 'D': (1.0, 0.0)}),
+        'links.fifth',
+        'take one of them away',
     ),
     'no assembly': (FOUR_BAR, drop('assembly', 'B'), 'assembly', 'write B: left or right'),
     'an assembly of a pin that closes nothing': (
@@ -143,19 +204,19 @@ MALFORMED: dict[str, tuple[Fields, Change, str, str]] = {
         SLIDER_CRANK,
         swivel(point='U'),
         'sliders.swivel.point',
-        "one link other than 'rod'",
-    ),
-    'a slider of a pin': (
-        SLIDER_CRANK,
-        swivel(point='O'),
-        'sliders.swivel.point',
-        "one link other than 'rod'",
+        "a link other than 'rod'",
     ),
     'a slider of its own link': (
         SLIDER_CRANK,
         swivel(point='T'),
         'sliders.swivel.point',
-        "one link other than 'rod'",
+        "a link other than 'rod'",
+    ),
+    'a block that does not carry the point': (
+        SLIDER_CRANK,
+        swivel(block='crank'),
+        'sliders.swivel.block',
+        'name one of ground',
     ),
     'a slider in no direction': (
         SLIDER_CRANK,
@@ -163,35 +224,29 @@ MALFORMED: dict[str, tuple[Fields, Change, str, str]] = {
         'sliders.swivel.direction',
         'for example [1, 0]',
     ),
-    'a slider the other way about': (
-        SLIDER_CRANK,
-        swivel(point='T', along='ground', through='C'),
-        'sliders.swivel',
-        'inverted slider-crank',
-    ),
-    'a rod without a pin on the crank': (
-        SLIDER_CRANK,
-        put('links', 'rod', {'Q': (0.0, 0.0), 'T': (0.3, 0.0)}),
-        'links.rod',
-        'inverted slider-crank',
-    ),
     'a swivel on the crank pivot': (
         SLIDER_CRANK,
         put('links', 'ground', 'C', (0.0, 0.0)),
         'links.ground.C',
         'different places',
     ),
+    'a rod that slides in two swivels': (
+        SLIDER_CRANK,
+        put('sliders', 'second', Slider('O', 'rod', 'T', (1.0, 0.0))),
+        'sliders.second',
+        'take one of them away',
+    ),
     'a joint of an unknown parent': (
         FOUR_BAR,
         put('joints', 'rocker_joint', RevoluteJoint('base', 'rocker')),
         'joints.rocker_joint.parent',
-        'name one of ground, crank, coupler, rocker',
+        'name one of coupler, crank, ground, rocker',
     ),
     'a joint of an unknown child': (
         FOUR_BAR,
         put('joints', 'rocker_joint', RevoluteJoint('ground', 'roker')),
         'joints.rocker_joint.child',
-        'name one of ground, crank, coupler, rocker',
+        'name one of coupler, crank, ground, rocker',
     ),
     'a joint of an unknown slider': (
         SLIDER_CRANK,
@@ -205,17 +260,24 @@ MALFORMED: dict[str, tuple[Fields, Change, str, str]] = {
         'joints.slide_joint.slider',
         'this linkage has none',
     ),
-    'a link too many': (
+    'an unknown traced point': (FOUR_BAR, put('traced', ('P',)), 'traced', 'name one of A, B'),
+    'a pose with a value too many': (
         FOUR_BAR,
-        put('links', 'fifth', {'B': (0.0, 0.0), 'E': (1.0, 0.0)}),
-        'links',
-        'four-bar',
+        put('pose', Pose((1.0, 2.0), {})),
+        'pose.inputs',
+        'give one for each input',
     ),
-    'a link too few': (FOUR_BAR, drop('links', 'rocker'), 'links', 'four-bar'),
-    'a four-bar that slides as well': (
-        FOUR_BAR,
-        put('sliders', 'slot', Slider('O', 'rocker', 'B', (1.0, 0.0))),
-        'sliders.slot.point',
-        "one link other than 'rocker'",
+    'a class III group without a pose': (CLASS_3, put('pose', None), 'pose', 'pose: {inputs'),
+    'a pose that leaves a link out': (
+        CLASS_3,
+        put('pose', Pose((1.0,), {})),
+        'pose.points',
+        'give two of its points: P1, P2, P3',
+    ),
+    'rails that run alike': (
+        YOKE,
+        put('sliders', 'slot', Slider('A', 'yoke', 'U', (1.0, 0.0))),
+        'sliders.slot.direction',
+        'different directions',
     ),
 }

@@ -25,10 +25,10 @@ from __future__ import annotations
 from itertools import pairwise
 from math import copysign, cos, nextafter, pi, remainder, sin
 
-from linkage_ros.kinematics.dyads.rrr import RRRDyad
 from linkage_ros.kinematics.status import Status
 import pytest
 
+from .on_crank import FourBar
 from .reference import four_bar
 from .tolerance import ANGLE, RATE
 
@@ -53,16 +53,16 @@ def off(angle: float, expected: float) -> float:
 @pytest.mark.parametrize('near', NEAR)
 @pytest.mark.parametrize('sign', [1, -1])
 def test_a_parallelogram_passes_zero_as_a_parallelogram(name: str, near: float, sign: int) -> None:
-    dyad, phi = RRRDyad(*PARALLELOGRAMS[name], 1), sign * near
+    dyad, phi = FourBar(*PARALLELOGRAMS[name], 1), sign * near
     pose = dyad.close(phi)
     assert pose.status is Status.CLOSED
     a, _, _, d = PARALLELOGRAMS[name]
     if d > a:
         # Small angles, to their own last digits.
-        assert abs(pose.coupler) < 8e-16 * near
-        assert pose.rocker == pytest.approx(phi, rel=1e-15, abs=0.0)
-    assert off(pose.coupler, 0.0) < 1e-15
-    assert off(pose.rocker, phi) < 1e-15
+        assert abs(pose.first) < 8e-16 * near
+        assert pose.second == pytest.approx(phi, rel=1e-15, abs=0.0)
+    assert off(pose.first, 0.0) < 1e-15
+    assert off(pose.second, phi) < 1e-15
     assert dyad.rates(pose, 1.0) == pytest.approx((0.0, 1.0), rel=8e-16, abs=8e-16)
 
 
@@ -72,11 +72,11 @@ def test_a_parallelogram_passes_zero_as_a_parallelogram(name: str, near: float, 
 def test_a_parallelogram_passes_half_a_turn_as_a_parallelogram(
     name: str, near: float, sign: int
 ) -> None:
-    dyad, phi = RRRDyad(*PARALLELOGRAMS[name], 1), pi + sign * near
+    dyad, phi = FourBar(*PARALLELOGRAMS[name], 1), pi + sign * near
     pose = dyad.close(phi)
     assert pose.status is Status.CLOSED
-    assert off(pose.coupler, 0.0) < 2e-15
-    assert off(pose.rocker, phi) < 2e-15
+    assert off(pose.first, 0.0) < 2e-15
+    assert off(pose.second, phi) < 2e-15
     assert dyad.rates(pose, 1.0) == pytest.approx((0.0, 1.0), rel=8e-16, abs=8e-16)
 
 
@@ -85,11 +85,11 @@ def test_a_parallelogram_passes_half_a_turn_as_a_parallelogram(
 def test_at_the_change_point_the_position_is_valid_and_the_rate_is_not(
     name: str, zero: float
 ) -> None:
-    pose = RRRDyad(*PARALLELOGRAMS[name], 1).close(zero)
+    pose = FourBar(*PARALLELOGRAMS[name], 1).close(zero)
     assert pose.status is Status.TOGGLE
     assert pose.cross == 0.0
-    assert off(pose.coupler, 0.0) < 1e-15
-    assert off(pose.rocker, 0.0) < 1e-15
+    assert off(pose.first, 0.0) < 1e-15
+    assert off(pose.second, 0.0) < 1e-15
 
 
 @pytest.mark.parametrize('name', PARALLELOGRAMS)
@@ -99,14 +99,14 @@ def test_at_the_change_point_the_position_is_valid_and_the_rate_is_not(
 def test_a_parallelogram_stays_one_at_any_step_in_either_direction(
     name: str, step: float, sign: int, start: float
 ) -> None:
-    dyad = RRRDyad(*PARALLELOGRAMS[name], 1)
+    dyad = FourBar(*PARALLELOGRAMS[name], 1)
     for i in range(round(max(2, 4 * pi / step))):
         phi = sign * (start + i * step)
         pose = dyad.close(phi)
         assert pose.status is Status.CLOSED
-        assert off(pose.coupler, 0.0) < 2e-15
+        assert off(pose.first, 0.0) < 2e-15
         # The angle itself is rounded at its size.
-        assert off(pose.rocker, phi) < 2e-15 + 2.0**-53 * abs(phi)
+        assert off(pose.second, phi) < 2e-15 + 2.0**-53 * abs(phi)
         assert dyad.rates(pose, 1.0) == pytest.approx((0.0, 1.0), rel=4e-15, abs=4e-15)
 
 
@@ -114,11 +114,11 @@ def test_a_parallelogram_stays_one_at_any_step_in_either_direction(
 @pytest.mark.parametrize('sign', [1, -1])
 def test_a_folded_kite_turns_as_one_link_about_the_crank_pivot(near: float, sign: int) -> None:
     # a = b and c = d, B on the crank's pivot: the crank carries the coupler, the rocker stands.
-    dyad, phi = RRRDyad(1.0, 1.0, 2.0, 2.0, -1), sign * near
+    dyad, phi = FourBar(1.0, 1.0, 2.0, 2.0, -1), sign * near
     pose = dyad.close(phi)
     assert pose.status is Status.CLOSED
-    assert off(pose.coupler, phi + pi) < 2e-15
-    assert off(pose.rocker, pi) < 2e-15
+    assert off(pose.first, phi + pi) < 2e-15
+    assert off(pose.second, pi) < 2e-15
     assert dyad.rates(pose, 1.0) == pytest.approx((1.0, 0.0), rel=2e-15, abs=2e-15)
 
 
@@ -130,12 +130,12 @@ def test_a_kite_whose_pins_meet_goes_through_with_its_links_in_line(
     # a = d and b = c: A passes D. The diagonal turns at half the crank's rate, and with its
     # length goes the height of the triangle; closed form: B lies at √(b² − s²/4) from its middle.
     a, b = 2.0, 3.0
-    dyad, phi = RRRDyad(a, b, b, a, 1), sign * near
+    dyad, phi = FourBar(a, b, b, a, 1), sign * near
     pose = dyad.close(phi)
     truth = four_bar(a, b, b, a, phi, sign, digits=700)
     assert pose.status is Status.CLOSED
-    assert truth.coupler.angle_error_of(pose.coupler) < ANGLE
-    assert truth.rocker.angle_error_of(pose.rocker) < ANGLE
+    assert truth.coupler.angle_error_of(pose.first) < ANGLE
+    assert truth.rocker.angle_error_of(pose.second) < ANGLE
     rates = dyad.rates(pose, 1.0)
     assert truth.coupler_rate.error_of(rates[0]) < RATE
     assert truth.rocker_rate.error_of(rates[1]) < RATE
@@ -143,7 +143,7 @@ def test_a_kite_whose_pins_meet_goes_through_with_its_links_in_line(
 
 @pytest.mark.parametrize('zero', [0.0, -0.0])
 def test_a_kite_with_a_pin_on_the_ground_pivot_has_no_pose_that_could_be_told(zero: float) -> None:
-    assert RRRDyad(2.0, 3.0, 3.0, 2.0, 1).close(zero).status is Status.INDETERMINATE
+    assert FourBar(2.0, 3.0, 3.0, 2.0, 1).close(zero).status is Status.INDETERMINATE
 
 
 # One change point only: a turn of the crank ends in the other assembly, two turns in the same.
@@ -160,19 +160,19 @@ SINGLE = {
 @pytest.mark.parametrize('side', [1, -1])
 def test_a_single_change_point_is_passed_steadily_over_two_turns(name: str, side: int) -> None:
     lengths, half = SINGLE[name]
-    dyad = RRRDyad(*lengths, side)
+    dyad = FourBar(*lengths, side)
     step = 4 * pi / 4000
     angles = [(i + 0.5) * step for i in range(4000)]
     poses = [dyad.close(phi) for phi in angles]
     assert {pose.status for pose in poses} == {Status.CLOSED}
     for (phi, one), (_, other) in pairwise(zip(angles, poses, strict=True)):
         rates = [max(map(abs, dyad.rates(pose, 1.0))) for pose in (one, other)]
-        moved = max(off(one.coupler, other.coupler), off(one.rocker, other.rocker))
+        moved = max(off(one.first, other.first), off(one.second, other.second))
         assert moved < 1.5 * step * (max(rates) + 1e-9), phi
     for phi, pose in zip(angles, poses, strict=True):
         assert copysign(1.0, pose.cross) == copysign(1.0, side * half(phi))
-    assert off(poses[0].coupler, poses[-1].coupler) < 0.02
-    assert off(poses[0].coupler, poses[2000].coupler) > 1e-4
+    assert off(poses[0].first, poses[-1].first) < 0.02
+    assert off(poses[0].first, poses[2000].first) > 1e-4
 
 
 @pytest.mark.parametrize('name', [name for name in SINGLE if 'decimal' not in name])
@@ -181,11 +181,11 @@ def test_a_single_change_point_has_the_reference_s_poses_on_both_turns(
     name: str, phi: float
 ) -> None:
     lengths, half = SINGLE[name]
-    dyad = RRRDyad(*lengths, 1)
+    dyad = FourBar(*lengths, 1)
     pose = dyad.close(phi)
     truth = four_bar(*lengths, phi, 1 if half(phi) > 0 else -1)
-    assert truth.coupler.half_turn_error_of(pose.coupler) < ANGLE
-    assert truth.rocker.half_turn_error_of(pose.rocker) < ANGLE
+    assert truth.coupler.half_turn_error_of(pose.first) < ANGLE
+    assert truth.rocker.half_turn_error_of(pose.second) < ANGLE
     for rate, expected in zip(
         dyad.rates(pose, 1.0), (truth.coupler_rate, truth.rocker_rate), strict=True
     ):
@@ -196,12 +196,12 @@ def test_a_single_change_point_has_the_reference_s_poses_on_both_turns(
 @pytest.mark.parametrize('sign', [1, -1])
 def test_next_to_a_single_change_point_poses_keep_their_digits(near: float, sign: int) -> None:
     lengths, phi = (3.0, 2.0, 4.0, 1.0), sign * near
-    pose = RRRDyad(*lengths, 1).close(phi)
+    pose = FourBar(*lengths, 1).close(phi)
     truth = four_bar(*lengths, phi, sign, digits=300)
     # Each angle is there proportional to the crank's, up to a half-turn: absolute errors count.
-    assert off(pose.coupler, float(truth.coupler.value)) < 2e-15
-    assert off(pose.rocker, float(truth.rocker.value)) < 2e-15
-    coupler_rate, rocker_rate = RRRDyad(*lengths, 1).rates(pose, 1.0)
+    assert off(pose.first, float(truth.coupler.value)) < 2e-15
+    assert off(pose.second, float(truth.rocker.value)) < 2e-15
+    coupler_rate, rocker_rate = FourBar(*lengths, 1).rates(pose, 1.0)
     assert coupler_rate == pytest.approx(float(truth.coupler_rate.value), rel=4e-15)
     assert rocker_rate == pytest.approx(float(truth.rocker_rate.value), rel=4e-15)
 
@@ -209,9 +209,9 @@ def test_next_to_a_single_change_point_poses_keep_their_digits(near: float, sign
 def test_lengths_that_cancel_but_for_their_last_digit_are_a_change_point() -> None:
     # 0.4 - 0.1 and 0.5 - 0.2 differ as floats. As decimals, which a file holds, they do not.
     assert 0.4 - 0.1 != 0.5 - 0.2
-    assert RRRDyad(0.4, 0.2, 0.5, 0.1, 1).fold_margin == 0.0
+    assert FourBar(0.4, 0.2, 0.5, 0.1, 1).diagonal.fold_margin == 0.0
     # Lengths that differ by more than rounding are what they are.
-    assert RRRDyad(0.4, 0.2, nextafter(0.5, 1.0) + 1e-14, 0.1, 1).fold_margin != 0.0
+    assert FourBar(0.4, 0.2, nextafter(0.5, 1.0) + 1e-14, 0.1, 1).diagonal.fold_margin != 0.0
 
 
 @pytest.mark.parametrize('b', [0.2, 1.0, 1.3, 7.0])
@@ -222,7 +222,7 @@ def test_where_the_crank_pin_meets_the_ground_pivot_rates_stay_right(
 ) -> None:
     # a = d and b = c: the diagonal vanishes, and the triangle on it stands ever more upright. By
     # hand, for a = d = 1 and φ → 0: θ3' = (1 ∓ 1/b)/2 and θ4' = (1 ± 1/b)/2, σ = ±1.
-    dyad = RRRDyad(1.0, b, b, 1.0, sign)
+    dyad = FourBar(1.0, b, b, 1.0, sign)
     rates = dyad.rates(dyad.close(phi), 1.0)
     limits = (0.5 * (1.0 - sign / b), 0.5 * (1.0 + sign / b))
     assert rates == pytest.approx(limits, rel=1e-15, abs=4e-16)

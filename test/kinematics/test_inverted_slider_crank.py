@@ -20,10 +20,10 @@ from math import cos, sin
 
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from linkage_ros.kinematics.dyads.rpr import RPRDyad
 from linkage_ros.kinematics.status import Status
 import pytest
 
+from .on_crank import InvertedSliderCrank
 from .reference import inverted_slider_crank, UNIT_ROUNDOFF
 from .samples import inverted_slider_cranks, SLIDER_CRANKS
 from .tolerance import ANGLE, LENGTH, NEEDLE_RATE, RATE, Worst
@@ -43,14 +43,14 @@ def test_positions_rates_and_status_are_right_in_every_family(family: str) -> No
     for case in inverted_slider_cranks(family, COUNT):
         a, d, h, phi, sign = case
         truth = inverted_slider_crank(*case)
-        dyad = RPRDyad(a, d, h, sign)
+        dyad = InvertedSliderCrank(a, d, h, sign)
         pose = dyad.close(phi)
         worst.note_status(pose.status, pose.gap, float(truth.gap), a + d + abs(h), case)
         if pose.status is not Status.CLOSED:
             continue
         closed += 1
         assert pose.slide * sign > 0.0, case
-        worst.note('rod', truth.rod.half_turn_error_of(pose.rod), ANGLE, case)
+        worst.note('rod', truth.rod.half_turn_error_of(pose.rail), ANGLE, case)
         worst.note('slide', truth.slide.error_of(pose.slide), LENGTH, case)
         limit = NEEDLE_RATE if family == 'needles' else RATE
         rod_rate, slide_rate = dyad.rates(pose, 1.0)
@@ -62,7 +62,7 @@ def test_positions_rates_and_status_are_right_in_every_family(family: str) -> No
 
 def test_the_sweep_holds_open_loops_too() -> None:
     found = {
-        RPRDyad(a, d, h, sign).close(phi).status
+        InvertedSliderCrank(a, d, h, sign).close(phi).status
         for family in SLIDER_CRANKS
         for a, d, h, phi, sign in inverted_slider_cranks(family, COUNT)
     }
@@ -74,10 +74,10 @@ def test_the_sweep_holds_open_loops_too() -> None:
 def test_walking_the_loop_ends_where_it_began(
     a: float, d: float, h: float, phi: float, sign: int
 ) -> None:
-    pose = RPRDyad(a, d, h, sign).close(phi)
+    pose = InvertedSliderCrank(a, d, h, sign).close(phi)
     assume(pose.status is Status.CLOSED)
-    x = a * cos(phi) + pose.slide * cos(pose.rod) - h * sin(pose.rod) - d
-    y = a * sin(phi) + pose.slide * sin(pose.rod) + h * cos(pose.rod)
+    x = a * cos(phi) + pose.slide * cos(pose.rail) - h * sin(pose.rail) - d
+    y = a * sin(phi) + pose.slide * sin(pose.rail) + h * cos(pose.rail)
     # What three angles of up to 2π, each rounded a few times, can move the links by.
     reached = 32.0 * UNIT_ROUNDOFF * (a + d + abs(h) + abs(pose.slide))
     assert abs(x) < reached
@@ -90,16 +90,16 @@ def test_a_mirrored_linkage_moves_in_the_mirror(
     a: float, d: float, h: float, phi: float, sign: int
 ) -> None:
     assume(abs(a - d) != abs(h))
-    dyad, mirrored = RPRDyad(a, d, h, sign), RPRDyad(a, d, -h, sign)
+    dyad, mirrored = InvertedSliderCrank(a, d, h, sign), InvertedSliderCrank(a, d, -h, sign)
     pose, image = dyad.close(phi), mirrored.close(-phi)
     assert (pose.status, pose.gap, pose.slide) == (image.status, image.gap, image.slide)
     if pose.status is Status.CLOSED:
         rod_rate, slide_rate = dyad.rates(pose, 1.0)
         assert mirrored.rates(image, 1.0) == (rod_rate, -slide_rate)
         # A rod along the ground points at π from either side of the mirror.
-        assume(sin(pose.rod) != 0.0 and phi != 0.0)
-        assert cos(pose.rod) == pytest.approx(cos(image.rod), rel=1e-14, abs=1e-15)
-        assert sin(pose.rod) == pytest.approx(-sin(image.rod), rel=1e-14, abs=1e-15)
+        assume(sin(pose.rail) != 0.0 and phi != 0.0)
+        assert cos(pose.rail) == pytest.approx(cos(image.rail), rel=1e-14, abs=1e-15)
+        assert sin(pose.rail) == pytest.approx(-sin(image.rail), rel=1e-14, abs=1e-15)
 
 
 @settings(derandomize=True, deadline=None, max_examples=200)
@@ -108,10 +108,10 @@ def test_a_straight_rod_behind_is_the_one_ahead_turned_round(
     a: float, d: float, phi: float
 ) -> None:
     assume(a != d)
-    ahead, behind = RPRDyad(a, d, 0.0, 1), RPRDyad(a, d, 0.0, -1)
+    ahead, behind = InvertedSliderCrank(a, d, 0.0, 1), InvertedSliderCrank(a, d, 0.0, -1)
     one, other = ahead.close(phi), behind.close(phi)
     assert other.slide == -one.slide
-    assert cos(other.rod - one.rod) == pytest.approx(-1.0)
+    assert cos(other.rail - one.rail) == pytest.approx(-1.0)
     rate, slide_rate = ahead.rates(one, 1.0)
     assert behind.rates(other, 1.0) == (rate, -slide_rate)
 
@@ -121,7 +121,7 @@ def test_a_bent_rod_that_just_reaches_its_swivel_is_at_a_toggle(
     a: float, d: float, h: float
 ) -> None:
     # At φ = 0 the pin is |d − a| = |h| from the swivel: the rod stands across the ground.
-    pose = RPRDyad(a, d, h, 1).close(0.0)
+    pose = InvertedSliderCrank(a, d, h, 1).close(0.0)
     assert (pose.status, pose.gap, pose.slide) == (Status.TOGGLE, 0.0, 0.0)
-    across = a * 1.0 - h * sin(pose.rod) - d
+    across = a * 1.0 - h * sin(pose.rail) - d
     assert across == pytest.approx(0.0, abs=1e-15)

@@ -56,8 +56,8 @@ def test_scaling_by_a_power_of_two_changes_no_bit(exponent: int, crank_angle: fl
         one, other = closure.position(crank_angle), scaled.position(crank_angle)
         assert other.status is one.status is Status.CLOSED
         assert other.joints == tuple(x * u for x, u in zip(one.joints, units, strict=True))
-        assert scaled.rates(other, 0.7) == tuple(
-            x * u for x, u in zip(closure.rates(one, 0.7), units, strict=True)
+        assert scaled.velocity(other, 0.7).joints == tuple(
+            x * u for x, u in zip(closure.velocity(one, 0.7).joints, units, strict=True)
         )
 
 
@@ -74,9 +74,9 @@ def test_lengths_of_any_size_are_solved_to_the_last_digit(
     closure = Closure(inverted_slider_crank_linkage((a, d, h), 'ahead' if side > 0 else 'behind'))
     truth = inverted_slider_crank(a, d, h, phi, side)
     position = closure.position(phi)
-    assert truth.rod.half_turn_error_of(position.pose.rod) < ANGLE
+    assert truth.rod.half_turn_error_of(position.poses[0].rail) < ANGLE
     assert truth.slide.error_of(position.joints[1]) < LENGTH
-    rod_rate, slide_rate = closure.rates(position, 1.0)
+    rod_rate, slide_rate = closure.velocity(position, 1.0).joints
     # The published rate is that of the rod less the crank's.
     assert truth.rod_rate.error_of(rod_rate + 1.0) < RATE
     assert truth.slide_rate.error_of(slide_rate) < RATE
@@ -111,9 +111,9 @@ def test_a_crank_angle_of_a_million_radians_is_where_it_belongs() -> None:
     turned = 1e6 - 159154 * 2 * pi
     far, near = closure.position(1e6), closure.position(turned)
     # 2π times 159154 is off by 159154·2.4e-16.
-    assert math.cos(far.pose.rocker - near.pose.rocker) == pytest.approx(1.0, abs=1e-15)
-    assert far.pose.rocker - near.pose.rocker == pytest.approx(
-        2 * pi * round((far.pose.rocker - near.pose.rocker) / (2 * pi)), abs=1e-9
+    assert math.cos(far.poses[0].second - near.poses[0].second) == pytest.approx(1.0, abs=1e-15)
+    assert far.poses[0].second - near.poses[0].second == pytest.approx(
+        2 * pi * round((far.poses[0].second - near.poses[0].second) / (2 * pi)), abs=1e-9
     )
 
 
@@ -127,9 +127,9 @@ def check_four_bar(lengths: tuple[float, ...], phi: float, side: int, rate_limit
         assert position.gap == pytest.approx(float(truth.gap), abs=4 * 2.0**-53 * sum(lengths))
         return False
     assert position.status is Status.CLOSED
-    assert truth.coupler.half_turn_error_of(position.pose.coupler) < ANGLE
-    assert truth.rocker.half_turn_error_of(position.pose.rocker) < ANGLE
-    coupler_rate, rocker_rate = closure.loop.dyad.rates(position.pose, 1.0)
+    assert truth.coupler.half_turn_error_of(position.poses[0].first) < ANGLE
+    assert truth.rocker.half_turn_error_of(position.poses[0].second) < ANGLE
+    coupler_rate, rocker_rate = closure.velocity(position, 1.0).state.coordinates[2:]
     assert truth.coupler_rate.error_of(coupler_rate) < rate_limit
     assert truth.rocker_rate.error_of(rocker_rate) < rate_limit
     return True

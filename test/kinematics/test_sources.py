@@ -23,13 +23,12 @@ from __future__ import annotations
 from math import acos, atan2, cos, degrees, nextafter, pi, radians, sin
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.dyads.rpr import RPRDyad
-from linkage_ros.kinematics.dyads.rrr import RRRDyad
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, Side, SlideJoint, Slider
 from linkage_ros.kinematics.status import Status
 from mpmath import mp, mpf
 import pytest
 
+from .on_crank import FourBar, InvertedSliderCrank
 from .reference import four_bar, inverted_slider_crank, turned, UNIT_ROUNDOFF
 from .tolerance import ANGLE, LENGTH, RATE
 
@@ -58,7 +57,7 @@ def test_the_slider_crank_of_the_first_text_is_solved(
             'crank': {'A': (0.0, 0.0), 'B': (0.15, 0.0)},
             'rod': {'B': (0.0, 0.0), 'end': (0.30, 0.0)},
         },
-        input=Input('crank_joint', 'ground', 'crank'),
+        inputs=(Input('crank_joint', 'ground', 'crank'),),
         assembly={'swivel': side},
         joints={'rod_joint': RevoluteJoint('ground', 'rod'), 'slide_joint': SlideJoint('swivel')},
         sliders={'swivel': Slider('C', 'rod', 'B', (1.0, 0.0))},
@@ -87,7 +86,7 @@ def test_the_pin_of_the_second_text_is_where_both_its_roots_say(name: str) -> No
             k4 = ((d - k1) ** 2 - c * c) / (k2 * k2 + 1)
             square = k3 * k3 / 4 - k4
             pins = [(k1 + k2 * by, by) for by in (k3 / 2 + r * mp.sqrt(square) for r in (1, -1))]
-        poses = [RRRDyad(a, b, c, d, side).close(phi) for side in (1, -1)]
+        poses = [FourBar(a, b, c, d, side).close(phi) for side in (1, -1)]
         assert {pose.status for pose in poses} == {Status.OPEN if square < 0 else Status.CLOSED}
         if square < 0:
             continue
@@ -96,8 +95,8 @@ def test_the_pin_of_the_second_text_is_where_both_its_roots_say(name: str) -> No
             poses, (1, -1), pins if left_first else pins[::-1], strict=True
         ):
             truth = four_bar(a, b, c, d, phi, side)
-            assert abs(d + c * cos(pose.rocker) - float(bx)) < _pin_error(truth.rocker, c, d)
-            assert abs(c * sin(pose.rocker) - float(by)) < _pin_error(truth.rocker, c, d)
+            assert abs(d + c * cos(pose.second) - float(bx)) < _pin_error(truth.rocker, c, d)
+            assert abs(c * sin(pose.second) - float(by)) < _pin_error(truth.rocker, c, d)
             compared += 1
     assert compared > 50
 
@@ -112,7 +111,7 @@ def _pin_error(angle, link: float, ground: float) -> float:
 @pytest.mark.parametrize('side', [1, -1])
 def test_the_rates_of_the_third_text_are_what_its_loop_equation_says(name: str, side: int) -> None:
     a, b, c, d = FOUR_BARS[name]
-    dyad = RRRDyad(a, b, c, d, side)
+    dyad = FourBar(a, b, c, d, side)
     compared = 0
     for degree in range(0, 360, 3):
         phi, omega = radians(degree), -2.5
@@ -142,12 +141,12 @@ def test_a_crank_pin_square_above_the_ground_pivot_is_an_ordinary_pose(
     lengths = (2.0, 3.0, 3.0, 1.0)
     for turn in (1, -1):
         phi = turn * (acos(0.5) + direction * offset)
-        dyad = RRRDyad(*lengths, side)
+        dyad = FourBar(*lengths, side)
         pose = dyad.close(phi)
         truth = four_bar(*lengths, phi, side)
         assert pose.status is Status.CLOSED
-        assert truth.coupler.angle_error_of(pose.coupler) < ANGLE
-        assert truth.rocker.angle_error_of(pose.rocker) < ANGLE
+        assert truth.coupler.angle_error_of(pose.first) < ANGLE
+        assert truth.rocker.angle_error_of(pose.second) < ANGLE
         coupler_rate, rocker_rate = dyad.rates(pose, 1.0)
         assert truth.coupler_rate.error_of(coupler_rate) < RATE
         assert truth.rocker_rate.error_of(rocker_rate) < RATE
@@ -166,12 +165,12 @@ def test_a_rocker_along_the_ground_has_a_rate(
 ) -> None:
     # A = (0, 3) and B = (4, 0): a triangle 3-4-5, and the third text divides by sin θ4.
     phi = pi / 2 + offset
-    dyad = RRRDyad(*lengths, side)
+    dyad = FourBar(*lengths, side)
     pose = dyad.close(phi)
     truth = four_bar(*lengths, phi, side)
     assert pose.status is Status.CLOSED
-    assert truth.rocker.half_turn_error_of(pose.rocker) < ANGLE
-    assert abs(turned(mpf(pose.rocker) - mpf(rocker))) < 10 * abs(offset) + 2e-15
+    assert truth.rocker.half_turn_error_of(pose.second) < ANGLE
+    assert abs(turned(mpf(pose.second) - mpf(rocker))) < 10 * abs(offset) + 2e-15
     coupler_rate, rocker_rate = dyad.rates(pose, 1.0)
     assert truth.coupler_rate.error_of(coupler_rate) < RATE
     assert truth.rocker_rate.error_of(rocker_rate) < RATE
@@ -183,7 +182,7 @@ def test_a_crank_pin_on_the_swivel_leaves_the_rod_without_a_direction(
     zero: float, side: int
 ) -> None:
     # And not the angle 0, which a formula might give out.
-    assert RPRDyad(1.5, 1.5, 0.0, side).close(zero).status is Status.INDETERMINATE
+    assert InvertedSliderCrank(1.5, 1.5, 0.0, side).close(zero).status is Status.INDETERMINATE
 
 
 @pytest.mark.parametrize('exponent', [-3, -6, -8, -9, -12, -15, -50, -150, -160, -300])
@@ -194,11 +193,11 @@ def test_a_crank_pin_next_to_the_swivel_is_an_ordinary_pose(
 ) -> None:
     # a = d: the rod turns at half the crank's rate, through the swivel and on.
     a, phi = 1.5, direction * 10.0**exponent
-    dyad = RPRDyad(a, a, 0.0, side)
+    dyad = InvertedSliderCrank(a, a, 0.0, side)
     pose = dyad.close(phi)
     assert pose.status is Status.CLOSED
     assert pose.slide == pytest.approx(side * 2 * a * sin(phi / 2), rel=1e-15, abs=0.0)
-    assert float(turned(mpf(pose.rod) - (mpf(phi) - side * mp.pi) / 2)) == pytest.approx(
+    assert float(turned(mpf(pose.rail) - (mpf(phi) - side * mp.pi) / 2)) == pytest.approx(
         0, abs=1e-15
     )
     rod_rate, slide_rate = dyad.rates(pose, 2.0)
@@ -213,11 +212,11 @@ def test_the_rod_may_point_into_every_quadrant() -> None:
         for a, d in ((3.0, 1.0), (1.0, 3.0)):
             for side in (1, -1):
                 phi = radians(degree)
-                pose = RPRDyad(a, d, 0.0, side).close(phi)
+                pose = InvertedSliderCrank(a, d, 0.0, side).close(phi)
                 truth = inverted_slider_crank(a, d, 0.0, phi, side)
-                assert truth.rod.half_turn_error_of(pose.rod) < ANGLE
+                assert truth.rod.half_turn_error_of(pose.rail) < ANGLE
                 assert truth.slide.error_of(pose.slide) < LENGTH
-                quadrants.add(int(degrees(atan2(sin(pose.rod), cos(pose.rod))) % 360 // 90))
+                quadrants.add(int(degrees(atan2(sin(pose.rail), cos(pose.rail))) % 360 // 90))
     assert quadrants == {0, 1, 2, 3}
 
 
@@ -226,5 +225,5 @@ def test_a_rod_straight_up_is_no_special_case() -> None:
     a, d = 1.0, 0.5
     phi = acos(0.5)
     for angle in (nextafter(phi, 0.0), phi, nextafter(phi, 2.0)):
-        pose = RPRDyad(a, d, 0.0, 1).close(angle)
-        assert pose.rod == pytest.approx(-pi / 2, abs=1e-15)
+        pose = InvertedSliderCrank(a, d, 0.0, 1).close(angle)
+        assert pose.rail == pytest.approx(-pi / 2, abs=1e-15)

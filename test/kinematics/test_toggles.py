@@ -18,12 +18,11 @@ from __future__ import annotations
 
 from math import pi, remainder
 
-from linkage_ros.kinematics.dyads.rpr import RPRDyad
-from linkage_ros.kinematics.dyads.rrr import RRRDyad
 from linkage_ros.kinematics.status import Status
 from mpmath import mp, mpf
 import pytest
 
+from .on_crank import FourBar, InvertedSliderCrank
 from .reference import four_bar, inverted_slider_crank, UNIT_ROUNDOFF
 from .tolerance import ANGLE, LENGTH, RATE, TOGGLE
 
@@ -61,14 +60,14 @@ def test_inside_the_limit_the_loop_closes_to_the_last_digit(
     lengths, _ = LIMITS[name]
     with mp.workdps(60):
         phi = float(limit_angle(name) + inward(name) * distance)
-    dyad = RRRDyad(*lengths, side)
+    dyad = FourBar(*lengths, side)
     pose, truth = dyad.close(phi), four_bar(*lengths, phi, side)
     assert pose.status in (Status.CLOSED, Status.TOGGLE)
     assert (pose.status is Status.TOGGLE) == (pose.cross == 0.0)
     limit = ANGLE if pose.status is Status.CLOSED else TOGGLE
     if truth.gap <= 0:
-        assert truth.coupler.half_turn_error_of(pose.coupler) < limit
-        assert truth.rocker.half_turn_error_of(pose.rocker) < limit
+        assert truth.coupler.half_turn_error_of(pose.first) < limit
+        assert truth.rocker.half_turn_error_of(pose.second) < limit
     if distance > 1e-13:
         assert pose.status is Status.CLOSED
     if pose.status is Status.CLOSED:
@@ -86,7 +85,7 @@ def test_outside_the_limit_the_loop_is_open_by_the_gap(
     lengths, _ = LIMITS[name]
     with mp.workdps(60):
         phi = turn * float(limit_angle(name) - inward(name) * distance)
-    pose, truth = RRRDyad(*lengths, 1).close(phi), four_bar(*lengths, phi, 1)
+    pose, truth = FourBar(*lengths, 1).close(phi), four_bar(*lengths, phi, 1)
     rounding = UNIT_ROUNDOFF * sum(lengths)
     if truth.gap > 32 * rounding:
         assert pose.status is Status.OPEN
@@ -107,12 +106,12 @@ def test_at_the_limit_the_position_is_that_of_links_in_line(
         line = turn * mp.arg(d - a * mp.expj(exact))
         coupler = line + (mp.pi if kind == 'fold' and b < c else 0)
         rocker = line + (0 if kind == 'fold' and b > c else mp.pi)
-    pose = RRRDyad(*lengths, side).close(turn * float(exact))
+    pose = FourBar(*lengths, side).close(turn * float(exact))
     assert (pose.status, pose.gap, pose.cross) == (Status.TOGGLE, 0.0, 0.0)
     # The rounded crank angle turns the diagonal by as much again as the angles' own rounding.
     sensitivity = max(1.0, a * d / (b - c) ** 2)
-    assert abs(remainder(pose.coupler - float(coupler), 2 * pi)) < 2e-15 * sensitivity
-    assert abs(remainder(pose.rocker - float(rocker), 2 * pi)) < 2e-15 * sensitivity
+    assert abs(remainder(pose.first - float(coupler), 2 * pi)) < 2e-15 * sensitivity
+    assert abs(remainder(pose.second - float(rocker), 2 * pi)) < 2e-15 * sensitivity
 
 
 @pytest.mark.parametrize('distance', DISTANCES)
@@ -127,19 +126,19 @@ def test_a_bent_rod_reaches_its_swivel_inside_the_limit_and_misses_it_outside(
     size = UNIT_ROUNDOFF * (a + d + abs(h))
 
     truth = inverted_slider_crank(a, d, h, inside, side)
-    dyad = RPRDyad(a, d, h, side)
+    dyad = InvertedSliderCrank(a, d, h, side)
     pose = dyad.close(inside)
     assert pose.status in (Status.CLOSED, Status.TOGGLE)
     assert (pose.status is Status.TOGGLE) == (pose.slide == 0.0)
     error = ANGLE if pose.status is Status.CLOSED else TOGGLE
-    assert truth.rod.half_turn_error_of(pose.rod) < error
+    assert truth.rod.half_turn_error_of(pose.rail) < error
     assert truth.slide.error_of(pose.slide) < error
     if pose.status is Status.CLOSED:
         rod_rate, slide_rate = dyad.rates(pose, 1.0)
         assert truth.rod_rate.error_of(rod_rate) < RATE
         assert truth.slide_rate.error_of(slide_rate) < RATE
 
-    missed = RPRDyad(a, d, h, side).close(outside)
+    missed = InvertedSliderCrank(a, d, h, side).close(outside)
     gap = float(inverted_slider_crank(a, d, h, outside, side).gap)
     assert missed.status in (Status.OPEN, Status.TOGGLE)
     if gap > 32 * size:
@@ -161,6 +160,6 @@ def test_the_gap_is_what_the_links_miss_each_other_by(
 ) -> None:
     # Crank along the ground, where all lengths lie on one line and are added up by hand.
     phi = 0.0 if gap in (4.0, 6.0, 1.0) else pi
-    pose = RRRDyad(*lengths, 1).close(phi)
+    pose = FourBar(*lengths, 1).close(phi)
     assert pose.status is Status.OPEN
     assert pose.gap == pytest.approx(gap, rel=1e-15)

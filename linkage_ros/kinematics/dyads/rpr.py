@@ -14,35 +14,41 @@
 
 
 """
-RPR: a rod pinned to the crank that slides through a swivel; the inverted slider-crank.
+RPR: a rail pinned at A along which a block slides that is pinned at D; the inverted slider-crank.
 
-In the frame of the loop (`diagonal`) the rod is pinned to the crank at A and runs through the
-swivel D. Its direction is û, n̂ is û turned left by 90°, and the line along which it slides passes
-A at the offset h: AD = r·û + h·n̂. With s = |AD|::
+The rail's direction is û, n̂ is û turned left by 90°, and the line along which D travels passes A
+at the offset h: AD = r·û + h·n̂. With s = |AD|::
 
-    r = σ·√((s − |h|)·(s + |h|))        s − |h| = (|d − a| − |h|) + near²/(s + |d − a|)
-    ψ = dir(û) = dir(AD) − atan2(h, r)
+    r = σ·√((s − |h|)·(s + |h|))        ψ = dir(û) = dir(AD) − atan2(h, r)
 
-σ = +1 where D lies ahead of A along û, −1 where it lies behind. For a straight rod h = 0 and r =
+σ = +1 where D lies ahead of A along û, −1 where it lies behind. For a straight rail h = 0 and r =
 ±s. Where |d − a| = |h| (a straight rod: the crank as long as the distance to the swivel), r passes
 zero with the sign of the half angle, as the rod itself does. At r = 0 a straight rod has no
 direction that could be told: the pose is indeterminate, not zero. A bent one (h ≠ 0) is at a
 toggle.
 
-Rates, from the velocity of the rod's point at D, which is along û. With OA the crank, and p and q
-of `CrankDiagonal.swing`, which are OA along AD and across it, in parts of s::
+Rates, where the diagonal grows by g = ṡ/s and turns by t, and with c = h/r, so that 1 + c² =
+s²/r²::
 
-    ω3 = −ω2·(OA·û)/r        = −ω2·(p − q·h/r)
-    ṙ  = ω3·h + ω2·(OA·n̂)    = ω3·h + ω2·(r·q + h·p) = ω2·q·(r + h²/r)
+    ψ̇ = t + g·c                            ṙ = g·(r + h·c)
+    ψ̈ = ṫ + c·(e − 2g²)                    r̈ = (r + h·c)·e        e = ġ + g²·(1 − c²)
 """
 
 from __future__ import annotations
 
-from math import atan2, sqrt
+from math import atan2, inf, sqrt
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import CrankDiagonal, Diagonal, margin, reach, SMALLEST
+from linkage_ros.kinematics.diagonal import (
+    AnyDiagonal,
+    CrankDiagonal,
+    Diagonal,
+    Growth,
+    margin,
+    UnsignedDiagonal,
+)
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new
 
 _CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
@@ -50,20 +56,18 @@ _CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
 
 class RPRPose(NamedTuple):
     """
-    The dyad at one crank direction, angles in the frame of the loop.
+    The dyad at one state of the linkage.
 
     Attributes
     ----------
     status
-        Whether the loop closes.
+        Whether it closes.
     gap
-        What the rod's line misses the swivel by where it is open, else 0, in the unit of the
-        lengths.
-    rod
-        ψ, direction of the rod's line, in [rad].
+        What the rail's line misses D by where it does not, else 0, in the unit of the lengths.
+    rail
+        ψ, direction of the rail's line, in [rad].
     slide
-        r, from the foot of A on the line to the swivel, along the line, in the unit of the
-        lengths.
+        r, from the foot of A on the line to D, along the line, in the unit of the lengths.
     diagonal
         From A to D.
 
@@ -71,56 +75,90 @@ class RPRPose(NamedTuple):
 
     status: Status
     gap: float
-    rod: float
+    rail: float
     slide: float
     diagonal: Diagonal
 
 
 class RPRDyad:
     """
-    The dyad of an inverted slider-crank.
+    A rail pinned at A, a block on it pinned at D.
 
     Parameters
     ----------
-    a, d
-        Lengths of the crank and of the ground between crank pivot and swivel, in one unit.
+    diagonal
+        From A to D, with the limits |h| and ∞.
     offset
-        h, from A to the rod's line, positive where the line lies left of A, in the same unit.
+        h, from A to the line, positive where the line lies left of A, in the unit of the lengths.
     sign
-        The assembly: +1 where the swivel lies ahead of A along the rod, −1 where it lies behind.
-        Where |d − a| = |h|: for 0 < φ < 2π.
+        The assembly: +1 where D lies ahead of A along the rail, −1 where it lies behind. Where the
+        diagonal passes a change point: for 0 < φ < 2π.
 
     """
 
-    __slots__ = ('_constants', '_diagonal', 'fold_margin', 'sides')
+    __slots__ = ('_constants', 'diagonal')
 
-    def __init__(self, a: float, d: float, offset: float, sign: int) -> None:
-        self._diagonal = CrankDiagonal(a, d)
-        self.sides = (a, d, offset)
-        self.fold_margin = margin(max(a, d), -min(a, d), -abs(offset))
-        self._constants = (offset, float(sign), self.fold_margin, self._diagonal.least)
+    def __init__(self, diagonal: AnyDiagonal, offset: float, sign: int) -> None:
+        self.diagonal = diagonal
+        self._constants = (offset, float(sign))
 
-    def close(self, phi: float) -> RPRPose:
-        """Return the pose for the crank direction φ, in [rad] in the frame of the loop."""
-        offset, sign, fold, least = self._constants
-        diagonal = self._diagonal.at(phi)
-        s, direction, near, _, _, _ = diagonal
-        if s < SMALLEST:
-            status = Status.OPEN if fold < 0.0 else Status.INDETERMINATE
-            return RPRPose(status, -fold, 0.0, 0.0, diagonal)
-        root_fold, gap = reach(fold, near, s + least)
+    def close(self, known: State) -> RPRPose:
+        """Append the direction of the rail, and the slide."""
+        offset, sign = self._constants
+        diagonal = self.diagonal.at(known)
+        s, direction, root_fold, _, gap, _, _ = diagonal
         if gap:
             return RPRPose(Status.OPEN, gap, 0.0, 0.0, diagonal)
-
+        if not s:
+            return RPRPose(Status.INDETERMINATE, 0.0, 0.0, 0.0, diagonal)
         slide = sign * root_fold * sqrt(s + abs(offset))
-        rod = direction - atan2(offset, slide)
-        return new(RPRPose, (_CLOSED if slide else _TOGGLE, 0.0, rod, slide, diagonal))
+        rail = direction - atan2(offset, slide)
+        known[0].append(rail)
+        known[0].append(slide)
+        return new(RPRPose, (_CLOSED if slide else _TOGGLE, 0.0, rail, slide, diagonal))
 
-    def rates(self, pose: RPRPose, crank_rate: float) -> tuple[float, float]:
-        """Return ω3, in [rad/s], and ṙ, in lengths a second, at the crank rate ω2, in [rad/s]."""
-        _, _, offset = self.sides
-        p, q = self._diagonal.swing(pose.diagonal)
-        slide = pose.slide
-        slope = offset / slide
-        # ω3·h and ω2·h·p would cancel: all of ṙ, where the rod's rate is at its extreme.
-        return -crank_rate * (p - q * slope), crank_rate * q * (slide + offset * slope)
+    def rates(self, pose: RPRPose, known: State, speeds: State) -> Growth:
+        """Append the rates of rail and slide."""
+        offset = self._constants[0]
+        growth = self.diagonal.rates(pose.diagonal, known, speeds)
+        unit, swing, base = growth
+        slope = offset / pose.slide
+        speeds[0].append(base + swing * (unit.imag + unit.real * slope))
+        speeds[0].append(swing * (unit.real * (pose.slide + offset * slope)))
+        return growth
+
+    def accelerations(
+        self, pose: RPRPose, growth: Growth, known: State, speeds: State, changes: State
+    ) -> None:
+        """Append the accelerations of rail and slide."""
+        offset = self._constants[0]
+        square, pull, base, bend = self.diagonal.accelerations(
+            pose.diagonal, growth, known, speeds, changes
+        )
+        (unit, swing, _), slope = growth, offset / pose.slide
+        grown = unit.real * unit.real
+        if bend is None:
+            bend = square.real + grown * (1.0 - slope) * (1.0 + slope)
+        bent = square.imag + slope * (bend - 2.0 * grown)
+        changes[0].append(base + pull * (unit.imag + unit.real * slope) + swing * swing * bent)
+        changes[0].append(
+            (pose.slide + offset * slope) * (pull * unit.real + swing * swing * bend)
+        )
+
+    def transmission_angle(self, pose: RPRPose) -> float:
+        """Return the angle between AD and the normal of the rail, in [0, π/2], in [rad]."""
+        return atan2(abs(pose.slide), abs(self._constants[0]))
+
+
+def swivel_diagonal(
+    a: float,
+    d: float,
+    offset: float,
+    arms: tuple[int, int] = (1, 0),
+    angle: float = 0.0,
+    turns_known: bool = True,
+) -> CrankDiagonal:
+    """Return the diagonal of the inverted slider-crank with crank a on ground d."""
+    fold = margin(max(a, d), -min(a, d), -abs(offset))
+    kind = CrankDiagonal if turns_known else UnsignedDiagonal
+    return kind(a, d, fold, inf, (abs(offset), inf), arms, angle)

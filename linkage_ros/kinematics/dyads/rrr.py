@@ -16,9 +16,9 @@
 """
 RRR: two links pinned together; the coupler and the rocker of a four-bar.
 
-In the frame of the loop (`diagonal`) the coupler runs from the crank pin A to B, the rocker from
-the ground pivot D to B. A, D and B are a triangle with the sides s = |AD|, b = |AB| and c = |DB|,
-and everything follows from what its sides fail to cancel::
+The first link runs from its outer pin A to B, the second from its outer pin D to B. A, D and B are
+a triangle with the sides s = |AD|, b = |AB| and c = |DB|, and everything follows from what its
+sides fail to cancel::
 
     P  = b + c + s        Fs = b + c − s        Fb = c + s − b        Fc = b + s − c
     tan(β/2)  = √(Fb·Fs / (P·Fc))        β  = the angle at A from AD to AB
@@ -31,47 +31,48 @@ and everything follows from what its sides fail to cancel::
     θ3 = dir(AD) + σ·β        θ4 = dir(AD) + σ·γ'
 
 Where the dyad folds (s → |b − c|) or stretches (s → b + c), the smaller of Fb and Fc, or Fs, goes
-to zero. Neither is taken as a difference of s, which has lost the digits by then, but from the
-diagonal::
+to zero; the diagonal gives their roots, signed at a change point, so that the motion passes it as
+the linkage itself does, at any step and with no memory.
 
-    s − |b − c| = (|d − a| − |b − c|) + near²/(s + |d − a|)
-    b + c − s   = (b + c − a − d) + far²/(s + a + d)
-                = (b + c − |d − a|) − near²/(s + |d − a|)
+Rates, from the closing equation multiplied by DB and by AB, where the diagonal grows by g = ṡ/s
+and turns by t::
 
-Where crank and ground are long beside coupler and rocker, so that no stretch can be near s = a +
-d, the last line is taken: the one before it would cancel a + d. The brackets are constants of the
-linkage. Where one of them is zero (a change point), the root of the difference is near/√(s + |d −
-a|), or far/√(s + a + d), which changes sign with the half angle: the motion passes the change
-point as the linkage itself does, at any step and with no memory (`reach`).
+    ω3 = t + g·cot(σ·γ')        cot(σ·γ') = (Fc·Fs − P·Fb)/(4·AB × DB) = (b² − c² − s²)/(2·AB × DB)
+    ω4 = t + g·cot(σ·β)         cot(σ·β)  = (P·Fc − Fb·Fs)/(4·AB × DB) = (b² − c² + s²)/(2·AB × DB)
 
-Rates, with OA the crank, from the loop's velocity equation multiplied by DB and by AB, and with OA
-taken along the diagonal and across it (p and q of `CrankDiagonal.swing`)::
+The first form of the cotangents is good for needles, where b or c is small. Where s is small, as
+where A meets D, the products of the first are nearly equal, and the second is taken. Since ω3 − t
+and ω4 − t are the rates of σ·β and σ·γ', these differentiate into::
 
-    ω3 = −ω2·(OA × DB)/(AB × DB) = −ω2·(p − q·cot(σ·γ'))
-    ω4 = −ω2·(OA × AB)/(AB × DB) = −ω2·(p − q·cot(σ·β))
-    cot(σ·β)  = (P·Fc − Fb·Fs)/(4·AB × DB) = (b² − c² + s²)/(2·AB × DB)
-    cot(σ·γ') = (Fc·Fs − P·Fb)/(4·AB × DB) = (b² − c² − s²)/(2·AB × DB)
+    α3 = ṫ + cot(σ·γ')·e − g²·cot(σ·β)        e = ġ − g²·cot(σ·β)·cot(σ·γ')
+    α4 = ṫ + cot(σ·β)·e − g²·cot(σ·γ')
 
-The first form is good for needles, where b or c is small. Where s is small, as where A meets D,
-the products of the first are nearly equal, and the second is taken.
+At a change point the cotangents are infinite and e is zero; `CrankDiagonal` gives what remains of
+it without the difference.
 
-OA × DB = a·c·sin(θ4 − φ) says the same, but where crank and rocker are nearly parallel it takes
-the difference of two angles that were rounded at the size of a half-turn: 6,500 u·κ was measured.
+OA × DB = a·c·sin(θ4 − φ) says the same of a four-bar, but where crank and rocker are nearly
+parallel it takes the difference of two angles that were rounded at the size of a half-turn: 6,500
+u·κ was measured.
 """
 
 from __future__ import annotations
 
-from math import atan2, fsum, sqrt
+from math import atan2, sqrt
 from typing import NamedTuple
 
 from linkage_ros.kinematics.diagonal import (
+    AnyDiagonal,
     CrankDiagonal,
     Diagonal,
+    folded,
+    Growth,
+    GrowthChange,
     margin,
-    reach,
     SMALLEST,
+    UnsignedDiagonal,
 )
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new
 
 _CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
@@ -79,15 +80,15 @@ _CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
 
 class RRRPose(NamedTuple):
     """
-    The dyad at one crank direction, angles in the frame of the loop.
+    The dyad at one state of the linkage.
 
     Attributes
     ----------
     status
-        Whether the loop closes.
+        Whether it closes.
     gap
-        What the links miss each other by where it is open, else 0, in the unit of the lengths.
-    coupler, rocker
+        What the links miss each other by where it does not, else 0, in the unit of the lengths.
+    first, second
         θ3 and θ4, directions of A→B and D→B, in [rad].
     cross
         AB × DB, signed; 0 at a toggle.
@@ -100,11 +101,19 @@ class RRRPose(NamedTuple):
 
     status: Status
     gap: float
-    coupler: float
-    rocker: float
+    first: float
+    second: float
     cross: float
     diagonal: Diagonal
     halves: tuple[float, float, float, float]
+
+
+class RRRRates(NamedTuple):
+    """The growth of the diagonal, and the cotangents of σ·β and σ·γ'."""
+
+    growth: Growth
+    cot_beta: float
+    cot_gamma: float
 
 
 _NO_HALVES = (0.0, 0.0, 0.0, 0.0)
@@ -112,78 +121,122 @@ _NO_HALVES = (0.0, 0.0, 0.0, 0.0)
 
 class RRRDyad:
     """
-    The dyad of a four-bar.
+    Two links pinned together.
 
     Parameters
     ----------
-    a, b, c, d
-        Lengths of crank, coupler, rocker and ground, in one unit; at best near 1.
+    diagonal
+        From A to D, with the limits |b − c| and b + c.
+    b, c
+        Lengths of the first and the second link, in one unit; at best near 1.
     sign
-        The assembly: +1 where B lies left of A→D, −1 where it lies right of it. In a change-point
-        linkage: for 0 < φ < π.
+        The assembly: +1 where B lies left of A→D, −1 where it lies right of it. Where the diagonal
+        passes a change point: for 0 < φ < π.
 
     """
 
-    __slots__ = ('_constants', '_diagonal', 'fold_margin', 'sides', 'stretch_margin')
+    __slots__ = ('_constants', '_sides', 'diagonal')
 
-    def __init__(self, a: float, b: float, c: float, d: float, sign: int) -> None:
-        self._diagonal = CrankDiagonal(a, d)
-        self.sides = (a, b, c, d)
-        self.fold_margin = margin(max(a, d), -min(a, d), -max(b, c), min(b, c))
-        self.stretch_margin = margin(b, c, -a, -d)
-        short_pair = a + d > 2.0 * (b + c)
-        self._constants = (
-            b, c, abs(b - c), float(sign), self.fold_margin,
-            fsum((b, c, -max(a, d), min(a, d))) if short_pair else self.stretch_margin, short_pair,
-            self._diagonal.least, self._diagonal.greatest,
-        )  # fmt: skip
+    def __init__(self, diagonal: AnyDiagonal, b: float, c: float, sign: int) -> None:
+        self.diagonal = diagonal
+        self._sides = (b, c)
+        self._constants = (b, c, abs(b - c), float(sign))
 
-    def close(self, phi: float) -> RRRPose:
-        """Return the pose for the crank direction φ, in [rad] in the frame of the loop."""
-        b, c, side_difference, sign, fold, stretch, short_pair, least, greatest = self._constants
-        diagonal = self._diagonal.at(phi)
-        s, direction, near, far, _, _ = diagonal
-        if s == 0.0:
-            status = Status.OPEN if fold < 0.0 else Status.INDETERMINATE
-            return RRRPose(status, -fold, 0.0, 0.0, 0.0, diagonal, _NO_HALVES)
-        root_fold, gap = reach(fold, near, s + least)
-        if gap:
-            return RRRPose(Status.OPEN, gap, 0.0, 0.0, 0.0, diagonal, _NO_HALVES)
-        if short_pair:
-            root_stretch, gap = reach(stretch, near, -(s + least))
-        else:
-            root_stretch, gap = reach(stretch, far, s + greatest)
-        if gap:
-            return RRRPose(Status.OPEN, gap, 0.0, 0.0, 0.0, diagonal, _NO_HALVES)
+    def close(self, known: State) -> RRRPose:
+        """Append the directions of both links."""
+        pose = close_triangle(self.diagonal.at(known), *self._constants)
+        known[0].append(pose[2])
+        known[0].append(pose[3])
+        return pose
 
-        root_perimeter = sqrt(b + c + s)
-        root_wide = sqrt(s + side_difference)
-        if b >= c:  # Fb is the one that goes to zero
-            beta_y, beta_x = root_fold * root_stretch, root_perimeter * root_wide
-            gamma_y, gamma_x = root_perimeter * root_fold, root_wide * root_stretch
-        else:
-            beta_y, beta_x = root_wide * root_stretch, root_perimeter * root_fold
-            gamma_y, gamma_x = root_perimeter * root_wide, root_fold * root_stretch
-        cross = 0.5 * sign * beta_y * beta_x
-        if -SMALLEST < cross < SMALLEST:
-            cross = 0.0
-        coupler = direction + 2.0 * sign * atan2(beta_y, beta_x)
-        rocker = direction + 2.0 * sign * atan2(gamma_y, gamma_x)
-        halves = (beta_y, beta_x, gamma_y, gamma_x)
-        status = _CLOSED if cross else _TOGGLE
-        return new(RRRPose, (status, 0.0, coupler, rocker, cross, diagonal, halves))
+    def rates(self, pose: RRRPose, known: State, speeds: State) -> RRRRates:
+        """Append the rates of both links."""
+        growth = self.diagonal.rates(pose.diagonal, known, speeds)
+        return triangle_rates(pose, *self._sides, growth, speeds)
 
-    def rates(self, pose: RRRPose, crank_rate: float) -> tuple[float, float]:
-        """Return ω3 and ω4, in [rad/s], of a closed pose at the crank rate ω2, in [rad/s]."""
-        _, b, c, _ = self.sides
-        s = pose.diagonal.length
-        p, q = self._diagonal.swing(pose.diagonal)
+    def accelerations(
+        self, pose: RRRPose, rates: RRRRates, known: State, speeds: State, changes: State
+    ) -> None:
+        """Append the accelerations of both links."""
+        change = self.diagonal.accelerations(pose.diagonal, rates.growth, known, speeds, changes)
+        triangle_accelerations(rates, change, changes)
+
+    def transmission_angle(self, pose: RRRPose) -> float:
+        """Return the angle between the two links at B, folded into [0, π/2], in [rad]."""
+        return folded(pose.second - pose.first)
+
+
+def crank_diagonal(
+    a: float,
+    b: float,
+    c: float,
+    d: float,
+    arms: tuple[int, int] = (1, 0),
+    offset: float = 0.0,
+    turns_known: bool = True,
+) -> CrankDiagonal:
+    """
+    Return the diagonal of the four-bar with crank a, coupler b, rocker c and ground d.
+
+    Of a parallelogram whole turns need not be known: both roots change their sign with one.
+    """
+    fold = margin(max(a, d), -min(a, d), -max(b, c), min(b, c))
+    stretch = margin(b, c, -a, -d)
+    kind = CrankDiagonal if turns_known or fold == stretch == 0.0 else UnsignedDiagonal
+    return kind(a, d, fold, stretch, (abs(b - c), b + c), arms, offset)
+
+
+def close_triangle(
+    diagonal: Diagonal, b: float, c: float, side_difference: float, sign: float
+) -> RRRPose:
+    """Return the pose over a diagonal."""
+    s, direction, root_fold, root_stretch, gap, _, _ = diagonal
+    if gap:
+        return RRRPose(Status.OPEN, gap, 0.0, 0.0, 0.0, diagonal, _NO_HALVES)
+    if not s:
+        return RRRPose(Status.INDETERMINATE, 0.0, 0.0, 0.0, 0.0, diagonal, _NO_HALVES)
+    root_perimeter = sqrt(b + c + s)
+    root_wide = sqrt(s + side_difference)
+    if b >= c:  # Fb is the one that goes to zero
+        beta_y, beta_x = root_fold * root_stretch, root_perimeter * root_wide
+        gamma_y, gamma_x = root_perimeter * root_fold, root_wide * root_stretch
+    else:
+        beta_y, beta_x = root_wide * root_stretch, root_perimeter * root_fold
+        gamma_y, gamma_x = root_perimeter * root_wide, root_fold * root_stretch
+    cross = 0.5 * sign * beta_y * beta_x
+    if -SMALLEST < cross < SMALLEST:
+        cross = 0.0
+    first = direction + 2.0 * sign * atan2(beta_y, beta_x)
+    second = direction + 2.0 * sign * atan2(gamma_y, gamma_x)
+    halves = (beta_y, beta_x, gamma_y, gamma_x)
+    status = _CLOSED if cross else _TOGGLE
+    return new(RRRPose, (status, 0.0, first, second, cross, diagonal, halves))
+
+
+def triangle_rates(pose: RRRPose, b: float, c: float, growth: Growth, speeds: State) -> RRRRates:
+    """Append ω3 and ω4 of a closed pose; return the cotangents."""
+    s, cross = pose.diagonal.length, pose.cross
+    if s < min(b, c):
+        square, difference = s * (s / cross), (b - c) * ((b + c) / cross)
+        cot_beta, cot_gamma = 0.5 * (difference + square), 0.5 * (difference - square)
+    else:
         beta_y, beta_x, gamma_y, gamma_x = pose.halves
-        if s < min(b, c):
-            square, difference = s * (s / pose.cross), (b - c) * ((b + c) / pose.cross)
-            cot_beta, cot_gamma = 0.5 * (difference + square), 0.5 * (difference - square)
-        else:
-            area = 4.0 * pose.cross
-            cot_beta = (beta_x * beta_x - beta_y * beta_y) / area
-            cot_gamma = (gamma_x * gamma_x - gamma_y * gamma_y) / area
-        return -crank_rate * (p - q * cot_gamma), -crank_rate * (p - q * cot_beta)
+        area = 4.0 * cross
+        cot_beta = (beta_x * beta_x - beta_y * beta_y) / area
+        cot_gamma = (gamma_x * gamma_x - gamma_y * gamma_y) / area
+    unit, swing, base = growth
+    grown, turned = unit.real, unit.imag
+    speeds[0].append(base + swing * (turned + grown * cot_gamma))
+    speeds[0].append(base + swing * (turned + grown * cot_beta))
+    return new(RRRRates, (growth, cot_beta, cot_gamma))
+
+
+def triangle_accelerations(rates: RRRRates, change: GrowthChange, changes: State) -> None:
+    """Append α3 and α4."""
+    (unit, swing, _), cot_beta, cot_gamma = rates
+    square, pull, base, bend = change
+    q = unit.real
+    bend = square.real - q * cot_beta * (q * cot_gamma) if bend is None else bend - q * q
+    for cot, other in ((cot_gamma, cot_beta), (cot_beta, cot_gamma)):
+        bent = square.imag + cot * bend - q * (q * other)
+        changes[0].append(base + pull * (unit.imag + q * cot) + swing * swing * bent)

@@ -20,7 +20,7 @@ from math import pi
 import random
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.mobility import describe
+from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.status import Status
 from mpmath import mp, mpf
 import pytest
@@ -88,11 +88,11 @@ def test_ranges_of_random_four_bars_end_where_they_fold_and_stretch() -> None:
 
 def check_ranges(lengths: tuple[float, float, float, float], folds: bool, stretches: bool) -> None:
     """Compare the ranges with the reference's limit angles."""
-    ranges = Closure(four_bar_linkage(lengths, 'left')).crank_ranges
-    for low, high in ranges:
+    ranges = Closure(four_bar_linkage(lengths, 'left')).input_ranges
+    for low, high, _ in ranges:
         if not folds and not stretches:
             assert (low, high) == (-pi, pi)
-    ends = [abs(end) for crank_range in ranges for end in crank_range]
+    ends = [abs(end) for low, high, _ in ranges for end in (low, high)]
     if folds:
         angle, condition = end_of_range(*lengths, 'fold')
         # Behind the far side of the ground a range goes on, up to the same angle beyond.
@@ -113,7 +113,7 @@ def test_a_loop_closes_inside_its_ranges_and_nowhere_else(name: str) -> None:
     closure = Closure(four_bar_linkage(lengths, 'right'))
     for i in range(1, 400):
         phi = -pi + i * pi / 200 + 1e-4
-        inside = any(low <= phi + turn <= high for low, high in closure.crank_ranges
+        inside = any(low <= phi + turn <= high for low, high, _ in closure.input_ranges
                      for turn in (0.0, 2 * pi))  # fmt: skip
         status = closure.position(phi).status
         assert (status is not Status.OPEN) == inside
@@ -134,7 +134,7 @@ def test_a_rod_s_range_ends_where_it_cannot_reach_its_swivel(
     lengths: tuple[float, float, float], whole: bool
 ) -> None:
     closure = Closure(inverted_slider_crank_linkage(lengths, 'ahead'))
-    ((low, high),) = closure.crank_ranges
+    ((low, high, _),) = closure.input_ranges
     if whole:
         assert (low, high) == (-pi, pi)
         return
@@ -150,15 +150,15 @@ def test_a_rod_s_range_ends_where_it_cannot_reach_its_swivel(
 @pytest.mark.parametrize('angle', [0.7, -2.0])
 def test_ranges_are_of_the_input_joint_and_turn_with_its_frame(angle: float) -> None:
     lengths, _, _ = FOUR_BARS['both']
-    plain = Closure(four_bar_linkage(lengths, 'left')).crank_ranges
-    turned = Closure(four_bar_linkage(lengths, 'left', {'crank': (0.1, 0.2, angle)})).crank_ranges
-    for (low, high), (turned_low, turned_high) in zip(plain, turned, strict=True):
+    plain = Closure(four_bar_linkage(lengths, 'left')).input_ranges
+    turned = Closure(four_bar_linkage(lengths, 'left', {'crank': (0.1, 0.2, angle)})).input_ranges
+    for (low, high, _), (turned_low, turned_high, _) in zip(plain, turned, strict=True):
         assert (turned_low, turned_high) == pytest.approx((low - angle, high - angle), abs=1e-14)
 
 
 def test_ranges_are_told_in_words() -> None:
     words = {
-        name: describe(Closure(four_bar_linkage(lengths, 'left')).crank_ranges)
+        name: describe(Closure(four_bar_linkage(lengths, 'left')).input_ranges)
         for name, (lengths, _, _) in FOUR_BARS.items()
     }
     assert words['crank-rocker'] == 'every crank angle'

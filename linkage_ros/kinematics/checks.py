@@ -1,0 +1,175 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What no linkage can be made of, refused before anything is looked for."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from math import isfinite
+
+from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, RevoluteJoint, Slider
+
+
+def check(linkage: Linkage) -> None:
+    """
+    Refuse a linkage whose parts do not fit each other.
+
+    Raises
+    ------
+    DefinitionError
+        With the key of the part, and the remedy.
+
+    """
+    if GROUND not in linkage.links:
+        raise DefinitionError(
+            'links', f'no link is named {GROUND!r}', f'name the frame {GROUND!r}'
+        )
+    for name, slider in linkage.sliders.items():
+        _check_slider(linkage, name, slider)
+    _check_points(linkage)
+    if not linkage.inputs:
+        raise DefinitionError('input', 'nothing is driven', 'name a joint that is')
+    for given in linkage.inputs:
+        _check_input(linkage, given)
+    names = [given.joint for given in linkage.inputs]
+    for name in names:
+        if names.count(name) > 1:
+            raise DefinitionError(
+                'input', f'{quoted(name)} is named twice', 'give each input its own name'
+            )
+    for name, joint in linkage.joints.items():
+        if isinstance(joint, RevoluteJoint):
+            for end in ('parent', 'child'):
+                _check_link(linkage, f'joints.{name}.{end}', getattr(joint, end))
+        else:
+            _check_slider_name(linkage, f'joints.{name}.slider', joint.slider)
+    points = {point for carried in linkage.links.values() for point in carried}
+    for point in (*linkage.traced, *(linkage.pose.points if linkage.pose else ())):
+        if point not in points:
+            key = 'traced' if point in linkage.traced else 'pose.points'
+            raise DefinitionError(key, f'{quoted(point)} is no point of a link', _one_of(points))
+    if linkage.pose and len(linkage.pose.inputs) != len(linkage.inputs):
+        raise DefinitionError(
+            'pose.inputs',
+            f'{len(linkage.pose.inputs)} value(s) for {len(linkage.inputs)} input(s)',
+            'give one for each input',
+        )
+
+
+def _check_points(linkage: Linkage) -> None:
+    # A slider joins its links as a pin does, at no point of its own.
+    sliding = {name for s in linkage.sliders.values() for name in (s.block, s.along)}
+    for name, points in linkage.links.items():
+        if len(points) < 2 and not (points and name in sliding):
+            raise DefinitionError(
+                f'links.{name}', f'{len(points)} point(s)', 'a link needs two points or more'
+            )
+        for point, place in points.items():
+            if not all(map(isfinite, place)):
+                raise DefinitionError(
+                    f'links.{name}.{point}', f'{place} is no place', 'write two finite numbers'
+                )
+    for (one, one_points), (other, other_points) in combinations(linkage.links.items(), 2):
+        shared = sorted(set(one_points) & set(other_points))
+        if len(shared) > 1:
+            raise DefinitionError(
+                f'links.{other}',
+                f'shares the points {", ".join(shared)} with {one!r}',
+                'two links have one pin between them; rename the points that are not pins',
+            )
+    carriers: dict[str, int] = {}
+    for points in linkage.links.values():
+        for point in points:
+            carriers[point] = carriers.get(point, 0) + 1
+    for slider in linkage.sliders.values():
+        carriers[slider.point] += 1
+    for name, points in linkage.links.items():
+        pins = [point for point in points if carriers[point] > 1]
+        for one, other in combinations(pins, 2):
+            if points[one] == points[other]:
+                raise DefinitionError(
+                    f'links.{name}.{other}',
+                    f'lies on {one!r}',
+                    'give the two points different places',
+                )
+
+
+def _check_slider(linkage: Linkage, name: str, slider: Slider) -> None:
+    key = f'sliders.{name}'
+    _check_link(linkage, f'{key}.along', slider.along)
+    points = linkage.links[slider.along]
+    if slider.through not in points:
+        raise DefinitionError(
+            f'{key}.through',
+            f'{quoted(slider.through)} is not a point of {slider.along!r}',
+            _one_of(points),
+        )
+    carriers = [link for link, carried in linkage.links.items() if slider.point in carried]
+    if not carriers or slider.along in carriers:
+        raise DefinitionError(
+            f'{key}.point',
+            f'{quoted(slider.point)} is named on {", ".join(carriers) or "no link"}',
+            f'name a point of a link other than {slider.along!r}',
+        )
+    if slider.block and slider.block not in carriers:
+        raise DefinitionError(
+            f'{key}.block',
+            f'{quoted(slider.block)} does not carry {slider.point!r}',
+            _one_of(carriers),
+        )
+    if slider.direction == (0.0, 0.0) or not all(map(isfinite, slider.direction)):
+        raise DefinitionError(
+            f'{key}.direction',
+            f'[{slider.direction[0]:g}, {slider.direction[1]:g}] points nowhere',
+            'write for example [1, 0]',
+        )
+
+
+def _check_input(linkage: Linkage, given: Input) -> None:
+    if given.slider:
+        _check_slider_name(linkage, 'input.slider', given.slider)
+        return
+    for end in ('parent', 'child'):
+        _check_link(linkage, f'input.{end}', getattr(given, end))
+    if given.parent == given.child:
+        raise DefinitionError(
+            'input.child', f'{quoted(given.child)} is its own parent', 'name two links'
+        )
+    if not set(linkage.links[given.parent]) & set(linkage.links[given.child]):
+        raise DefinitionError(
+            f'links.{given.child}',
+            f'no point is named both on {given.parent!r} and on {given.child!r}',
+            f'name the pin about which {given.joint!r} turns on both',
+        )
+
+
+def _check_slider_name(linkage: Linkage, key: str, name: str) -> None:
+    if name not in linkage.sliders:
+        raise DefinitionError(
+            key,
+            f'{quoted(name)} is not a slider',
+            _one_of(linkage.sliders) if linkage.sliders else 'this linkage has none',
+        )
+
+
+def _check_link(linkage: Linkage, key: str, name: str) -> None:
+    if name not in linkage.links:
+        raise DefinitionError(key, f'{quoted(name)} is not a link', _one_of(linkage.links))
+
+
+def _one_of(names: object) -> str:
+    return f'name one of {", ".join(sorted(names))}'  # type: ignore[call-overload]

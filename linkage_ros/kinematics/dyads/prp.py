@@ -1,0 +1,151 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+PRP: a pin where two known lines cross.
+
+The pin travels along a line through E1 in the direction û1 on one link and along a line through E2
+in the direction û2 on another. With × for the z component of the cross product and δ the angle
+from û1 to û2::
+
+    E1 + s1·û1 = E2 + s2·û2        s1 = (E2 − E1) × û2 / sin δ        s2 = (E2 − E1) × û1 / sin δ
+
+The rates solve the same equations for the difference of the velocities that the two links have at
+the pin, the accelerations for that of the accelerations, Coriolis' included. Where the lines are
+parallel they do not meet, or lie on each other: open, or indeterminate.
+"""
+
+from __future__ import annotations
+
+from cmath import rect
+from math import atan2
+from typing import NamedTuple
+
+from linkage_ros.kinematics.diagonal import ROUNDING
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import State
+from linkage_ros.tuples import new
+
+
+class PRPPose(NamedTuple):
+    """
+    The dyad at one state of the linkage.
+
+    Attributes
+    ----------
+    status
+        Whether the lines cross.
+    gap
+        The distance of parallel lines, else 0, in the unit of the lengths.
+    first, second
+        s1 and s2, in the unit of the lengths.
+    across
+        e^{iδ}.
+    units
+        û1 and û2.
+
+    """
+
+    status: Status
+    gap: float
+    first: float
+    second: float
+    across: complex
+    units: tuple[complex, complex]
+
+
+class PRPDyad:
+    """
+    A pin on two lines.
+
+    Parameters
+    ----------
+    starts
+        Indices of E1 and E2 among the pins.
+    arms
+        Indices, among the coordinates, of the angles of the links that carry the lines.
+    directions
+        Directions of the lines less those coordinates, in [rad].
+
+    """
+
+    __slots__ = ('_arms', '_directions', '_starts')
+
+    def __init__(
+        self, starts: tuple[int, int], arms: tuple[int, int], directions: tuple[float, float]
+    ) -> None:
+        self._starts = starts
+        self._arms = arms
+        self._directions = directions
+
+    def close(self, known: State) -> PRPPose:
+        """Append both slides."""
+        x, pins = known
+        (i, j), (one, other) = self._arms, self._directions
+        start, end = (pins[k] for k in self._starts)
+        units = rect(1.0, x[i] + one), rect(1.0, x[j] + other)
+        # The angle between the lines first: two directions would cancel where they are parallel.
+        across = rect(1.0, x[j] - x[i] + (other - one))
+        between = (end - start) * units[0].conjugate()
+        if abs(across.imag) <= ROUNDING:
+            gap = abs(between.imag)
+            far = gap > ROUNDING * (abs(start) + abs(end))
+            status = Status.OPEN if far else Status.INDETERMINATE
+            return PRPPose(status, gap if far else 0.0, 0.0, 0.0, across, units)
+        first, second = _slides(between, across, known)
+        return new(PRPPose, (Status.CLOSED, 0.0, first, second, across, units))
+
+    def rates(self, pose: PRPPose, _known: State, speeds: State) -> tuple[float, float]:
+        """Append the rates of both slides."""
+        v, velocities = speeds
+        (i, j), (one, other) = self._arms, pose.units
+        start, end = (velocities[k] for k in self._starts)
+        carried = end + complex(0.0, v[j] * pose.second) * other
+        carried -= start + complex(0.0, v[i] * pose.first) * one
+        return _slides(carried * one.conjugate(), pose.across, speeds)
+
+    def accelerations(
+        self,
+        pose: PRPPose,
+        rates: tuple[float, float],
+        _known: State,
+        speeds: State,
+        changes: State,
+    ) -> None:
+        """Append the accelerations of both slides."""
+        v, (a, pulls) = speeds[0], changes
+        (i, j), (one, other) = self._arms, pose.units
+        start, end = (pulls[k] for k in self._starts)
+        carried = end + _carried(pose.second, rates[1], v[j], a[j]) * other
+        carried -= start + _carried(pose.first, rates[0], v[i], a[i]) * one
+        _slides(carried * one.conjugate(), pose.across, changes)
+
+    def transmission_angle(self, pose: PRPPose) -> float:
+        """Return the angle between the two lines, in [0, π/2], in [rad]."""
+        return atan2(abs(pose.across.imag), abs(pose.across.real))
+
+
+def _carried(slide: float, rate: float, turn: float, change: float) -> complex:
+    """Return what a turning line does to a point on it, centrifugal, Euler and Coriolis."""
+    return complex(-turn * turn * slide, change * slide + 2.0 * turn * rate)
+
+
+def _slides(between: complex, across: complex, state: State) -> tuple[float, float]:
+    """Resolve a vector in the frame of the first line along both, and append its parts."""
+    second = -between.imag / across.imag
+    first = between.real - between.imag * (across.real / across.imag)
+    state[0].append(first)
+    state[0].append(second)
+    return first, second

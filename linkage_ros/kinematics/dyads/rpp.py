@@ -1,0 +1,118 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+RPP: a link pinned at A slides along a second one, which slides on a known line; the Scotch yoke.
+
+Both links keep their angles to the rail, so the second rail has a constant angle α to the first.
+In the frame of the first, with A at z = x + i·y and κ a constant::
+
+    z = κ + s2 + s1·e^{iα}        s1 = Im(z − κ)/sin α        s2 = Re(z − κ) − s1·cos α
+
+s2 is the slide along the known line, s1 that of the pinned link along the second. The same holds
+of the rates and of the accelerations. There is one solution at every state, and no toggle.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, sin
+from typing import NamedTuple
+
+from linkage_ros.kinematics.rail import Rail, Sight
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import State
+from linkage_ros.tuples import new
+
+
+class RPPPose(NamedTuple):
+    """
+    The dyad at one state of the linkage.
+
+    Attributes
+    ----------
+    status, gap
+        Closed, 0.
+    first, second
+        s1 and s2, in the unit of the lengths.
+    sight
+        A in the frame of the rail.
+
+    """
+
+    status: Status
+    gap: float
+    first: float
+    second: float
+    sight: Sight
+
+
+class RPPDyad:
+    """
+    A link pinned at A on a link that slides on a line.
+
+    Parameters
+    ----------
+    rail
+        The known line.
+    constant
+        κ, in the unit of the lengths.
+    angle
+        α, in [rad]; no multiple of π.
+
+    """
+
+    __slots__ = ('_constants', '_rail')
+
+    def __init__(self, rail: Rail, constant: complex, angle: float) -> None:
+        self._rail = rail
+        self._constants = (constant, sin(angle), cos(angle))
+
+    def close(self, known: State) -> RPPPose:
+        """Append both slides."""
+        sight = self._rail.at(known)
+        first, second = self._slides(sight.place - self._constants[0], known)
+        return new(RPPPose, (Status.CLOSED, 0.0, first, second, sight))
+
+    def rates(self, pose: RPPPose, known: State, speeds: State) -> tuple[complex, float]:
+        """Append the rates of both slides."""
+        rates = self._rail.rates(pose.sight, known, speeds)
+        self._slides(rates[0], speeds)
+        return rates
+
+    def accelerations(
+        self,
+        pose: RPPPose,
+        rates: tuple[complex, float],
+        known: State,
+        speeds: State,
+        changes: State,
+    ) -> None:
+        """Append the accelerations of both slides."""
+        pull, _ = self._rail.accelerations(pose.sight, rates, known, speeds, changes)
+        self._slides(pull, changes)
+
+    def transmission_angle(self, _pose: RPPPose) -> float:
+        """Return the angle between the two lines, in [0, π/2], in [rad]."""
+        _, sine, cosine = self._constants
+        return atan2(abs(sine), abs(cosine))
+
+    def _slides(self, place: complex, state: State) -> tuple[float, float]:
+        """Resolve a vector along both lines, and append its parts."""
+        _, sine, cosine = self._constants
+        first = place.imag / sine
+        second = place.real - first * cosine
+        state[0].append(first)
+        state[0].append(second)
+        return first, second

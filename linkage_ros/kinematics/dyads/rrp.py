@@ -1,0 +1,139 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+RRP: a link pinned at A whose other pin B travels along a known line; the slider-crank.
+
+In the frame of the rail A lies at (x, y), and the link has the length b. With σ = +1 where B lies
+ahead of A along the line, −1 where it lies behind::
+
+    w = σ·√((b − y)·(b + y))        λ = atan2(−y, w)        r = x + w
+
+λ is the direction of the link in the frame of the rail, r the place of B along the line. Where the
+link stands across the line, w = 0: a toggle. Rates::
+
+    λ̇ = −ẏ/w                        ṙ = ẋ + y·λ̇
+    λ̈ = −(ÿ + y·λ̇²)/w               r̈ = ẍ + ẏ·λ̇ + y·λ̈
+"""
+
+from __future__ import annotations
+
+from math import atan2
+from typing import NamedTuple
+
+from linkage_ros.kinematics.diagonal import SMALLEST
+from linkage_ros.kinematics.rail import Rail, Sight
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import State
+from linkage_ros.tuples import new
+
+_CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
+
+
+class RRPPose(NamedTuple):
+    """
+    The dyad at one state of the linkage.
+
+    Attributes
+    ----------
+    status
+        Whether it closes.
+    gap
+        What the link misses the line by where it does not, else 0, in the unit of the lengths.
+    link
+        Direction of A→B, in [rad].
+    slide
+        r, in the unit of the lengths.
+    along
+        w, from A to B along the line.
+    sight
+        A in the frame of the rail.
+
+    """
+
+    status: Status
+    gap: float
+    link: float
+    slide: float
+    along: float
+    sight: Sight
+
+
+class RRPRates(NamedTuple):
+    """The rates of the rail's frame, A's velocity in it, and λ̇."""
+
+    rail: tuple[complex, float]
+    link: float
+
+
+class RRPDyad:
+    """
+    A link pinned at A, and a pin of it on a line.
+
+    Parameters
+    ----------
+    rail
+        The rail, asked for a link of length b.
+    sign
+        The assembly: +1 where B lies ahead of A, −1 where it lies behind. Where the rail passes a
+        change point: for −π/2 < ψ < π/2.
+
+    """
+
+    __slots__ = ('_rail', '_sign')
+
+    def __init__(self, rail: Rail, sign: int) -> None:
+        self._rail = rail
+        self._sign = float(sign)
+
+    def close(self, known: State) -> RRPPose:
+        """Append the direction of the link, as the rail's link has it, and the slide."""
+        sight = self._rail.at(known)
+        place, below, above, gap, base, _ = sight
+        if gap:
+            return RRPPose(Status.OPEN, gap, 0.0, 0.0, 0.0, sight)
+        along = self._sign * below * above
+        if -SMALLEST < along < SMALLEST:
+            along = 0.0
+        link = base + atan2(-place.imag, along)
+        slide = place.real + along
+        known[0].append(link)
+        known[0].append(slide)
+        return new(RRPPose, (_CLOSED if along else _TOGGLE, 0.0, link, slide, along, sight))
+
+    def rates(self, pose: RRPPose, known: State, speeds: State) -> RRPRates:
+        """Append the rates of link and slide."""
+        rail = self._rail.rates(pose.sight, known, speeds)
+        velocity, turn = rail
+        link = -velocity.imag / pose.along
+        speeds[0].append(turn + link)
+        speeds[0].append(velocity.real + pose.sight.place.imag * link)
+        return new(RRPRates, (rail, link))
+
+    def accelerations(
+        self, pose: RRPPose, rates: RRPRates, known: State, speeds: State, changes: State
+    ) -> None:
+        """Append the accelerations of link and slide."""
+        (velocity, _), link = rates
+        pull, turn = self._rail.accelerations(pose.sight, rates.rail, known, speeds, changes)
+        y = pose.sight.place.imag
+        across = self._rail.across(pose.sight, pull, pose.along, link, speeds, changes)
+        change = -across / pose.along
+        changes[0].append(turn + change)
+        changes[0].append(pull.real + velocity.imag * link + y * change)
+
+    def transmission_angle(self, pose: RRPPose) -> float:
+        """Return the angle between the link and the normal of the line, in [0, π/2], in [rad]."""
+        return atan2(abs(pose.along), abs(pose.sight.place.imag))

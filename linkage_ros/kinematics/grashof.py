@@ -1,0 +1,110 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The name of a four-bar, from its four lengths alone."""
+
+from __future__ import annotations
+
+from math import fsum
+from typing import NamedTuple
+
+from linkage_ros.kinematics.diagonal import margin
+
+
+class FourBarType(NamedTuple):
+    """
+    What a four-bar is called, after Grashof and Barker.
+
+    Attributes
+    ----------
+    code
+        Barker's: G Grashof, S change point; then C crank or R rocker for input, coupler and
+        output. RRR1 to RRR4 are triple rockers, by the longest link.
+    name
+        As an engineer says it.
+    margin
+        How much shorter the shortest and the longest link are together than the other two;
+        negative where they are longer, 0 at a change point. In the unit of the lengths.
+
+    """
+
+    code: str
+    name: str
+    margin: float
+
+
+# By the place of the shortest link, or of the longest: input, coupler, output, frame.
+_GRASHOF = (
+    ('GCRR', 'crank-rocker'),
+    ('GRCR', 'double rocker (the coupler turns fully)'),
+    ('GRRC', 'rocker-crank'),
+    ('GCCC', 'double crank (drag link)'),
+)
+_TRIPLE_ROCKERS = (
+    ('RRR2', 'triple rocker, the input is longest'),
+    ('RRR3', 'triple rocker, the coupler is longest'),
+    ('RRR4', 'triple rocker, the output is longest'),
+    ('RRR1', 'triple rocker, the frame is longest'),
+)
+_CHANGE_POINTS = (
+    ('SCRR', 'change-point crank-rocker'),
+    ('SRCR', 'change-point double rocker'),
+    ('SRRC', 'change-point rocker-crank'),
+    ('SCCC', 'change-point double crank'),
+)
+
+
+def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
+    """
+    Name a four-bar.
+
+    F. Grashof (Theoretische Maschinenlehre, vol. 2, 1883): some link turns fully against the
+    others where the shortest and the longest are together no longer than the other two. The
+    fourteen names are those of C. R. Barker, A complete classification of planar four-bar
+    linkages, Mechanism and Machine Theory 20 (1985) 535-554; R. L. Norton, Design of Machinery,
+    ch. 2, lists them. Lengths count as equal where they differ by their rounding only.
+
+    Neither the shortest nor the longest link is ever in doubt: two shortest ones, or two longest,
+    make the one inequality or the other impossible; at a change point they come in pairs.
+
+    Parameters
+    ----------
+    a, b, c, d
+        Lengths of input, coupler, output and frame, above 0.
+
+    Raises
+    ------
+    ValueError
+        Where one is longer than the others together, so that the loop does not close.
+
+    """
+    sides = (a, b, c, d)
+    shortest, p, q, longest = sorted(sides)
+    if fsum((shortest, p, q, -longest)) < 0.0 and margin(shortest, p, q, -longest):
+        raise ValueError(f'{longest!r} is longer than {shortest!r}, {p!r} and {q!r} together')
+    excess = margin(p, q, -shortest, -longest)
+    if excess > 0.0:
+        return FourBarType(*_GRASHOF[sides.index(shortest)], excess)
+    if excess < 0.0:
+        return FourBarType(*_TRIPLE_ROCKERS[sides.index(longest)], excess)
+    opposite = margin(a, -c) == margin(b, -d) == 0.0
+    beside = margin(a, -b) == margin(c, -d) == 0.0 or margin(a, -d) == margin(b, -c) == 0.0
+    if opposite and beside:
+        return FourBarType('S3X', 'rhombus (change point, all links equal)', 0.0)
+    if opposite:
+        return FourBarType('S2X', 'parallelogram (change point)', 0.0)
+    if beside:
+        return FourBarType('S2X', 'kite (change point)', 0.0)
+    return FourBarType(*_CHANGE_POINTS[sides.index(shortest)], 0.0)

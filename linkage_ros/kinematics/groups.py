@@ -1,0 +1,429 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The sequence in which a linkage is solved, found from which link is joined to which.
+
+Links that driven joints hold together are one body whose shape the inputs know. What is joined to
+the known part by its own joint, and with another such body by one more, is a dyad (an Assur group
+of class II): both become known, and so on. Where no dyad is left, the smallest set of bodies with
+as many unknowns as constraints is solved by iteration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.linkage import GROUND, Linkage, Point
+
+_BLOCK = 'block of '
+"""With the name of a slider, that of the block which a pin in a slot stands for."""
+
+_LARGEST_GROUP = 8
+"""Bodies of a group that is searched for by trial; a larger one is solved as a whole."""
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """
+    A pin ('R') or slider ('P') between two links.
+
+    ``name`` is that of the point or of the slider; ``link`` belongs to the group, ``to`` is the
+    link that it is joined to.
+    """
+
+    kind: str
+    name: str
+    link: str
+    to: str
+
+
+@dataclass(frozen=True, slots=True)
+class Driven:
+    """An input that places ``joint.link`` once ``joint.to`` is known; ``index`` numbers it."""
+
+    joint: Joint
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class Dyad:
+    """
+    Two bodies joined to each other, and each to what is known.
+
+    Attributes
+    ----------
+    kind
+        RRR, RRP, RPR, PRP or RPP: the first body's outer joint, the inner one, the second's outer.
+    bodies
+        The links of each body; more than one where driven joints hold them together.
+    outer
+        Joint of each body to what is known.
+    inner
+        Joint from the first body to the second.
+
+    """
+
+    kind: str
+    bodies: tuple[tuple[str, ...], tuple[str, ...]]
+    outer: tuple[Joint, Joint]
+    inner: Joint
+
+
+@dataclass(frozen=True, slots=True)
+class Iterated:
+    """Links that no dyad covers; their joints are all those among them and to what is known."""
+
+    links: tuple[str, ...]
+
+
+Group = Driven | Dyad | Iterated
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """
+    A linkage as bodies and joints.
+
+    Attributes
+    ----------
+    links
+        The links and their points; a pin in a slot has a block of its own.
+    blocks
+        For each slider the link that slides.
+    groups
+        In the order in which they are solved.
+    joints
+        All joints; a pin of three links is two.
+
+    """
+
+    links: Mapping[str, Mapping[str, Point]]
+    blocks: Mapping[str, str]
+    groups: tuple[Group, ...]
+    joints: tuple[Joint, ...]
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom, by Grübler's count, before the inputs take theirs."""
+        return 3 * (len(self.links) - 1) - 2 * len(self.joints)
+
+
+def find_groups(linkage: Linkage) -> Structure:
+    """
+    Find the order in which a linkage is solved.
+
+    Raises
+    ------
+    DefinitionError
+        Where a link is free, held twice over, or joined to nothing that leads to the ground.
+
+    """
+    links: dict[str, Mapping[str, Point]] = dict(linkage.links)
+    blocks: dict[str, str] = {}
+    for name, slider in linkage.sliders.items():
+        blocks[name] = slider.block or f'{_BLOCK}{name}'
+        if not slider.block:
+            links[blocks[name]] = {slider.point: (0.0, 0.0)}
+    joints = tuple(_joints(linkage, links, blocks))
+    _check_connected(linkage, links, joints)
+    search = _Search(linkage, links, blocks, joints)
+    structure = Structure(links, blocks, tuple(search.groups()), joints)
+    freedom = structure.freedom
+    if freedom != len(linkage.inputs):
+        raise DefinitionError('links', *_freedom(freedom, len(linkage.inputs)))
+    return structure
+
+
+def _freedom(freedom: int, inputs: int) -> tuple[str, str]:
+    return (
+        f'{freedom} degree(s) of freedom and {inputs} input(s)',
+        'add an input, a link or a pin' if freedom > inputs else 'take away a link or a pin',
+    )
+
+
+def _joints(
+    linkage: Linkage, links: Mapping[str, Mapping[str, Point]], blocks: Mapping[str, str]
+) -> Iterator[Joint]:
+    carriers: dict[str, list[str]] = {}
+    for link, points in links.items():
+        for point in points:
+            carriers.setdefault(point, []).append(link)
+    for point, carried in carriers.items():
+        for link in carried[1:]:
+            yield Joint('R', point, link, carried[0])
+    for name, slider in linkage.sliders.items():
+        yield Joint('P', name, blocks[name], slider.along)
+
+
+def _check_connected(
+    linkage: Linkage, links: Mapping[str, Mapping[str, Point]], joints: tuple[Joint, ...]
+) -> None:
+    reached, before = {GROUND}, 0
+    while len(reached) > before:
+        before = len(reached)
+        for joint in joints:
+            if joint.link in reached or joint.to in reached:
+                reached |= {joint.link, joint.to}
+    for link in linkage.links:
+        if link not in reached:
+            raise DefinitionError(
+                f'links.{link}',
+                'no chain of pins and sliders joins it to the ground',
+                'name one of its points on another link too, or leave it out',
+            )
+
+
+class _Search:
+    """The search for the next group, with what is known so far."""
+
+    def __init__(
+        self,
+        linkage: Linkage,
+        links: Mapping[str, Mapping[str, Point]],
+        blocks: Mapping[str, str],
+        joints: tuple[Joint, ...],
+    ) -> None:
+        self._linkage = linkage
+        self._links = links
+        self._joints = joints
+        self._sliders = {j.name: j for j in joints if j.kind == 'P'}
+        self._rank = {GROUND: 0}
+        self._order = {link: i for i, link in enumerate(links)}
+        self._drives = tuple(self._driven_joint(i, blocks) for i in range(len(linkage.inputs)))
+        self._bodies = self._merged()
+
+    def groups(self) -> Iterator[Group]:
+        """Return group after group until all is known."""
+        yield from self._learn((GROUND,))
+        while unknown := [body for body in self._bodies if body[0] not in self._rank]:
+            dyad = self._next_dyad(unknown)
+            if dyad is not None:
+                yield dyad
+                for body, first in zip(dyad.bodies, _firsts(dyad), strict=True):
+                    yield from self._learn(body, first)
+                continue
+            chosen = self._smallest_group(unknown)
+            yield Iterated(tuple(link for body in chosen for link in body))
+            for body in chosen:
+                for link in body:
+                    self._rank[link] = len(self._rank)
+
+    def _driven_joint(self, index: int, blocks: Mapping[str, str]) -> Joint:
+        given = self._linkage.inputs[index]
+        if given.slider:
+            return self._sliders[given.slider]
+        shared = set(self._links[given.parent]) & set(self._links[given.child])
+        (pin,) = shared
+        return Joint('R', pin, given.child, given.parent)
+
+    def _merged(self) -> list[tuple[str, ...]]:
+        """Return the links, those that driven joints hold together as one."""
+        body_of: dict[str, tuple[str, ...]] = {link: (link,) for link in self._links}
+        for index, drive in enumerate(self._drives):
+            one, other = body_of[drive.link], body_of[drive.to]
+            if one == other:
+                raise DefinitionError(
+                    f'input.{self._linkage.inputs[index].joint}',
+                    f'{drive.link!r} and {drive.to!r} are held by other inputs already',
+                    'leave one of the inputs out',
+                )
+            both = tuple(sorted(one + other, key=self._order.__getitem__))
+            for link in both:
+                body_of[link] = both
+        return sorted(set(body_of.values()), key=lambda body: self._order[body[0]])
+
+    def _learn(self, body: tuple[str, ...], first: str = GROUND) -> Iterator[Driven]:
+        """Take a body, from its first known link on, by its driven joints."""
+        self._rank.setdefault(first, len(self._rank))
+        body = next(known for known in self._bodies if first in known)
+        learnt = True
+        while learnt:
+            learnt = False
+            for index, drive in enumerate(self._drives):
+                ends = (drive.link, drive.to)
+                known = [end for end in ends if end in self._rank]
+                if drive.link in body and len(known) == 1:
+                    (new,) = set(ends) - set(known)
+                    yield Driven(Joint(drive.kind, drive.name, new, known[0]), index)
+                    self._rank[new] = len(self._rank)
+                    learnt = True
+
+    def _outer(self, body: tuple[str, ...]) -> list[Joint]:
+        """Return the joints of a body to what is known."""
+        pins: dict[str, Joint] = {}
+        for link in body:
+            for point in self._links[link]:
+                carriers = [k for k in self._rank if point in self._links[k]]
+                if carriers:
+                    pins.setdefault(point, Joint('R', point, link, carriers[0]))
+        found = list(pins.values())
+        for joint in self._sliders.values():
+            for one, other in ((joint.link, joint.to), (joint.to, joint.link)):
+                if one in body and other in self._rank:
+                    found.append(Joint('P', joint.name, one, other))
+        return found
+
+    def _inner(self, one: tuple[str, ...], other: tuple[str, ...]) -> list[Joint]:
+        """Return the joints between two bodies, but for pins that are known already."""
+        known = {point for link in self._rank for point in self._links[link]}
+        pins: dict[str, Joint] = {}
+        for link in one:
+            for to in other:
+                for point in self._links[link]:
+                    if point in self._links[to] and point not in known:
+                        pins.setdefault(point, Joint('R', point, link, to))
+        found = list(pins.values())
+        for joint in self._sliders.values():
+            if joint.link in one and joint.to in other:
+                found.append(Joint('P', joint.name, joint.link, joint.to))
+            if joint.link in other and joint.to in one:
+                found.append(Joint('P', joint.name, joint.to, joint.link))
+        return found
+
+    def _next_dyad(self, unknown: list[tuple[str, ...]]) -> Dyad | None:
+        outer = {body: self._outer(body) for body in unknown}
+        for body, joints in outer.items():
+            if len(joints) > 1:
+                raise DefinitionError(
+                    _key(body, self._linkage),
+                    f'is held twice: by {" and ".join(_spoken(j) for j in joints)}',
+                    'with both it cannot move as the rest does; take one of them away',
+                )
+        for one, other in combinations(unknown, 2):
+            if not (outer[one] and outer[other]):
+                continue
+            inner = self._inner(one, other)
+            if len(inner) > 1:
+                raise DefinitionError(
+                    _key(other, self._linkage),
+                    f'is joined to {one[0]!r} twice: by {" and ".join(_spoken(j) for j in inner)}',
+                    'take one of them away, or make one link of the two',
+                )
+            if inner:
+                dyad = self._dyad((one, other), (outer[one][0], outer[other][0]), inner[0])
+                if dyad is not None:
+                    return dyad
+        return None
+
+    def _dyad(
+        self,
+        bodies: tuple[tuple[str, ...], tuple[str, ...]],
+        outer: tuple[Joint, Joint],
+        inner: Joint,
+    ) -> Dyad | None:
+        """Return a dyad with its bodies in order, or nothing where it takes an iteration."""
+        kind = outer[0].kind + inner.kind + outer[1].kind
+        composite = len(bodies[0]) > 1 or len(bodies[1]) > 1
+        if kind == 'PPP':
+            raise DefinitionError(
+                f'sliders.{inner.name}',
+                f'with {outer[0].name!r} and {outer[1].name!r} three sliders follow each other',
+                'they leave a link free and an angle held twice; make one of them a pin',
+            )
+        if composite and kind != 'RRR':
+            return None
+        if kind == 'RPR':
+            # The body with the rail comes first.
+            turn = inner.link != self._linkage.sliders[inner.name].along
+        elif outer[0].kind != outer[1].kind:
+            # The body with the pin comes first.
+            turn = outer[0].kind == 'P'
+        else:
+            # The body on the link that is known later comes first, so that of the ground last.
+            ranks = [self._rank[joint.to] for joint in outer]
+            turn = ranks[0] < ranks[1]
+        if turn:
+            bodies = (bodies[1], bodies[0])
+            outer = (outer[1], outer[0])
+            inner = Joint(inner.kind, inner.name, inner.to, inner.link)
+            kind = kind[::-1]
+        return Dyad(kind, bodies, outer, inner)
+
+    def _smallest_group(self, unknown: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+        """Return the smallest set of bodies that has as many unknowns as constraints."""
+        constrained = {body: len(self._outer(body)) for body in unknown}
+        between = {
+            frozenset((one, other)): self._inner(one, other)
+            for one, other in combinations(unknown, 2)
+        }
+        everything = self._freedom_of(unknown, constrained, between)
+        largest = len(unknown) if len(unknown) <= 14 else 0
+        for size in range(1, min(largest, _LARGEST_GROUP) + 1):
+            for chosen in combinations(unknown, size):
+                if self._freedom_of(list(chosen), constrained, between) == 0:
+                    return list(chosen)
+        if everything == 0:
+            return unknown
+        loose = min(unknown, key=lambda b: constrained[b] + self._hold(b, unknown, between))
+        if everything > 0:
+            raise DefinitionError(
+                _key(loose, self._linkage),
+                'is free: its pins and sliders do not hold it, '
+                f'{everything} degree(s) of freedom too many',
+                'join it to one more link, or name one more input',
+            )
+        raise DefinitionError(
+            _key(unknown[-1], self._linkage),
+            f'belongs to links that hold each other too well, {-everything} degree(s) of freedom '
+            'too few',
+            'take away a link or a pin',
+        )
+
+    def _hold(
+        self,
+        body: tuple[str, ...],
+        unknown: list[tuple[str, ...]],
+        between: Mapping[frozenset[tuple[str, ...]], list[Joint]],
+    ) -> int:
+        return sum(len(between[frozenset((body, other))]) for other in unknown if other != body)
+
+    def _freedom_of(
+        self,
+        bodies: list[tuple[str, ...]],
+        constrained: Mapping[tuple[str, ...], int],
+        between: Mapping[frozenset[tuple[str, ...]], list[Joint]],
+    ) -> int:
+        """Count the degrees of freedom of bodies on what is known; a pin of three counts twice."""
+        joints = sum(constrained[body] for body in bodies)
+        pins: dict[str, set[tuple[str, ...]]] = {}
+        for one, other in combinations(bodies, 2):
+            for joint in between[frozenset((one, other))]:
+                if joint.kind == 'P':
+                    joints += 1
+                else:
+                    pins.setdefault(joint.name, set()).update((one, other))
+        joints += sum(len(carriers) - 1 for carriers in pins.values())
+        return 3 * len(bodies) - 2 * joints
+
+
+def _firsts(dyad: Dyad) -> tuple[str, str]:
+    """Return the link of each body that the dyad's outer joint holds."""
+    return dyad.outer[0].link, dyad.outer[1].link
+
+
+def _key(body: tuple[str, ...], linkage: Linkage) -> str:
+    """Return the key by which the user has named a body: a link, or the slider of a slot."""
+    for link in body:
+        if link in linkage.links:
+            return f'links.{link}'
+    return f'sliders.{body[0].removeprefix(_BLOCK)}'
+
+
+def _spoken(joint: Joint) -> str:
+    return f'{"pin" if joint.kind == "R" else "slider"} {joint.name!r}'

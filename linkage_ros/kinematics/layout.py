@@ -1,0 +1,73 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Where links and sliders are, in terms of the coordinates of a solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Angle:
+    """A link's angle: a coordinate and a constant, in [rad]."""
+
+    coordinate: int
+    constant: float
+
+    def plus(self, angle: float) -> Angle:
+        """Return the angle of what stands at a constant angle to the link."""
+        return Angle(self.coordinate, self.constant + angle)
+
+
+@dataclass(frozen=True, slots=True)
+class Slide:
+    """A slide: ± a coordinate, and a constant, in the unit of the lengths."""
+
+    coordinate: int
+    sign: float
+    constant: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """
+    Where a link is held: its ``point``, in its own frame, lies where ``at`` of ``link`` does.
+
+    With a ``slide``, it lies that far along a line from there, whose ``direction`` is in the frame
+    of ``link``, in [rad]. A ``pin`` is the number of a pin that an iteration has placed.
+    """
+
+    point: complex
+    link: str
+    at: complex = 0j
+    slide: Slide | None = None
+    direction: float = 0.0
+    pin: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """
+    The way of a point of one link along a slider, in the frame of the link that it slides on.
+
+    The point lies at start + sign·(slide of the slider)·e^{i·direction}; ``angle`` is that of the
+    moving link less that of the other one.
+    """
+
+    start: complex
+    direction: float
+    angle: float
+    sign: float

@@ -1,0 +1,89 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""How near trouble a linkage is: transmission angle, conditioning, distance to a toggle."""
+
+from __future__ import annotations
+
+from math import inf, pi, remainder, sin, sqrt, tau
+from typing import NamedTuple, TYPE_CHECKING
+
+from linkage_ros.kinematics.diagonal import CrankDiagonal
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure, Position
+
+
+class Nearness(NamedTuple):
+    """
+    How near trouble a position is; the smaller, the nearer.
+
+    Attributes
+    ----------
+    transmission_angle
+        The smallest of all dyads, folded into [0, π/2], in [rad]; π/2 where there is none.
+    conditioning
+        The smallest singular value of a loop's Jacobian, of rows of length 1: for a dyad of
+        transmission angle μ it is √2·sin(μ/2), from 0 at a toggle to 1. For an iterated group it
+        is the smallest singular value divided by the largest.
+    toggle_distance
+        How far the input is from the next toggle or change point, in [rad] or [m]; infinite where
+        there is none, and where there are several inputs.
+
+    """
+
+    transmission_angle: float
+    conditioning: float
+    toggle_distance: float
+
+
+def nearness(closure: Closure, position: Position) -> Nearness:
+    """Return how near trouble a closed position is."""
+    angle, conditioning = 0.5 * pi, 1.0
+    for step, pose in zip(closure.steps, position.poses, strict=True):
+        if hasattr(step, 'transmission_angle'):
+            angle = min(angle, step.transmission_angle(pose))
+        elif hasattr(step, 'conditioning'):
+            conditioning = min(conditioning, step.conditioning(pose))
+    conditioning = min(conditioning, sqrt(2.0) * sin(0.5 * angle))
+    distance = inf
+    if len(closure.linkage.inputs) == 1:
+        sliding = bool(closure.linkage.inputs[0].slider)
+        unit = closure.scale if sliding else 1.0
+        value = position.state.coordinates[1] * unit
+        for critical in closure.critical_inputs:
+            away = value - critical
+            distance = min(distance, abs(away if sliding else remainder(away, tau)))
+    return Nearness(angle, conditioning, distance)
+
+
+def critical_inputs(closure: Closure) -> tuple[float, ...]:
+    """
+    Return where a single input meets toggles and change points.
+
+    Toggles end the ranges of the input. A change point of a dyad on crank and ground is where its
+    margin is zero: the crank along the ground, outwards for the fold, inwards for the stretch.
+    """
+    found = []
+    for interval in closure.input_ranges:
+        if not interval.whole:
+            found += [interval.lowest, interval.highest]
+    for step in closure.steps:
+        diagonal = getattr(step, 'diagonal', None)
+        if isinstance(diagonal, CrankDiagonal) and diagonal.arms[:2] == (1, 0):
+            for margin, phi in ((diagonal.fold_margin, 0.0), (diagonal.stretch_margin, pi)):
+                if margin == 0.0:
+                    found.append(remainder(phi - diagonal.arms[2], tau))
+    return tuple(sorted(found))

@@ -1,0 +1,197 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Steps that place a point of a link whose angle is known, or move a coordinate along."""
+
+from __future__ import annotations
+
+from cmath import rect
+from math import cos, sin
+
+from linkage_ros.kinematics.step import PLACED, Pose, State
+
+
+class FixedPoint:
+    """
+    A point of the ground.
+
+    Parameters
+    ----------
+    place
+        In the frame of the ground.
+
+    """
+
+    __slots__ = ('_place',)
+
+    def __init__(self, place: complex) -> None:
+        self._place = place
+
+    def close(self, known: State) -> Pose:
+        """Append the point."""
+        known[1].append(self._place)
+        return PLACED
+
+    def rates(self, _pose: Pose, _known: State, speeds: State) -> None:
+        """Append that it stands."""
+        speeds[1].append(0j)
+
+    def accelerations(
+        self, _pose: Pose, _rates: None, _known: State, _speeds: State, changes: State
+    ) -> None:
+        """Append that it stands."""
+        changes[1].append(0j)
+
+
+class PointOnLink:
+    """
+    A point at a constant distance from a pin of the same link.
+
+    Parameters
+    ----------
+    pin
+        Index of that pin; the point's own index is the next free one.
+    arm
+        Index, among the coordinates, of the angle of the link.
+    length, direction
+        From the pin to the point: distance, and direction less that coordinate, in [rad].
+
+    """
+
+    __slots__ = ('_arm', '_direction', '_length', '_pin', '_point')
+
+    def __init__(self, pin: int, point: int, arm: int, length: float, direction: float) -> None:
+        self._pin = pin
+        self._point = point
+        self._arm = arm
+        self._length = length
+        self._direction = direction
+
+    def close(self, known: State) -> Pose:
+        """Append the point."""
+        x, pins = known
+        pins.append(pins[self._pin] + rect(self._length, x[self._arm] + self._direction))
+        return PLACED
+
+    def rates(self, _pose: Pose, known: State, speeds: State) -> None:
+        """Append its velocity."""
+        pins, (v, velocities) = known[1], speeds
+        arm = pins[self._point] - pins[self._pin]
+        velocities.append(velocities[self._pin] + complex(0.0, v[self._arm]) * arm)
+
+    def accelerations(
+        self, _pose: Pose, _rates: None, known: State, speeds: State, changes: State
+    ) -> None:
+        """Append its acceleration."""
+        pins, turn, (a, pulls) = known[1], speeds[0][self._arm], changes
+        arm = pins[self._point] - pins[self._pin]
+        pulls.append(pulls[self._pin] + complex(-turn * turn, a[self._arm]) * arm)
+
+
+class PointOnRail:
+    """
+    A point that travels along a line of a link.
+
+    Parameters
+    ----------
+    pin
+        Index of the pin that the line starts from.
+    arm
+        Index, among the coordinates, of the angle of the link that carries the line.
+    slide
+        Index, among the coordinates, of the way along the line.
+    direction
+        Of the line less the coordinate of the link, in [rad].
+    sign
+        +1 where the point travels in that direction with the slide, −1 where against it.
+
+    """
+
+    __slots__ = ('_arm', '_direction', '_pin', '_sign', '_slide')
+
+    def __init__(self, pin: int, arm: int, slide: int, direction: float, sign: float) -> None:
+        self._pin = pin
+        self._arm = arm
+        self._slide = slide
+        self._direction = direction
+        self._sign = sign
+
+    def close(self, known: State) -> Pose:
+        """Append the point."""
+        x, pins = known
+        along = self._sign * x[self._slide]
+        direction = x[self._arm] + self._direction
+        pins.append(pins[self._pin] + complex(along * cos(direction), along * sin(direction)))
+        return PLACED
+
+    def rates(self, _pose: Pose, known: State, speeds: State) -> None:
+        """Append its velocity."""
+        x, (v, velocities) = known[0], speeds
+        unit = rect(self._sign, x[self._arm] + self._direction)
+        moved = complex(v[self._slide], v[self._arm] * x[self._slide])
+        velocities.append(velocities[self._pin] + moved * unit)
+
+    def accelerations(
+        self, _pose: Pose, _rates: None, known: State, speeds: State, changes: State
+    ) -> None:
+        """Append its acceleration."""
+        x, v, (a, pulls) = known[0], speeds[0], changes
+        unit = rect(self._sign, x[self._arm] + self._direction)
+        slide, turn = x[self._slide], v[self._arm]
+        moved = complex(
+            a[self._slide] - turn * turn * slide,
+            a[self._arm] * slide + 2.0 * turn * v[self._slide],
+        )
+        pulls.append(pulls[self._pin] + moved * unit)
+
+
+class Turned:
+    """
+    The angle of a link that a driven joint turns against another.
+
+    Parameters
+    ----------
+    arm, turn
+        Indices, among the coordinates, of the other link's angle and of the joint.
+    sign
+        +1 where the joint adds to that angle, −1 where it is taken away.
+
+    """
+
+    __slots__ = ('_arm', '_sign', '_turn')
+
+    def __init__(self, arm: int, turn: int, sign: float) -> None:
+        self._arm = arm
+        self._turn = turn
+        self._sign = sign
+
+    def close(self, known: State) -> Pose:
+        """Append the angle."""
+        self._append(known)
+        return PLACED
+
+    def rates(self, _pose: Pose, _known: State, speeds: State) -> None:
+        """Append its rate."""
+        self._append(speeds)
+
+    def accelerations(
+        self, _pose: Pose, _rates: None, _known: State, _speeds: State, changes: State
+    ) -> None:
+        """Append its acceleration."""
+        self._append(changes)
+
+    def _append(self, state: State) -> None:
+        values = state[0]
+        values.append(values[self._arm] + self._sign * values[self._turn])

@@ -1,0 +1,299 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A pin seen from a rail: its place in the frame of the line along which another pin travels.
+
+The line passes E in the direction û on a link that is known; the frame of the rail has its origin
+at E and û for its x axis. Where the seen pin A lies on a link that is pinned, at O, to the one
+that carries the rail, its place follows from the angle between the two links (`CrankRail`); for
+all others from the coordinates (`FreeRail`).
+"""
+
+from __future__ import annotations
+
+from cmath import rect
+from math import cos, inf, pi, sin, sqrt
+from typing import NamedTuple, Protocol
+
+from linkage_ros.kinematics.diagonal import margin, reach, root_of
+from linkage_ros.kinematics.step import State
+from linkage_ros.tuples import new
+
+
+class Sight(NamedTuple):
+    """
+    The pin A in the frame of the rail.
+
+    Attributes
+    ----------
+    place
+        (x + i·y), in the unit of the lengths.
+    below, above
+        √(b − y) and √(b + y): how far a link of length b from A to the line is from its limits.
+        Signed at a change point; infinite where no such link is asked for.
+    gap
+        What A is too far from the line by; 0 where it is not.
+    base
+        Coordinate of the link that carries the rail, in [rad].
+    arm
+        From O to A in the frame of a `CrankRail`, else 0.
+
+    """
+
+    place: complex
+    below: float
+    above: float
+    gap: float
+    base: float
+    arm: complex
+
+
+class Rail(Protocol):
+    """What a dyad asks of a rail."""
+
+    def at(self, known: State, /) -> Sight:
+        """Return the pin in the frame of the rail."""
+
+    def rates(self, sight: Sight, known: State, speeds: State, /) -> tuple[complex, float]:
+        """Return the pin's velocity in that frame, and the rate of the frame, in [rad/s]."""
+
+    def accelerations(
+        self,
+        sight: Sight,
+        rates: tuple[complex, float],
+        known: State,
+        speeds: State,
+        changes: State,
+        /,
+    ) -> tuple[complex, float]:
+        """Return the pin's acceleration in that frame, and that of the frame, in [rad/s²]."""
+
+    def across(
+        self,
+        sight: Sight,
+        pull: complex,
+        along: float,
+        link_rate: float,
+        speeds: State,
+        changes: State,
+        /,
+    ) -> float:
+        """Return ÿ + y·λ̇², of a link at the rate λ̇ whose part along the line is w."""
+
+
+class CrankRail:
+    """
+    A rail on a link to which the link of A is pinned at O.
+
+    With a = OA at the angle ψ to the rail, O at (f, e) in the frame of the rail, and a link of
+    length b from A to the line::
+
+        b − y = (b − e − a) + 2a·sin²(π/4 − ψ/2)        b + y = (b + e − a) + 2a·cos²(π/4 − ψ/2)
+
+    The brackets are constants of the linkage. With ψ = π/2 − 2η and η near 0 or π/2 at a change
+    point, sine and cosine of ψ are taken from those of η as well, so that what cancels there does.
+
+    Parameters
+    ----------
+    a
+        Length of OA.
+    pivot
+        O in the frame of the rail.
+    link
+        b; infinite where no link is asked for.
+    arms
+        Indices, among the coordinates, of the direction of OA and of the link with the rail.
+    offset
+        ψ less the difference of those two coordinates, in [rad].
+
+    """
+
+    __slots__ = ('_arms', '_constants', '_link')
+
+    def __init__(
+        self, a: float, pivot: complex, link: float, arms: tuple[int, int], offset: float
+    ) -> None:
+        endless = link == inf
+        below, above = (
+            (inf, inf)
+            if endless
+            else (margin(link, side, -a) for side in (-pivot.imag, pivot.imag))
+        )
+        self._constants = (a, pivot, below, above, sqrt(2.0) * sqrt(a), endless)
+        self._link = link
+        self._arms = (*arms, offset)
+
+    def at(self, known: State) -> Sight:
+        """Return the pin in the frame of the rail."""
+        a, pivot, below, above, root, endless = self._constants
+        first, second, offset = self._arms
+        x = known[0]
+        base = x[second]
+        half = 0.5 * (0.5 * pi - (x[first] - base + offset))
+        sine, cosine = sin(half), cos(half)
+        arm = complex(2.0 * a * sine * cosine, a * (cosine - sine) * (cosine + sine))
+        if endless:
+            return new(Sight, (pivot + arm, inf, inf, 0.0, base, arm))
+        root_below, gap = reach(below, root * sine, 1.0)
+        root_above = 0.0
+        if not gap:
+            root_above, gap = reach(above, root * cosine, 1.0)
+        return new(Sight, (pivot + arm, root_below, root_above, gap, base, arm))
+
+    def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
+        """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
+        first, second, _ = self._arms
+        v = speeds[0]
+        swing, arm = v[first] - v[second], sight.arm
+        return complex(-swing * arm.imag, swing * arm.real), v[second]
+
+    def accelerations(
+        self,
+        sight: Sight,
+        _rates: tuple[complex, float],
+        _known: State,
+        speeds: State,
+        changes: State,
+    ) -> tuple[complex, float]:
+        """Return the pin's acceleration in the frame of the rail, and that of the frame."""
+        first, second, _ = self._arms
+        v, a = speeds[0], changes[0]
+        swing = v[first] - v[second]
+        return complex(-swing * swing, a[first] - a[second]) * sight.arm, a[second]
+
+    def across(
+        self,
+        sight: Sight,
+        _pull: complex,
+        along: float,
+        _link_rate: float,
+        speeds: State,
+        changes: State,
+    ) -> float:
+        """
+        Return ÿ + y·λ̇².
+
+        Of the two terms, which cancel at a change point, there remains, by ψ̇²::
+
+            (e·(b − y)² − y·(b − e − a)·(a + b − e))/w²
+              = (e·(b + y)² − y·(b + e − a)·(a + b + e))/w²
+
+        The brackets b ∓ e − a are constants of the linkage; the nearer limit is the better form.
+        """
+        first, second, _ = self._arms
+        v, changed = speeds[0], changes[0]
+        a, pivot, below, above = self._constants[:4]
+        link, e, y = self._link, pivot.imag, sight.place.imag
+        swing = v[first] - v[second]
+        if y > 0.0:
+            rest = e * sight.below**4 - y * below * (a + link - e)
+        else:
+            rest = e * sight.above**4 - y * above * (a + link + e)
+        change = (changed[first] - changed[second]) * sight.arm.real
+        return change + swing * swing * (rest / along / along)
+
+
+class UnsignedRail(CrankRail):
+    """A `CrankRail` whose angle is known but for whole turns; as `UnsignedDiagonal`."""
+
+    __slots__ = ()
+
+    def at(self, known: State) -> Sight:
+        """Return the pin in the frame of the rail."""
+        found = super().at(known)
+        return found._replace(below=abs(found.below), above=abs(found.above))
+
+
+class FreeRail:
+    """
+    A rail and a pin, from their coordinates.
+
+    Parameters
+    ----------
+    ends
+        Indices of E and A among the pins.
+    link
+        b, length of a link from A to the line; infinite where none is asked for.
+    arm
+        Index, among the coordinates, of the angle of the link that carries the rail.
+    direction
+        Direction of the line less that coordinate, in [rad].
+
+    """
+
+    __slots__ = ('_arm', '_direction', '_ends', '_link')
+
+    def __init__(self, ends: tuple[int, int], link: float, arm: int, direction: float) -> None:
+        self._ends = ends
+        self._link = link
+        self._arm = arm
+        self._direction = direction
+
+    def at(self, known: State) -> Sight:
+        """Return the pin in the frame of the rail."""
+        x, pins = known
+        base = x[self._arm]
+        start, end = (pins[i] for i in self._ends)
+        place = (end - start) * rect(1.0, -(base + self._direction))
+        link = self._link
+        if link == inf:
+            return new(Sight, (place, inf, inf, 0.0, base, 0j))
+        size = abs(start) + abs(end) + link
+        below, gap = root_of(link - place.imag, size)
+        above = 0.0
+        if not gap:
+            above, gap = root_of(link + place.imag, size)
+        return new(Sight, (place, below, above, gap, base, 0j))
+
+    def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
+        """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
+        v, velocities = speeds
+        start, end = (velocities[i] for i in self._ends)
+        turn = v[self._arm]
+        back = rect(1.0, -(sight.base + self._direction))
+        return (end - start) * back - complex(0.0, turn) * sight.place, turn
+
+    def accelerations(
+        self,
+        sight: Sight,
+        rates: tuple[complex, float],
+        _known: State,
+        _speeds: State,
+        changes: State,
+    ) -> tuple[complex, float]:
+        """Return the pin's acceleration in the frame of the rail, and that of the frame."""
+        a, pulls = changes
+        start, end = (pulls[i] for i in self._ends)
+        velocity, turn = rates
+        change = a[self._arm]
+        back = rect(1.0, -(sight.base + self._direction))
+        # Coriolis, Euler and centrifugal terms of a frame that turns.
+        apparent = (
+            complex(0.0, 2.0 * turn) * velocity + complex(-turn * turn, change) * sight.place
+        )
+        return (end - start) * back - apparent, change
+
+    def across(
+        self,
+        sight: Sight,
+        pull: complex,
+        _along: float,
+        link_rate: float,
+        _speeds: State,
+        _changes: State,
+    ) -> float:
+        """Return ÿ + y·λ̇²."""
+        return pull.imag + sight.place.imag * link_rate * link_rate

@@ -1,0 +1,165 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Where an input can go: the intervals in which every loop closes.
+
+The limits of a dyad on a crank and the ground follow from its lengths. What else there is, chains
+and iterated groups, is searched: sampled, and each limit narrowed down to neighbouring floats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from math import acos, asin, inf, pi, sqrt, tau
+from typing import NamedTuple, TYPE_CHECKING
+
+from linkage_ros.kinematics.diagonal import CrankDiagonal
+from linkage_ros.kinematics.status import Status
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure
+
+_SAMPLES = 720
+
+
+class InputRange(NamedTuple):
+    """An interval of an input in which every loop closes, in [rad] or [m]; turns not wrapped."""
+
+    lowest: float
+    highest: float
+    turning: bool = True
+
+    @property
+    def whole(self) -> bool:
+        """Whether the input turns fully."""
+        return self.turning and self.highest - self.lowest >= tau
+
+    def __str__(self) -> str:
+        if self.whole:
+            return 'every crank angle'
+        return f'{self.lowest:.6g} to {self.highest:.6g} {"rad" if self.turning else "m"}'
+
+
+def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
+    """Return the intervals of a single input; none where it closes nowhere, or of several."""
+    if len(closure.linkage.inputs) > 1:
+        return ()
+    if closure.linkage.inputs[0].slider:
+        reach = sum(
+            max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
+            for points in closure.structure.links.values()
+        )
+        return tuple(
+            InputRange(low, high, turning=False)
+            for low, high in _search(closure, -reach, reach, 4 * _SAMPLES)
+        )
+    intervals = [(-pi, pi)]
+    exact = True
+    for step in closure.steps:
+        diagonal = getattr(step, 'diagonal', None)
+        if isinstance(diagonal, CrankDiagonal) and diagonal.arms[:2] == (1, 0):
+            found = _crank_intervals(diagonal)
+            shifted = [(low - diagonal.arms[2], high - diagonal.arms[2]) for low, high in found]
+            # The first dyad sets the frame; further ones on the same crank are cut out below.
+            exact = exact and intervals == [(-pi, pi)]
+            intervals = shifted if exact else intervals
+        elif hasattr(step, 'diagonal') or not _harmless(step):
+            exact = False
+    if not exact:
+        start, end = intervals[0][0], intervals[-1][1]
+        intervals = [
+            part for low, high in intervals for part in _search(closure, low, high, _SAMPLES)
+        ]
+        ends_meet = end - start >= tau and len(intervals) > 1
+        if ends_meet and intervals[0][0] == start and intervals[-1][1] == end:
+            # One interval that runs through the end of the turn.
+            (_, high), *others, (low, _) = intervals
+            intervals = [*others, (low, high + tau)]
+    return tuple(InputRange(low, high) for low, high in intervals)
+
+
+def describe(ranges: tuple[InputRange, ...]) -> str:
+    """Return ranges as a user reads them."""
+    return ' or '.join(map(str, ranges)) or 'no single range: it depends on every input'
+
+
+def _harmless(step: object) -> bool:
+    """Return whether a step closes everywhere."""
+    return type(step).__name__ in ('FixedPoint', 'PointOnLink', 'PointOnRail', 'Turned', 'RPPDyad')
+
+
+def _crank_intervals(diagonal: CrankDiagonal) -> list[tuple[float, float]]:
+    """
+    Return the intervals of φ in which a dyad on a crank closes.
+
+    The diagonal s grows with |φ| from |d − a| to a + d. Its limits are met at::
+
+        sin²(φ/2) = (lower² − (d − a)²)/(4ad)        cos²(φ/2) = ((a + d)² − upper²)/(4ad)
+    """
+    a, d = diagonal.sides
+    lower, upper = diagonal.limits
+    lowest, highest = 0.0, pi
+    if diagonal.fold_margin < 0.0:
+        square = -diagonal.fold_margin / a * (lower + abs(d - a)) / d / 4.0
+        if square > 1.0:
+            return []
+        lowest = 2.0 * asin(sqrt(square))
+    if upper != inf and diagonal.stretch_margin < 0.0:
+        square = -diagonal.stretch_margin / a * (a + d + upper) / d / 4.0
+        if square > 1.0:
+            return []
+        highest = 2.0 * acos(sqrt(square))
+    if lowest == 0.0:
+        return [(-highest, highest)]
+    if highest == pi:
+        return [(lowest, tau - lowest)]
+    return [(-highest, -lowest), (lowest, highest)]
+
+
+def _search(
+    closure: Closure, low: float, high: float, samples: int
+) -> Iterator[tuple[float, float]]:
+    """Yield the parts of an interval in which every loop closes."""
+
+    def closes(value: float) -> bool:
+        return closure.position(value).status in (Status.CLOSED, Status.TOGGLE)
+
+    begin = None
+    before = low
+    for i in range(samples + 1):
+        value = low + (high - low) * i / samples
+        if closes(value):
+            if begin is None:
+                begin = _limit(closes, value, before) if i else value
+        elif begin is not None:
+            yield begin, _limit(closes, before, value)
+            begin = None
+        before = value
+    if begin is not None:
+        yield begin, high
+
+
+def _limit(closes: Callable[[float], bool], inside: float, outside: float) -> float:
+    """Return the last value at which the loops close, on the way to one at which they do not."""
+    for _ in range(60):
+        middle = 0.5 * (inside + outside)
+        if middle in (inside, outside):
+            break
+        if closes(middle):
+            inside = middle
+        else:
+            outside = middle
+    return inside

@@ -1,0 +1,472 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+From the groups of a linkage to the steps that solve it, in numbers.
+
+Everything is in the unit of ``scale`` metres: a power of two near the longest length, so that
+scaling rounds nothing.
+"""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from collections.abc import Iterable, Mapping
+from math import frexp, hypot, inf, ldexp, pi, remainder
+
+from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.kinematics.diagonal import AnyDiagonal, FreeDiagonal, UNIT_ROUNDOFF
+from linkage_ros.kinematics.dyads.driven_rrr import Carry, DrivenRRRDyad, Side
+from linkage_ros.kinematics.dyads.prp import PRPDyad
+from linkage_ros.kinematics.dyads.rpp import RPPDyad
+from linkage_ros.kinematics.dyads.rpr import RPRDyad, swivel_diagonal
+from linkage_ros.kinematics.dyads.rrp import RRPDyad
+from linkage_ros.kinematics.dyads.rrr import crank_diagonal, RRRDyad
+from linkage_ros.kinematics.groups import Driven, Dyad, Iterated, Joint, Structure
+from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
+from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Point
+from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
+from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
+from linkage_ros.kinematics.step import Step
+
+_SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
+_SIDES['RPR'] = _SIDES['RRP']
+
+
+class Planner:
+    """
+    Makes the steps of a linkage, group after group.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    structure
+        Its groups.
+
+    Attributes
+    ----------
+    scale
+        Metres in the unit of the lengths.
+    steps
+        In order; ``step_groups`` tells for each the number of its group.
+    angles, slides
+        Of links and sliders, in the coordinates.
+    points
+        Of every link, in its own frame and in the unit of the lengths.
+
+    """
+
+    def __init__(self, linkage: Linkage, structure: Structure) -> None:
+        self._linkage = linkage
+        self.blocks = structure.blocks
+        self._joints = structure.joints
+        self.scale = _scale(structure.links.values())
+        self.points = {
+            link: {
+                name: complex(x / self.scale, y / self.scale) for name, (x, y) in points.items()
+            }
+            for link, points in structure.links.items()
+        }
+        self.steps: list[Step] = []
+        self.step_groups: list[int] = []
+        self.angles = {GROUND: Angle(0, 0.0)}
+        self.slides: dict[str, Slide] = {}
+        self._held: dict[str, Held] = {}
+        self._coordinates = 1 + len(linkage.inputs)
+        self._pins: dict[tuple[str, complex], int] = {}
+        self._pin_count = 0
+        self._group = 0
+        self._assembly = dict(linkage.assembly)
+        self._keys: list[str] = []
+        for self._group, group in enumerate(structure.groups):
+            if isinstance(group, Driven):
+                self._drive(group)
+            elif isinstance(group, Dyad):
+                self._close(group)
+            else:
+                self._iterate(group)
+        for name in self._assembly:
+            raise DefinitionError(
+                f'assembly.{name}',
+                f'{quoted(name)} does not close a dyad that has two assemblies',
+                f'name {", ".join(map(repr, self._keys))}' if self._keys else 'leave it out',
+            )
+
+    def place(self, link: str, point: complex) -> int:
+        """Return the index of a pin, with the steps that place it, for a known link's point."""
+        index = self._pins.get((link, point))
+        if index is not None:
+            return index
+        if link == GROUND:
+            self._add(FixedPoint(point))
+        else:
+            held = self._held[link]
+            if held.point == point:
+                index = self._place_held(held)
+                self._pins[link, point] = index
+                return index
+            base = self.place(link, held.point)
+            arm, angle = point - held.point, self.angles[link]
+            self._add(
+                PointOnLink(
+                    base,
+                    self._pin_count,
+                    angle.coordinate,
+                    abs(arm),
+                    angle.constant + phase(arm),
+                )
+            )
+        return self._new_pin(link, point)
+
+    def _place_held(self, held: Held) -> int:
+        if held.pin >= 0:
+            return held.pin
+        base = self.place(held.link, held.at)
+        if held.slide is None:
+            return base
+        angle, slide = self.angles[held.link], held.slide
+        direction = angle.constant + held.direction
+        self._add(PointOnRail(base, angle.coordinate, slide.coordinate, direction, slide.sign))
+        self._pin_count += 1
+        return self._pin_count - 1
+
+    def _new_pin(self, link: str, point: complex) -> int:
+        self._pins[link, point] = self._pin_count
+        self._pin_count += 1
+        return self._pin_count - 1
+
+    def _add(self, step: Step) -> None:
+        self.steps.append(step)
+        self.step_groups.append(self._group)
+
+    def _new_coordinates(self, count: int) -> int:
+        self._coordinates += count
+        return self._coordinates - count
+
+    def _drive(self, driven: Driven) -> None:
+        joint, index = driven.joint, 1 + driven.index
+        angle = self.angles[joint.to]
+        if joint.kind == 'R':
+            sign = 1.0 if self._linkage.inputs[driven.index].child == joint.link else -1.0
+            coordinate = index
+            if angle.coordinate or sign < 0.0:
+                self._add(Turned(angle.coordinate, index, sign))
+                coordinate = self._new_coordinates(1)
+            self.angles[joint.link] = Angle(coordinate, angle.constant)
+            self._held[joint.link] = Held(
+                self.points[joint.link][joint.name],
+                joint.to,
+                self.points[joint.to][joint.name],
+            )
+            return
+        point = self._point_of(joint.name, joint.link)
+        line = self._line(joint.name, joint.to, point)
+        self._ride(joint.link, point, joint.to, line, Slide(index, line.sign))
+        self.slides[joint.name] = Slide(index, 1.0)
+
+    def _close(self, dyad: Dyad) -> None:
+        if len(dyad.bodies[0]) > 1 or len(dyad.bodies[1]) > 1:
+            self._driven_rrr(dyad)
+            return
+        {
+            'RRR': self._rrr,
+            'RRP': self._rrp,
+            'RPR': self._rpr,
+            'PRP': self._prp,
+            'RPP': self._rpp,
+        }[dyad.kind](dyad)
+
+    def _rrr(self, dyad: Dyad) -> None:
+        (one,), (other,) = dyad.bodies
+        first, second = dyad.outer
+        closing = dyad.inner.name
+        sign = self._sign(dyad.kind, closing, f'the side of {first.name}→{second.name}')
+        b, first_zero = self._arm(one, first.name, closing)
+        c, second_zero = self._arm(other, second.name, closing)
+        diagonal: AnyDiagonal
+        hinge = self._hinge(first.name, second.name)
+        if hinge is None:
+            ends = self._place_pin(first.name), self._place_pin(second.name)
+            diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c)), 0.0
+        else:
+            a, d, arms, offset, base = hinge
+            diagonal = crank_diagonal(a, b, c, d, arms, offset, self._driven_only(arms))
+        self._add(RRRDyad(diagonal, b, c, sign))
+        k = self._new_coordinates(2)
+        self.angles[one] = Angle(k, base - first_zero)
+        self.angles[other] = Angle(k + 1, base - second_zero)
+        self._pin_to(one, first)
+        self._pin_to(other, second)
+
+    def _rpr(self, dyad: Dyad) -> None:
+        (rail,), (block,) = dyad.bodies
+        first, second = dyad.outer
+        name = dyad.inner.name
+        sign = self._sign(dyad.kind, name, f'where {second.name} lies from {first.name}')
+        start = self.points[rail][first.name]
+        line = self._line(name, rail, self.points[block][second.name])
+        foot = (line.start - start) * rect(1.0, -line.direction)
+        offset = foot.imag
+        if abs(offset) <= 4.0 * UNIT_ROUNDOFF * (abs(line.start) + abs(start)):
+            offset = 0.0
+        diagonal: AnyDiagonal
+        hinge = self._hinge(first.name, second.name)
+        if hinge is None:
+            ends = self._place_pin(first.name), self._place_pin(second.name)
+            diagonal, base = FreeDiagonal(ends, (abs(offset), inf)), 0.0
+        else:
+            a, d, arms, angle, base = hinge
+            diagonal = swivel_diagonal(a, d, offset, arms, angle, self._driven_only(arms))
+        self._add(RPRDyad(diagonal, offset, sign))
+        k = self._new_coordinates(2)
+        self.angles[rail] = Angle(k, base - line.direction)
+        self.angles[block] = self.angles[rail].plus(line.angle)
+        self.slides[name] = Slide(k + 1, 1.0, -foot.real)
+        self._pin_to(rail, first)
+        self._pin_to(block, second)
+
+    def _rrp(self, dyad: Dyad) -> None:
+        (link,), (block,) = dyad.bodies
+        first, second = dyad.outer
+        closing, name = dyad.inner.name, second.name
+        sign = self._sign(dyad.kind, name, f'where {closing} lies from {first.name}')
+        length, zero = self._arm(link, first.name, closing)
+        point = self.points[block][closing]
+        line = self._line(name, second.to, point)
+        base = self.angles[second.to].plus(line.direction)
+        self._add(RRPDyad(self._rail(first.name, second.to, line, length), sign))
+        k = self._new_coordinates(2)
+        self.angles[link] = Angle(k, base.constant - zero)
+        self._pin_to(link, first)
+        self._ride(block, point, second.to, line, Slide(k + 1, 1.0))
+        self.slides[name] = Slide(k + 1, line.sign)
+
+    def _prp(self, dyad: Dyad) -> None:
+        starts, arms, directions = [], [], []
+        k = self._coordinates
+        for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
+            point = self.points[body][dyad.inner.name]
+            line = self._line(outer.name, outer.to, point)
+            base = self.angles[outer.to].plus(line.direction)
+            starts.append(self.place(outer.to, line.start))
+            arms.append(base.coordinate)
+            directions.append(base.constant)
+            self._ride(body, point, outer.to, line, Slide(k + i, 1.0))
+            self.slides[outer.name] = Slide(k + i, line.sign)
+        self._add(
+            PRPDyad((starts[0], starts[1]), (arms[0], arms[1]), (directions[0], directions[1]))
+        )
+        self._new_coordinates(2)
+
+    def _rpp(self, dyad: Dyad) -> None:
+        (link,), (carrier,) = dyad.bodies
+        first, second = dyad.outer
+        point = self._point_of(second.name, carrier)
+        outer = self._line(second.name, second.to, point)
+        inner = self._line(dyad.inner.name, carrier, self.points[link][first.name])
+        turn = outer.angle - outer.direction
+        angle = turn + inner.direction
+        if abs(remainder(angle, pi)) < 1e-9:
+            raise DefinitionError(
+                f'sliders.{dyad.inner.name}.direction',
+                f'is parallel to that of {second.name!r}',
+                'give the two sliders different directions',
+            )
+        constant = (inner.start - point) * rect(1.0, turn)
+        self._add(RPPDyad(self._rail(first.name, second.to, outer, inf), constant, angle))
+        k = self._new_coordinates(2)
+        self._ride(carrier, point, second.to, outer, Slide(k + 1, 1.0))
+        self.slides[second.name] = Slide(k + 1, outer.sign)
+        self.slides[dyad.inner.name] = Slide(k, inner.sign)
+        self.angles[link] = self.angles[carrier].plus(inner.angle)
+        self._pin_to(link, first)
+
+    def _driven_rrr(self, dyad: Dyad) -> None:
+        closing = dyad.inner.name
+        first, second = dyad.outer
+        sign = self._sign(dyad.kind, closing, f'the side of {first.name}→{second.name}')
+        sides = [
+            Side(
+                self.points[outer.link][outer.name],
+                self.points[end][closing],
+                self._carries(end, outer.link),
+            )
+            for outer, end in zip(dyad.outer, (dyad.inner.link, dyad.inner.to), strict=True)
+        ]
+        ends = self._place_pin(first.name), self._place_pin(second.name)
+        self._add(DrivenRRRDyad(ends, (sides[0], sides[1]), sign))
+        k = self._new_coordinates(2)
+        for i, outer in enumerate(dyad.outer):
+            self.angles[outer.link] = Angle(k + i, 0.0)
+            self._pin_to(outer.link, outer)
+
+    def _iterate(self, group: Iterated) -> None:
+        # local import: numpy is loaded only where something is iterated
+        from linkage_ros.kinematics.constraints import Constraints
+
+        constraints = Constraints(self._linkage, self._joints, group.links, self)
+        slides = constraints.slides
+        self._add(constraints.iteration(tuple(self.steps)))
+        k = self._new_coordinates(len(group.links) + len(slides))
+        for i, link in enumerate(group.links):
+            self.angles[link] = Angle(k + i, 0.0)
+            point = next(iter(self.points[link].values()))
+            self._held[link] = Held(point, link, pin=self._pin_count + i)
+        self._pin_count += len(group.links)
+        for i, name in enumerate(slides):
+            self.slides[name] = Slide(k + len(group.links) + i, 1.0)
+
+    def _pin_to(self, link: str, joint: Joint) -> None:
+        """Hold a link by a pin that is known."""
+        self._held[link] = Held(
+            self.points[link][joint.name], joint.to, self.points[joint.to][joint.name]
+        )
+
+    def _ride(self, link: str, point: complex, on: str, line: Line, slide: Slide) -> None:
+        """Hold a link by a slider, without turning."""
+        self.angles[link] = self.angles[on].plus(line.angle)
+        self._held[link] = Held(point, on, line.start, slide, line.direction)
+
+    def _point_of(self, slider: str, link: str) -> complex:
+        """Return the point by which a link takes part in a slider."""
+        given = self._linkage.sliders[slider]
+        return self.points[link][given.through if link == given.along else given.point]
+
+    def _line(self, name: str, on: str, point: complex) -> Line:
+        """Return the way of a point of the one link of a slider as the other link sees it."""
+        slider = self._linkage.sliders[name]
+        through = self.points[slider.along][slider.through]
+        sliding = self.points[self.blocks[name]][slider.point]
+        direction = phase(complex(*slider.direction))
+        if on == slider.along:
+            start = through + rect(1.0, slider.angle) * (point - sliding)
+            return Line(start, direction, slider.angle, 1.0)
+        start = sliding + rect(1.0, -slider.angle) * (point - through)
+        return Line(start, direction - slider.angle, -slider.angle, -1.0)
+
+    def _carries(self, start: str, end: str) -> tuple[Carry, ...]:
+        """Return the way from one link of a body to another, through its driven joints."""
+        ways: dict[str, tuple[Carry, ...]] = {start: ()}
+        while end not in ways:
+            for i, given in enumerate(self._linkage.inputs):
+                for one, other in self._ends(i):
+                    if one in ways and other not in ways:
+                        ways[other] = (*ways[one], self._carry(1 + i, given, one, other))
+        return ways[end]
+
+    def _ends(self, index: int) -> tuple[tuple[str, str], tuple[str, str]]:
+        given = self._linkage.inputs[index]
+        one, other = given.parent, given.child
+        if given.slider:
+            one, other = self._linkage.sliders[given.slider].along, self.blocks[given.slider]
+        return (one, other), (other, one)
+
+    def _carry(self, index: int, given: Input, inner: str, outer: str) -> Carry:
+        if given.slider:
+            point = self._point_of(given.slider, inner)
+            line = self._line(given.slider, outer, point)
+            unit = rect(1.0, line.direction)
+            self.slides[given.slider] = Slide(index, 1.0)
+            return Carry(line.start, point, line.angle, -1, index, line.sign, unit)
+        (pin,) = set(self.points[inner]) & set(self.points[outer])
+        sign = 1.0 if given.child == inner else -1.0
+        return Carry(self.points[outer][pin], self.points[inner][pin], 0.0, index, -1, sign, 0j)
+
+    def _arm(self, link: str, start: str, end: str) -> tuple[float, float]:
+        """Return length and direction from one point of a link to another."""
+        arm = self.points[link][end] - self.points[link][start]
+        return abs(arm), phase(arm)
+
+    def _carriers(self, point: str) -> list[str]:
+        """Return the known links that carry a point, the ground first."""
+        return [link for link in self.angles if point in self.points[link]]
+
+    def _place_pin(self, point: str) -> int:
+        link = self._carriers(point)[0]
+        return self.place(link, self.points[link][point])
+
+    def _hinge(
+        self, first: str, second: str
+    ) -> tuple[float, float, tuple[int, int], float, float] | None:
+        """
+        Return OA, OD, the arms, their offset and the base, where two pins' links share a pin O.
+
+        The base is what is to be added to a direction that a `CrankDiagonal` gives.
+        """
+        for other in self._carriers(second):
+            for one in self._carriers(first):
+                pivot = self._common(one, other, (first, second))
+                if pivot:
+                    a, first_zero = self._arm(one, pivot, first)
+                    d, second_zero = self._arm(other, pivot, second)
+                    angle, base = self.angles[one], self.angles[other].plus(second_zero)
+                    offset = angle.constant + first_zero - base.constant
+                    return a, d, (angle.coordinate, base.coordinate), offset, base.constant
+        return None
+
+    def _common(self, one: str, other: str, apart: tuple[str, ...]) -> str | None:
+        """Return the pin of two links, if they have one that is none of the given points."""
+        if one == other:
+            return None
+        shared = set(self.points[one]) & set(self.points[other]) - set(apart)
+        return min(shared, default=None)
+
+    def _rail(self, pin: str, on: str, line: Line, length: float) -> Rail:
+        """Return a line on a known link as it sees a known pin."""
+        base = self.angles[on].plus(line.direction)
+        for link in self._carriers(pin):
+            pivot = self._common(link, on, (pin,))
+            if pivot:
+                a, zero = self._arm(link, pivot, pin)
+                angle = self.angles[link].plus(zero)
+                place = (self.points[on][pivot] - line.start) * rect(1.0, -line.direction)
+                arms = angle.coordinate, base.coordinate
+                kind = CrankRail if self._driven_only(arms) else UnsignedRail
+                return kind(a, place, length, arms, angle.constant - base.constant)
+        ends = self.place(on, line.start), self._place_pin(pin)
+        return FreeRail(ends, length, base.coordinate, base.constant)
+
+    def _driven_only(self, arms: tuple[int, int]) -> bool:
+        """Return whether two coordinates are inputs or the ground: known with their turns."""
+        return max(arms) <= len(self._linkage.inputs)
+
+    def _sign(self, kind: str, closing: str, meaning: str) -> int:
+        """Return the sign of the assembly of the pin or slider that closes a dyad."""
+        self._keys.append(closing)
+        sides = _SIDES[kind]
+        choices = ' or '.join(sides)
+        side = self._assembly.pop(closing, None)
+        if side is None:
+            raise DefinitionError(
+                'assembly', f'{closing!r} is missing', f'write {closing}: {choices} ({meaning})'
+            )
+        if side not in sides:
+            raise DefinitionError(
+                f'assembly.{closing}',
+                f'{quoted(side)} is no side',
+                f'write {choices} ({meaning})',
+            )
+        return sides[side]
+
+
+def _scale(links: Iterable[Mapping[str, Point]]) -> float:
+    """Return the power of two next to the longest distance on a link."""
+    longest = 0.0
+    for points in links:
+        places = list(points.values())
+        for x, y in places:
+            longest = max(longest, hypot(x - places[0][0], y - places[0][1]))
+    return ldexp(1.0, frexp(longest)[1]) if longest else 1.0

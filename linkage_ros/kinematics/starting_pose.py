@@ -1,0 +1,124 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Where an iteration starts: the pose of its links that the linkage file gives, roughly."""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.linkage import Linkage
+
+
+class StartingPose(NamedTuple):
+    """
+    A rough pose.
+
+    Attributes
+    ----------
+    inputs
+        The inputs at which it holds, in [rad] or the unit of the lengths.
+    angles
+        Of the links, in [rad].
+    places
+        Of the first point of each link, in the frame of the ground.
+
+    """
+
+    inputs: tuple[float, ...]
+    angles: tuple[float, ...]
+    places: tuple[complex, ...]
+
+
+def starting_pose(
+    linkage: Linkage,
+    links: Sequence[str],
+    blocks: Mapping[str, str],
+    points: Mapping[str, Mapping[str, complex]],
+    scale: float,
+    place_known: Callable[[Sequence[float]], tuple[Mapping[str, complex], Mapping[str, float]]],
+) -> StartingPose:
+    """
+    Fit links to the points that the file's pose gives.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    links
+        Names of the links to be placed.
+    blocks
+        For each slider the link that slides.
+    points
+        Of every link, in its own frame and in the unit of the lengths.
+    scale
+        Metres in that unit.
+    place_known
+        Returns places and link angles that are known at given inputs.
+
+    Raises
+    ------
+    DefinitionError
+        Where there is no pose, or where a link has fewer than two of its points.
+
+    """
+    if linkage.pose is None:
+        raise DefinitionError(
+            'pose',
+            f'is missing: no dyad covers {", ".join(links)}, they are solved by iteration',
+            'give inputs, and where points of these links lie then: '
+            'pose: {inputs: [...], points: {...}}',
+        )
+    inputs = tuple(
+        value / scale if driven.slider else value
+        for value, driven in zip(linkage.pose.inputs, linkage.inputs, strict=True)
+    )
+    known_places, known_angles = place_known(inputs)
+    given = {name: complex(x, y) / scale for name, (x, y) in linkage.pose.points.items()}
+    given |= known_places
+    rails = {blocks[name]: slider for name, slider in linkage.sliders.items()}
+    angles = dict(known_angles)
+
+    def angle_of(link: str) -> float:
+        if link not in angles:
+            known = [name for name in points[link] if name in given]
+            apart = [n for n in known[1:] if points[link][n] != points[link][known[0]]]
+            if apart:
+                there = given[apart[0]] - given[known[0]]
+                angles[link] = phase(there / (points[link][apart[0]] - points[link][known[0]]))
+            elif link in rails and known:
+                angles[link] = angle_of(rails[link].along) + rails[link].angle
+            else:
+                raise DefinitionError(
+                    'pose.points',
+                    f'does not say where {link!r} lies',
+                    f'give two of its points: {", ".join(points[link])}',
+                )
+        return angles[link]
+
+    places = []
+    for link in links:
+        turn = rect(1.0, angle_of(link))
+        known = next((name for name in points[link] if name in given), None)
+        if known is None:
+            raise DefinitionError(
+                'pose.points', f'does not say where {link!r} lies', 'give one of its points'
+            )
+        first = next(iter(points[link].values()))
+        places.append(given[known] + turn * (first - points[link][known]))
+    return StartingPose(inputs, tuple(angle_of(link) for link in links), tuple(places))

@@ -1,0 +1,359 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What an input does to a linkage as it goes through its range: ways, samples, extremes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from itertools import pairwise, product
+from math import cos, isfinite, pi, remainder, sqrt, tau
+from typing import NamedTuple
+
+from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.ranges import InputRange
+from linkage_ros.kinematics.status import Status
+
+_SAMPLES = 720
+_GRID = 24
+_GOLDEN = (sqrt(5.0) - 1.0) / 2.0
+_SAME = 1e-9
+"""What two values may differ by and be the same for a user, in [rad] or of a length."""
+
+_NOISE = 1e-13
+"""What two values may differ by and be the same but for their rounding, in [rad]."""
+
+_APART = 1e-4
+"""Places that are nearer to each other are one, in [rad] or [m]."""
+
+_MANY = 12
+"""At more places than these a value is the rule and no extreme; also the lines of a grid."""
+
+
+class Extreme(NamedTuple):
+    """A lowest or highest value, and where it is met; nowhere named where it is met all along."""
+
+    value: float
+    at: tuple[float, ...]
+
+
+class Extremes(NamedTuple):
+    """The lowest and the highest value of something over the range of an input."""
+
+    lowest: Extreme
+    highest: Extreme
+
+    @property
+    def constant(self) -> bool:
+        """Whether it does not change."""
+        return self.highest.value - self.lowest.value < _SAME
+
+
+class Way:
+    """
+    A linkage as a function of one of its inputs; the others are held.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    held
+        Values of all inputs, in [rad] or [m]; not needed where there is one.
+    index
+        Number of the input that moves.
+
+    """
+
+    def __init__(self, closure: Closure, held: Sequence[float] = (0.0,), index: int = 0) -> None:
+        self.closure = closure
+        self._held = tuple(held)
+        self._index = index
+        self.input = closure.linkage.inputs[index]
+        self.turning = not self.input.slider
+
+    def inputs(self, value: float) -> tuple[float, ...]:
+        """Return the values of all inputs."""
+        return (*self._held[: self._index], value, *self._held[self._index + 1 :])
+
+    def position(self, value: float) -> Position:
+        """Return the position at a value of the input."""
+        return self.closure.position(*self.inputs(value))
+
+    def closes(self, value: float) -> bool:
+        """Return whether every loop closes there."""
+        return self.position(value).status in (Status.CLOSED, Status.TOGGLE)
+
+    @cached_property
+    def ranges(self) -> tuple[InputRange, ...]:
+        """
+        Where every loop closes, as a user expects the angles.
+
+        A full turn begins at 0, and is two where the linkage needs two to come back to where it
+        was; a limited range lies about a place in (−π, π].
+        """
+        if len(self.closure.linkage.inputs) == 1:
+            found = self.closure.input_ranges
+        else:
+            found = tuple(InputRange(*ends, self.turning) for ends in self._searched())
+        return tuple(map(self._usual, found))
+
+    def range_about(self, value: float) -> InputRange | None:
+        """Return the range in which a value lies, none where it lies in none."""
+        for interval in self.ranges:
+            if interval.whole or interval.lowest <= value <= interval.highest:
+                return interval
+            if interval.turning:
+                middle = 0.5 * (interval.lowest + interval.highest)
+                shift = tau * round((value - middle) / tau)
+                if shift and interval.lowest <= value - shift <= interval.highest:
+                    return InputRange(interval.lowest + shift, interval.highest + shift)
+        return None
+
+    @property
+    def widest_range(self) -> InputRange | None:
+        """The widest range; of equal ones the last, since slides are meant positive."""
+        return max(
+            reversed(self.ranges),
+            key=lambda interval: round(interval.highest - interval.lowest, 6),
+            default=None,
+        )
+
+    def _usual(self, interval: InputRange) -> InputRange:
+        if not interval.turning:
+            return interval
+        if interval.whole:
+            turns = 1 if all(self._repeats(0.1 + i, tau) for i in range(6)) else 2
+            return InputRange(0.0, turns * tau)
+        middle = 0.5 * (interval.lowest + interval.highest)
+        shift = -tau * round(middle / tau)
+        if shift and self._repeats(middle, shift):
+            return InputRange(interval.lowest + shift, interval.highest + shift)
+        return interval
+
+    def _repeats(self, value: float, shift: float) -> bool:
+        """Return whether all joints are the same again after a shift, but for whole turns."""
+        here, there = self.position(value).joints, self.position(value + shift).joints
+        return all(
+            abs(remainder(p - q, tau) if turns else p - q)
+            < _SAME * (1.0 if turns else self.closure.scale)
+            for p, q, turns in zip(here, there, self.closure.turning, strict=True)
+        )
+
+    def _searched(self) -> Iterator[tuple[float, float]]:
+        """Yield the intervals in which every loop closes, of several inputs."""
+        low, high = (-pi, pi) if self.turning else (-reach(self.closure), reach(self.closure))
+        values = [low + (high - low) * i / _SAMPLES for i in range(_SAMPLES + 1)]
+        closing = [self.closes(value) for value in values]
+        found: list[list[float]] = []
+        if closing[0]:
+            found.append([low, high])
+        for (before, closed), (value, closes) in pairwise(zip(values, closing, strict=True)):
+            if closes and not closed:
+                found.append([self._limit(value, before), high])
+            elif closed and not closes:
+                found[-1][1] = self._limit(before, value)
+        if self.turning and len(found) > 1 and closing[0] and closing[-1]:
+            # One interval that runs through the end of the turn.
+            found[-1][1] = found.pop(0)[1] + tau
+        yield from ((begin, end) for begin, end in found)
+
+    def _limit(self, inside: float, outside: float) -> float:
+        while (middle := 0.5 * (inside + outside)) not in (inside, outside):
+            if self.closes(middle):
+                inside = middle
+            else:
+                outside = middle
+        return inside
+
+
+def reach(closure: Closure) -> float:
+    """Return a length that no slide exceeds, in [m]."""
+    return sum(
+        max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
+        for points in closure.structure.links.values()
+    )
+
+
+def usual_inputs(closure: Closure) -> tuple[float, ...]:
+    """
+    Return inputs at which a linkage shows what it is.
+
+    60 degrees where the input turns fully; else two thirds of the way through its widest range,
+    since in the middle the links of a symmetric linkage often lie on each other. Of several
+    inputs, what the file's pose says, or of a coarse grid what is farthest from a toggle.
+    """
+    linkage = closure.linkage
+    if len(linkage.inputs) > 1:
+        if linkage.pose is not None:
+            return linkage.pose.inputs
+        return max(grid(closure, _MANY), key=lambda found: _ease(closure, found[1]))[0]
+    interval = Way(closure).widest_range
+    assert interval is not None, 'reading the file has proved that it closes somewhere'
+    if interval.whole:
+        return (pi / 3.0,)
+    return (interval.lowest + (interval.highest - interval.lowest) * 2.0 / 3.0,)
+
+
+def _ease(closure: Closure, position: Position) -> float:
+    if position.status is not Status.CLOSED:
+        return -1.0
+    return closure.nearness(position).conditioning
+
+
+def grid(closure: Closure, count: int = _GRID) -> Iterator[tuple[tuple[float, ...], Position]]:
+    """Yield positions on a grid over all inputs: a turn each, or as far as a slide may reach."""
+    ways = []
+    for given in closure.linkage.inputs:
+        if given.slider:
+            farthest = reach(closure)
+            ways.append([farthest * (2 * i - count) / count for i in range(count + 1)])
+        else:
+            ways.append([tau * i / count for i in range(count)])
+    for inputs in product(*ways):
+        yield inputs, closure.position(*inputs)
+
+
+def samples(interval: InputRange, count: int = _SAMPLES) -> list[float]:
+    """
+    Return values from one end of a range to the other.
+
+    At the limits of a range, joints move as the root of the input does; there they lie closer.
+    """
+    low, high = interval.lowest, interval.highest
+    if interval.whole:
+        return [low + (high - low) * i / count for i in range(count + 1)]
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    inner = [middle - half * cos(pi * i / count) for i in range(1, count)]
+    return [low, *(min(max(value, low), high) for value in inner), high]
+
+
+def extremes(
+    function: Callable[[float], float], ranges: Sequence[InputRange], count: int = _SAMPLES
+) -> Extremes:
+    """
+    Find the lowest and the highest value of a function of the input.
+
+    It is sampled, and each valley and each summit narrowed down by golden sections.
+    """
+    sampled = []
+    for interval in ranges:
+        values = samples(interval, count)
+        sampled.append((interval, values, [function(value) for value in values]))
+    lowest = _lowest(function, sampled)
+    upside_down = [(one, values, [-y for y in results]) for one, values, results in sampled]
+    highest = _lowest(lambda value: -function(value), upside_down)
+    return Extremes(lowest, Extreme(-highest.value, highest.at))
+
+
+def _lowest(
+    function: Callable[[float], float],
+    sampled: Sequence[tuple[InputRange, list[float], list[float]]],
+) -> Extreme:
+    found: list[tuple[float, float]] = []
+    for interval, values, results in sampled:
+        last = len(values) - 1
+        for i, result in enumerate(results):
+            # The ends of a full turn are one place, and what lies beyond each is at the other.
+            turn = values[last] - values[0] if interval.whole else 0.0
+            before = values[i - 1] if i else values[last - 1] - turn if turn else values[0]
+            after = values[i + 1] if i < last else values[1] + turn if turn else values[last]
+            beside = (
+                results[i - 1 if i or turn else 0],
+                results[(i + 1) % last if turn else min(i + 1, last)],
+            )
+            found.append((result, values[i]))
+            if result <= min(beside) and result < max(beside):
+                lowest = _golden(function, before, after)
+                # At a smooth valley the place has half the digits; the sample's may be better.
+                if result - lowest[0] > _NOISE:
+                    found[-1] = lowest
+    found = [(result, value) for result, value in found if isfinite(result)]
+    best = min(result for result, _ in found)
+    places = sorted(value for result, value in found if result - best <= _SAME)
+    if len(places) > _MANY:
+        return Extreme(best, ())
+    at: list[float] = []
+    for value in places:
+        whole = any(interval.whole for interval, _, _ in sampled)
+        if all(abs(remainder(value - p, tau) if whole else value - p) > _APART for p in at):
+            at.append(value)
+    return Extreme(best, tuple(at))
+
+
+def _golden(function: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
+    """Return the lowest value between two places, and where it is."""
+    one, other = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    at_one, at_other = function(one), function(other)
+    for _ in range(80):
+        if not low < one < other < high:
+            break
+        if at_one <= at_other:
+            high, other, at_other = other, one, at_one
+            one = high - _GOLDEN * (high - low)
+            at_one = function(one)
+        else:
+            low, one, at_one = one, other, at_other
+            other = low + _GOLDEN * (high - low)
+            at_other = function(other)
+    return min((at_one, one), (at_other, other))
+
+
+def transmission_angles(way: Way) -> dict[int, Extremes]:
+    """
+    Return the extreme transmission angles of each group over the range, by its number, in [rad].
+
+    They are folded into [0, π/2]. Groups that are iterated have none.
+    """
+    found = {}
+    for i, step in enumerate(way.closure.steps):
+        if not hasattr(step, 'transmission_angle'):
+            continue
+
+        def angle(
+            value: float, i: int = i, of: Callable[..., float] = step.transmission_angle
+        ) -> float:
+            return of(way.position(value).poses[i])
+
+        found[way.closure.step_groups[i]] = extremes(angle, way.ranges)
+    return found
+
+
+def conditionings(way: Way) -> dict[int, Extremes]:
+    """Return the extreme conditioning of each iterated group over the range, by its number."""
+    found = {}
+    for i, step in enumerate(way.closure.steps):
+        if not hasattr(step, 'conditioning'):
+            continue
+
+        def value_of(
+            value: float, i: int = i, of: Callable[..., float] = step.conditioning
+        ) -> float:
+            return of(way.position(value).poses[i])
+
+        found[way.closure.step_groups[i]] = extremes(value_of, way.ranges, _SAMPLES // 4)
+    return found
+
+
+def worst_residual(closure: Closure) -> tuple[float, tuple[float, ...], int]:
+    """Return the worst residual [m] over the range, the inputs there, and how many were tried."""
+    if len(closure.linkage.inputs) > 1:
+        tried = [found for found in grid(closure) if found[1].joints]
+    else:
+        way = Way(closure)
+        values = [value for interval in way.ranges for value in samples(interval)]
+        tried = [((value,), way.position(value)) for value in values]
+    worst, at = max((closure.residual(position), inputs) for inputs, position in tried)
+    return worst, at, len(tried)
