@@ -191,13 +191,13 @@ class CrankDiagonal:
     arms
         Indices, among the coordinates, of the directions of OA and OD.
     offset
-        φ less the difference of those two coordinates, in [rad].
+        φ less the difference of those two coordinates, in (−π, π] rad.
 
     """
 
     __slots__ = (
-        '_brackets', '_constants', '_reaches', 'arms', 'fold_margin', 'limits', 'sides',
-        'stretch_margin',
+        '_constants', '_reaches', 'arms', 'brackets', 'fold_margin', 'half_turn', 'limits',
+        'sides', 'stretch_margin',
     )  # fmt: skip
 
     def __init__(
@@ -214,7 +214,7 @@ class CrankDiagonal:
         least = abs(d - a)
         self.sides = (a, d)
         self.limits = limits
-        self._brackets = (fold * (least + lower), stretch * (upper + a + d))
+        self.brackets = (fold * (least + lower), stretch * (upper + a + d))
         self.fold_margin, self.stretch_margin = fold, stretch
         # Two roots, since a·d may underflow where the lengths differ by many decades.
         self._constants = (a, d, d - a, 2.0 * sqrt(a) * sqrt(d), lower)
@@ -223,6 +223,7 @@ class CrankDiagonal:
             stretch = fsum((upper, -max(a, d), min(a, d)))
         self._reaches = (fold, stretch, short_pair, stretch == inf, least, a + d)
         self.arms = (*arms, offset)
+        self.half_turn = (sin(0.5 * offset), cos(0.5 * offset))
 
     def at(self, known: State) -> Diagonal:
         """Return the diagonal."""
@@ -231,9 +232,15 @@ class CrankDiagonal:
         fold, stretch, short_pair, endless, least, greatest = self._reaches
         first, second, offset = self.arms
         base = x[second]
-        half = 0.5 * (x[first] - base + offset)
-        half_sine = sin(half)
-        half_cosine = cos(half)
+        half = 0.5 * (x[first] - base)
+        half_sine, half_cosine = sin(half), cos(half)
+        if offset:
+            # Not added to an angle that may have turned a thousand times.
+            sine, cosine = self.half_turn
+            half_sine, half_cosine = (
+                half_sine * cosine + half_cosine * sine,
+                half_cosine * cosine - half_sine * sine,
+            )
         near = root * half_sine
         s = hypot(difference, near)
         if s < SMALLEST:
@@ -276,17 +283,19 @@ class CrankDiagonal:
         a = changes[0]
         first, second, _ = self.arms
         q, p = growth.unit.real, -growth.unit.imag
-        square = complex(p + (p - q) * (p + q), q * (1.0 + 2.0 * p))
+        a_length, d, difference, root, _ = self._constants
         s, _, fold, stretch, _, half_sine, half_cosine = diagonal
-        root, (lower, upper) = self._constants[3], self.limits
+        lower, upper = self.limits
+        # 1 + 2p = (d² − a²)/s², which is exactly 0 where a = d.
+        square = complex(p + (p - q) * (p + q), q * (difference / s) * ((a_length + d) / s))
         near, far = root * (half_sine / s), root * (half_cosine / s)
         bend = 0.0
-        if self._brackets[0]:
-            bend = self._brackets[0] * (far / fold) * (far / fold) / (s + lower)
+        if self.brackets[0]:
+            bend = self.brackets[0] * (far / fold) * (far / fold) / (s + lower)
         if upper == inf:
             bend -= near * near
-        elif self._brackets[1]:
-            bend -= self._brackets[1] * (near / stretch) * (near / stretch) / (s + upper)
+        elif self.brackets[1]:
+            bend -= self.brackets[1] * (near / stretch) * (near / stretch) / (s + upper)
         return new(GrowthChange, (square, a[first] - a[second], a[second], 0.25 * bend))
 
     def swing(self, diagonal: Diagonal) -> tuple[float, float]:

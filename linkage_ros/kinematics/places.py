@@ -18,7 +18,6 @@
 from __future__ import annotations
 
 from cmath import rect
-from math import cos, sin
 
 from linkage_ros.kinematics.step import PLACED, Pose, State
 
@@ -65,24 +64,23 @@ class PointOnLink:
         Index of that pin; the point's own index is the next free one.
     arm
         Index, among the coordinates, of the angle of the link.
-    length, direction
-        From the pin to the point: distance, and direction less that coordinate, in [rad].
+    vector
+        From the pin to the point where that coordinate is 0.
 
     """
 
-    __slots__ = ('_arm', '_direction', '_length', '_pin', '_point')
+    __slots__ = ('_arm', '_pin', '_point', '_vector')
 
-    def __init__(self, pin: int, point: int, arm: int, length: float, direction: float) -> None:
+    def __init__(self, pin: int, point: int, arm: int, vector: complex) -> None:
         self._pin = pin
         self._point = point
         self._arm = arm
-        self._length = length
-        self._direction = direction
+        self._vector = vector
 
     def close(self, known: State) -> Pose:
         """Append the point."""
         x, pins = known
-        pins.append(pins[self._pin] + rect(self._length, x[self._arm] + self._direction))
+        pins.append(pins[self._pin] + rect(1.0, x[self._arm]) * self._vector)
         return PLACED
 
     def rates(self, _pose: Pose, known: State, speeds: State) -> None:
@@ -112,34 +110,30 @@ class PointOnRail:
         Index, among the coordinates, of the angle of the link that carries the line.
     slide
         Index, among the coordinates, of the way along the line.
-    direction
-        Of the line less the coordinate of the link, in [rad].
-    sign
-        +1 where the point travels in that direction with the slide, −1 where against it.
+    unit
+        In which the point travels with the slide, where that coordinate of the link is 0.
 
     """
 
-    __slots__ = ('_arm', '_direction', '_pin', '_sign', '_slide')
+    __slots__ = ('_arm', '_pin', '_slide', '_unit')
 
-    def __init__(self, pin: int, arm: int, slide: int, direction: float, sign: float) -> None:
+    def __init__(self, pin: int, arm: int, slide: int, unit: complex) -> None:
         self._pin = pin
         self._arm = arm
         self._slide = slide
-        self._direction = direction
-        self._sign = sign
+        self._unit = unit
 
     def close(self, known: State) -> Pose:
         """Append the point."""
         x, pins = known
-        along = self._sign * x[self._slide]
-        direction = x[self._arm] + self._direction
-        pins.append(pins[self._pin] + complex(along * cos(direction), along * sin(direction)))
+        unit = rect(1.0, x[self._arm]) * self._unit
+        pins.append(pins[self._pin] + x[self._slide] * unit)
         return PLACED
 
     def rates(self, _pose: Pose, known: State, speeds: State) -> None:
         """Append its velocity."""
         x, (v, velocities) = known[0], speeds
-        unit = rect(self._sign, x[self._arm] + self._direction)
+        unit = rect(1.0, x[self._arm]) * self._unit
         moved = complex(v[self._slide], v[self._arm] * x[self._slide])
         velocities.append(velocities[self._pin] + moved * unit)
 
@@ -148,7 +142,7 @@ class PointOnRail:
     ) -> None:
         """Append its acceleration."""
         x, v, (a, pulls) = known[0], speeds[0], changes
-        unit = rect(self._sign, x[self._arm] + self._direction)
+        unit = rect(1.0, x[self._arm]) * self._unit
         slide, turn = x[self._slide], v[self._arm]
         moved = complex(
             a[self._slide] - turn * turn * slide,

@@ -24,8 +24,8 @@ all others from the coordinates (`FreeRail`).
 
 from __future__ import annotations
 
-from cmath import rect
-from math import cos, inf, pi, sin, sqrt
+from cmath import phase, rect
+from math import inf, pi, sqrt
 from typing import NamedTuple, Protocol
 
 from linkage_ros.kinematics.diagonal import margin, reach, root_of
@@ -99,63 +99,73 @@ class CrankRail:
     A rail on a link to which the link of A is pinned at O.
 
     With a = OA at the angle ψ to the rail, O at (f, e) in the frame of the rail, and a link of
-    length b from A to the line::
+    length b from A to the line, the link stands across the line where b ∓ y = 0. There, with η =
+    π/4 − ψ/2, of the two forms the one of smaller terms is taken::
 
-        b − y = (b − e − a) + 2a·sin²(π/4 − ψ/2)        b + y = (b + e − a) + 2a·cos²(π/4 − ψ/2)
+        b − y = (b − e − a) + 2a·sin²η        b + y = (b + e − a) + 2a·cos²η
 
-    The brackets are constants of the linkage. With ψ = π/2 − 2η and η near 0 or π/2 at a change
-    point, sine and cosine of ψ are taken from those of η as well, so that what cancels there does.
+    The brackets are constants of the linkage. Where one is zero, the root has the sign of its sine
+    or cosine, and passes the change point with it.
 
     Parameters
     ----------
-    a
-        Length of OA.
+    arm
+        OA in the frame of the rail, where the difference of the two coordinates is 0.
     pivot
         O in the frame of the rail.
     link
         b; infinite where no link is asked for.
     arms
-        Indices, among the coordinates, of the direction of OA and of the link with the rail.
-    offset
-        ψ less the difference of those two coordinates, in [rad].
+        Indices, among the coordinates, of the angles of the link of A and of that with the rail.
 
     """
 
-    __slots__ = ('_arms', '_constants', '_link')
+    __slots__ = ('_arm', '_arms', '_constants', '_half_turn', '_link')
 
-    def __init__(
-        self, a: float, pivot: complex, link: float, arms: tuple[int, int], offset: float
-    ) -> None:
-        endless = link == inf
+    def __init__(self, arm: complex, pivot: complex, link: float, arms: tuple[int, int]) -> None:
+        a = abs(arm)
         below, above = (
             (inf, inf)
-            if endless
+            if link == inf
             else (margin(link, side, -a) for side in (-pivot.imag, pivot.imag))
         )
-        self._constants = (a, pivot, below, above, sqrt(2.0) * sqrt(a), endless)
+        self._constants = (a, pivot, below, above, sqrt(2.0) * sqrt(a), not (below and above))
+        self._arm = arm
+        self._half_turn = rect(1.0, 0.25 * pi - 0.5 * phase(arm))
         self._link = link
-        self._arms = (*arms, offset)
+        self._arms = arms
 
     def at(self, known: State) -> Sight:
         """Return the pin in the frame of the rail."""
-        a, pivot, below, above, root, endless = self._constants
-        first, second, offset = self._arms
-        x = known[0]
+        a, pivot, below, above, root, changes_over = self._constants
+        first, second = self._arms
+        x, link = known[0], self._link
         base = x[second]
-        half = 0.5 * (0.5 * pi - (x[first] - base + offset))
-        sine, cosine = sin(half), cos(half)
-        arm = complex(2.0 * a * sine * cosine, a * (cosine - sine) * (cosine + sine))
-        if endless:
-            return new(Sight, (pivot + arm, inf, inf, 0.0, base, arm))
-        root_below, gap = reach(below, root * sine, 1.0)
+        swing = x[first] - base
+        arm = rect(1.0, swing) * self._arm
+        place = pivot + arm
+        if link == inf:
+            return new(Sight, (place, inf, inf, 0.0, base, arm))
+        eta = rect(1.0, -0.5 * swing) * self._half_turn
+        sine, cosine = eta.imag, eta.real
+        root_below, gap = self._root(below, root * sine, link, -place.imag)
         root_above = 0.0
         if not gap:
-            root_above, gap = reach(above, root * cosine, 1.0)
-        return new(Sight, (pivot + arm, root_below, root_above, gap, base, arm))
+            root_above, gap = self._root(above, root * cosine, link, place.imag)
+        if changes_over:
+            # Of the rate, which is 0 where the root is; two forms of one zero would not cancel.
+            arm = complex(2.0 * a * sine * cosine, arm.imag)
+        return new(Sight, (place, root_below, root_above, gap, base, arm))
+
+    def _root(self, bracket: float, part: float, link: float, side: float) -> tuple[float, float]:
+        """Return the root of the link's length less what it has to reach, and the gap."""
+        if bracket == 0.0 or abs(bracket) + part * part < link + abs(side):
+            return reach(bracket, part, 1.0)
+        return root_of(link + side, link + abs(side))
 
     def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
         """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
-        first, second, _ = self._arms
+        first, second = self._arms
         v = speeds[0]
         swing, arm = v[first] - v[second], sight.arm
         return complex(-swing * arm.imag, swing * arm.real), v[second]
@@ -169,7 +179,7 @@ class CrankRail:
         changes: State,
     ) -> tuple[complex, float]:
         """Return the pin's acceleration in the frame of the rail, and that of the frame."""
-        first, second, _ = self._arms
+        first, second = self._arms
         v, a = speeds[0], changes[0]
         swing = v[first] - v[second]
         return complex(-swing * swing, a[first] - a[second]) * sight.arm, a[second]
@@ -193,7 +203,7 @@ class CrankRail:
 
         The brackets b ∓ e − a are constants of the linkage; the nearer limit is the better form.
         """
-        first, second, _ = self._arms
+        first, second = self._arms
         v, changed = speeds[0], changes[0]
         a, pivot, below, above = self._constants[:4]
         link, e, y = self._link, pivot.imag, sight.place.imag
@@ -229,25 +239,25 @@ class FreeRail:
         b, length of a link from A to the line; infinite where none is asked for.
     arm
         Index, among the coordinates, of the angle of the link that carries the rail.
-    direction
-        Direction of the line less that coordinate, in [rad].
+    unit
+        Direction of the line where that coordinate is 0.
 
     """
 
-    __slots__ = ('_arm', '_direction', '_ends', '_link')
+    __slots__ = ('_arm', '_back', '_ends', '_link')
 
-    def __init__(self, ends: tuple[int, int], link: float, arm: int, direction: float) -> None:
+    def __init__(self, ends: tuple[int, int], link: float, arm: int, unit: complex) -> None:
         self._ends = ends
         self._link = link
         self._arm = arm
-        self._direction = direction
+        self._back = unit.conjugate()
 
     def at(self, known: State) -> Sight:
         """Return the pin in the frame of the rail."""
         x, pins = known
         base = x[self._arm]
         start, end = (pins[i] for i in self._ends)
-        place = (end - start) * rect(1.0, -(base + self._direction))
+        place = (end - start) * (rect(1.0, -base) * self._back)
         link = self._link
         if link == inf:
             return new(Sight, (place, inf, inf, 0.0, base, 0j))
@@ -263,7 +273,7 @@ class FreeRail:
         v, velocities = speeds
         start, end = (velocities[i] for i in self._ends)
         turn = v[self._arm]
-        back = rect(1.0, -(sight.base + self._direction))
+        back = rect(1.0, -sight.base) * self._back
         return (end - start) * back - complex(0.0, turn) * sight.place, turn
 
     def accelerations(
@@ -279,7 +289,7 @@ class FreeRail:
         start, end = (pulls[i] for i in self._ends)
         velocity, turn = rates
         change = a[self._arm]
-        back = rect(1.0, -(sight.base + self._direction))
+        back = rect(1.0, -sight.base) * self._back
         # Coriolis, Euler and centrifugal terms of a frame that turns.
         apparent = (
             complex(0.0, 2.0 * turn) * velocity + complex(-turn * turn, change) * sight.place

@@ -24,10 +24,17 @@ from __future__ import annotations
 
 from cmath import phase, rect
 from collections.abc import Iterable, Mapping
-from math import frexp, hypot, inf, ldexp, pi, remainder
+from math import frexp, hypot, inf, ldexp
 
 from linkage_ros.errors import DefinitionError, quoted
-from linkage_ros.kinematics.diagonal import AnyDiagonal, FreeDiagonal, UNIT_ROUNDOFF
+from linkage_ros.kinematics.diagonal import (
+    AnyDiagonal,
+    CrankDiagonal,
+    FreeDiagonal,
+    ROUNDING,
+    UNIT_ROUNDOFF,
+)
+from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import Carry, DrivenRRRDyad, Side
 from linkage_ros.kinematics.dyads.prp import PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
@@ -43,6 +50,10 @@ from linkage_ros.kinematics.step import Step
 
 _SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
 _SIDES['RPR'] = _SIDES['RRP']
+
+
+_LEVEL = Angle(0, 0.0, 1 + 0j)
+"""What a direction in the frame of the ground is measured from."""
 
 
 class Planner:
@@ -82,7 +93,7 @@ class Planner:
         }
         self.steps: list[Step] = []
         self.step_groups: list[int] = []
-        self.angles = {GROUND: Angle(0, 0.0)}
+        self.angles = {GROUND: Angle(0, 0.0, 1 + 0j)}
         self.slides: dict[str, Slide] = {}
         self._held: dict[str, Held] = {}
         self._coordinates = 1 + len(linkage.inputs)
@@ -120,15 +131,7 @@ class Planner:
                 return index
             base = self.place(link, held.point)
             arm, angle = point - held.point, self.angles[link]
-            self._add(
-                PointOnLink(
-                    base,
-                    self._pin_count,
-                    angle.coordinate,
-                    abs(arm),
-                    angle.constant + phase(arm),
-                )
-            )
+            self._add(PointOnLink(base, self._pin_count, angle.coordinate, angle.unit * arm))
         return self._new_pin(link, point)
 
     def _place_held(self, held: Held) -> int:
@@ -138,8 +141,8 @@ class Planner:
         if held.slide is None:
             return base
         angle, slide = self.angles[held.link], held.slide
-        direction = angle.constant + held.direction
-        self._add(PointOnRail(base, angle.coordinate, slide.coordinate, direction, slide.sign))
+        unit = angle.unit * (slide.sign * held.direction)
+        self._add(PointOnRail(base, angle.coordinate, slide.coordinate, unit))
         self._pin_count += 1
         return self._pin_count - 1
 
@@ -165,7 +168,7 @@ class Planner:
             if angle.coordinate or sign < 0.0:
                 self._add(Turned(angle.coordinate, index, sign))
                 coordinate = self._new_coordinates(1)
-            self.angles[joint.link] = Angle(coordinate, angle.constant)
+            self.angles[joint.link] = Angle(coordinate, angle.constant, angle.unit)
             self._held[joint.link] = Held(
                 self.points[joint.link][joint.name],
                 joint.to,
@@ -194,20 +197,23 @@ class Planner:
         first, second = dyad.outer
         closing = dyad.inner.name
         sign = self._sign(dyad.kind, closing, f'the side of {first.name}→{second.name}')
-        b, first_zero = self._arm(one, first.name, closing)
-        c, second_zero = self._arm(other, second.name, closing)
+        one_arm = self._arm(one, first.name, closing)
+        other_arm = self._arm(other, second.name, closing)
+        b, c = abs(one_arm), abs(other_arm)
         diagonal: AnyDiagonal
         hinge = self._hinge(first.name, second.name)
         if hinge is None:
             ends = self._place_pin(first.name), self._place_pin(second.name)
-            diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c)), 0.0
+            diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c)), _LEVEL
         else:
             a, d, arms, offset, base = hinge
             diagonal = crank_diagonal(a, b, c, d, arms, offset, self._driven_only(arms))
-        self._add(RRRDyad(diagonal, b, c, sign))
+        written_out = type(diagonal) is CrankDiagonal and CrankRRRDyad.fits(diagonal)
+        kind = CrankRRRDyad if written_out else RRRDyad
+        self._add(kind(diagonal, b, c, sign))  # type: ignore[arg-type]  # as just asked
         k = self._new_coordinates(2)
-        self.angles[one] = Angle(k, base - first_zero)
-        self.angles[other] = Angle(k + 1, base - second_zero)
+        self.angles[one] = _facing(k, base, one_arm)
+        self.angles[other] = _facing(k + 1, base, other_arm)
         self._pin_to(one, first)
         self._pin_to(other, second)
 
@@ -218,7 +224,7 @@ class Planner:
         sign = self._sign(dyad.kind, name, f'where {second.name} lies from {first.name}')
         start = self.points[rail][first.name]
         line = self._line(name, rail, self.points[block][second.name])
-        foot = (line.start - start) * rect(1.0, -line.direction)
+        foot = (line.start - start) * line.direction.conjugate()
         offset = foot.imag
         if abs(offset) <= 4.0 * UNIT_ROUNDOFF * (abs(line.start) + abs(start)):
             offset = 0.0
@@ -226,13 +232,13 @@ class Planner:
         hinge = self._hinge(first.name, second.name)
         if hinge is None:
             ends = self._place_pin(first.name), self._place_pin(second.name)
-            diagonal, base = FreeDiagonal(ends, (abs(offset), inf)), 0.0
+            diagonal, base = FreeDiagonal(ends, (abs(offset), inf)), _LEVEL
         else:
             a, d, arms, angle, base = hinge
             diagonal = swivel_diagonal(a, d, offset, arms, angle, self._driven_only(arms))
         self._add(RPRDyad(diagonal, offset, sign))
         k = self._new_coordinates(2)
-        self.angles[rail] = Angle(k, base - line.direction)
+        self.angles[rail] = _facing(k, base, line.direction)
         self.angles[block] = self.angles[rail].plus(line.angle)
         self.slides[name] = Slide(k + 1, 1.0, -foot.real)
         self._pin_to(rail, first)
@@ -243,32 +249,29 @@ class Planner:
         first, second = dyad.outer
         closing, name = dyad.inner.name, second.name
         sign = self._sign(dyad.kind, name, f'where {closing} lies from {first.name}')
-        length, zero = self._arm(link, first.name, closing)
+        arm = self._arm(link, first.name, closing)
         point = self.points[block][closing]
         line = self._line(name, second.to, point)
-        base = self.angles[second.to].plus(line.direction)
-        self._add(RRPDyad(self._rail(first.name, second.to, line, length), sign))
+        base = self.angles[second.to].along(line.direction)
+        self._add(RRPDyad(self._rail(first.name, second.to, line, abs(arm)), sign))
         k = self._new_coordinates(2)
-        self.angles[link] = Angle(k, base.constant - zero)
+        self.angles[link] = _facing(k, base, arm)
         self._pin_to(link, first)
         self._ride(block, point, second.to, line, Slide(k + 1, 1.0))
         self.slides[name] = Slide(k + 1, line.sign)
 
     def _prp(self, dyad: Dyad) -> None:
-        starts, arms, directions = [], [], []
+        starts, arms, units = [], [], []
         k = self._coordinates
         for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
             point = self.points[body][dyad.inner.name]
             line = self._line(outer.name, outer.to, point)
-            base = self.angles[outer.to].plus(line.direction)
             starts.append(self.place(outer.to, line.start))
-            arms.append(base.coordinate)
-            directions.append(base.constant)
+            arms.append(self.angles[outer.to].coordinate)
+            units.append(self.angles[outer.to].unit * line.direction)
             self._ride(body, point, outer.to, line, Slide(k + i, 1.0))
             self.slides[outer.name] = Slide(k + i, line.sign)
-        self._add(
-            PRPDyad((starts[0], starts[1]), (arms[0], arms[1]), (directions[0], directions[1]))
-        )
+        self._add(PRPDyad((starts[0], starts[1]), (arms[0], arms[1]), (units[0], units[1])))
         self._new_coordinates(2)
 
     def _rpp(self, dyad: Dyad) -> None:
@@ -277,16 +280,16 @@ class Planner:
         point = self._point_of(second.name, carrier)
         outer = self._line(second.name, second.to, point)
         inner = self._line(dyad.inner.name, carrier, self.points[link][first.name])
-        turn = outer.angle - outer.direction
-        angle = turn + inner.direction
-        if abs(remainder(angle, pi)) < 1e-9:
+        turn = rect(1.0, outer.angle) * outer.direction.conjugate()
+        unit = turn * inner.direction
+        if abs(unit.imag) <= ROUNDING:
             raise DefinitionError(
                 f'sliders.{dyad.inner.name}.direction',
                 f'is parallel to that of {second.name!r}',
                 'give the two sliders different directions',
             )
-        constant = (inner.start - point) * rect(1.0, turn)
-        self._add(RPPDyad(self._rail(first.name, second.to, outer, inf), constant, angle))
+        constant = (inner.start - point) * turn
+        self._add(RPPDyad(self._rail(first.name, second.to, outer, inf), constant, unit))
         k = self._new_coordinates(2)
         self._ride(carrier, point, second.to, outer, Slide(k + 1, 1.0))
         self.slides[second.name] = Slide(k + 1, outer.sign)
@@ -310,7 +313,7 @@ class Planner:
         self._add(DrivenRRRDyad(ends, (sides[0], sides[1]), sign))
         k = self._new_coordinates(2)
         for i, outer in enumerate(dyad.outer):
-            self.angles[outer.link] = Angle(k + i, 0.0)
+            self.angles[outer.link] = Angle(k + i, 0.0, 1 + 0j)
             self._pin_to(outer.link, outer)
 
     def _iterate(self, group: Iterated) -> None:
@@ -322,7 +325,7 @@ class Planner:
         self._add(constraints.iteration(tuple(self.steps)))
         k = self._new_coordinates(len(group.links) + len(slides))
         for i, link in enumerate(group.links):
-            self.angles[link] = Angle(k + i, 0.0)
+            self.angles[link] = Angle(k + i, 0.0, 1 + 0j)
             point = next(iter(self.points[link].values()))
             self._held[link] = Held(point, link, pin=self._pin_count + i)
         self._pin_count += len(group.links)
@@ -350,12 +353,13 @@ class Planner:
         slider = self._linkage.sliders[name]
         through = self.points[slider.along][slider.through]
         sliding = self.points[self.blocks[name]][slider.point]
-        direction = phase(complex(*slider.direction))
+        direction = complex(*slider.direction)
+        direction /= abs(direction)
         if on == slider.along:
             start = through + rect(1.0, slider.angle) * (point - sliding)
             return Line(start, direction, slider.angle, 1.0)
         start = sliding + rect(1.0, -slider.angle) * (point - through)
-        return Line(start, direction - slider.angle, -slider.angle, -1.0)
+        return Line(start, direction * rect(1.0, -slider.angle), -slider.angle, -1.0)
 
     def _carries(self, start: str, end: str) -> tuple[Carry, ...]:
         """Return the way from one link of a body to another, through its driven joints."""
@@ -378,17 +382,15 @@ class Planner:
         if given.slider:
             point = self._point_of(given.slider, inner)
             line = self._line(given.slider, outer, point)
-            unit = rect(1.0, line.direction)
             self.slides[given.slider] = Slide(index, 1.0)
-            return Carry(line.start, point, line.angle, -1, index, line.sign, unit)
+            return Carry(line.start, point, line.angle, -1, index, line.sign, line.direction)
         (pin,) = set(self.points[inner]) & set(self.points[outer])
         sign = 1.0 if given.child == inner else -1.0
         return Carry(self.points[outer][pin], self.points[inner][pin], 0.0, index, -1, sign, 0j)
 
-    def _arm(self, link: str, start: str, end: str) -> tuple[float, float]:
-        """Return length and direction from one point of a link to another."""
-        arm = self.points[link][end] - self.points[link][start]
-        return abs(arm), phase(arm)
+    def _arm(self, link: str, start: str, end: str) -> complex:
+        """Return the vector from one point of a link to another."""
+        return self.points[link][end] - self.points[link][start]
 
     def _carriers(self, point: str) -> list[str]:
         """Return the known links that carry a point, the ground first."""
@@ -400,21 +402,21 @@ class Planner:
 
     def _hinge(
         self, first: str, second: str
-    ) -> tuple[float, float, tuple[int, int], float, float] | None:
+    ) -> tuple[float, float, tuple[int, int], float, Angle] | None:
         """
         Return OA, OD, the arms, their offset and the base, where two pins' links share a pin O.
 
-        The base is what is to be added to a direction that a `CrankDiagonal` gives.
+        The base is what a direction that a `CrankDiagonal` gives is measured from.
         """
         for other in self._carriers(second):
             for one in self._carriers(first):
                 pivot = self._common(one, other, (first, second))
                 if pivot:
-                    a, first_zero = self._arm(one, pivot, first)
-                    d, second_zero = self._arm(other, pivot, second)
-                    angle, base = self.angles[one], self.angles[other].plus(second_zero)
-                    offset = angle.constant + first_zero - base.constant
-                    return a, d, (angle.coordinate, base.coordinate), offset, base.constant
+                    a, d = self._arm(one, pivot, first), self._arm(other, pivot, second)
+                    angle, base = self.angles[one].along(a), self.angles[other].along(d)
+                    offset = phase(angle.unit * base.unit.conjugate())
+                    arms = angle.coordinate, base.coordinate
+                    return abs(a), abs(d), arms, offset, base
         return None
 
     def _common(self, one: str, other: str, apart: tuple[str, ...]) -> str | None:
@@ -426,18 +428,18 @@ class Planner:
 
     def _rail(self, pin: str, on: str, line: Line, length: float) -> Rail:
         """Return a line on a known link as it sees a known pin."""
-        base = self.angles[on].plus(line.direction)
+        base = self.angles[on].along(line.direction)
         for link in self._carriers(pin):
             pivot = self._common(link, on, (pin,))
             if pivot:
-                a, zero = self._arm(link, pivot, pin)
-                angle = self.angles[link].plus(zero)
-                place = (self.points[on][pivot] - line.start) * rect(1.0, -line.direction)
+                angle = self.angles[link]
+                arm = self._arm(link, pivot, pin) * angle.unit * base.unit.conjugate()
+                place = (self.points[on][pivot] - line.start) * line.direction.conjugate()
                 arms = angle.coordinate, base.coordinate
                 kind = CrankRail if self._driven_only(arms) else UnsignedRail
-                return kind(a, place, length, arms, angle.constant - base.constant)
+                return kind(arm, place, length, arms)
         ends = self.place(on, line.start), self._place_pin(pin)
-        return FreeRail(ends, length, base.coordinate, base.constant)
+        return FreeRail(ends, length, base.coordinate, base.unit)
 
     def _driven_only(self, arms: tuple[int, int]) -> bool:
         """Return whether two coordinates are inputs or the ground: known with their turns."""
@@ -460,6 +462,12 @@ class Planner:
                 f'write {choices} ({meaning})',
             )
         return sides[side]
+
+
+def _facing(coordinate: int, base: Angle, vector: complex) -> Angle:
+    """Return the angle of a link of which a vector stands at a coordinate, from a base."""
+    unit = base.unit * (vector / abs(vector)).conjugate()
+    return Angle(coordinate, base.constant - phase(vector), unit)
 
 
 def _scale(links: Iterable[Mapping[str, Point]]) -> float:

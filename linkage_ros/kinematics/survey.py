@@ -43,6 +43,10 @@ _MANY = 12
 """At more places than these a value is the rule and no extreme; also the lines of a grid."""
 
 
+_EASY = 0.25
+"""Conditioning of a pose that shows a linkage well: its transmission angle is above 20 degrees."""
+
+
 class Extreme(NamedTuple):
     """A lowest or highest value, and where it is met; nowhere named where it is met all along."""
 
@@ -193,12 +197,17 @@ def usual_inputs(closure: Closure) -> tuple[float, ...]:
 
     60 degrees where the input turns fully; else two thirds of the way through its widest range,
     since in the middle the links of a symmetric linkage often lie on each other. Of several
-    inputs, what the file's pose says, or of a coarse grid what is farthest from a toggle.
+    inputs, what the file's pose says; else 60 degrees each, where that is far from a toggle; else
+    what is farthest from one on a coarse grid.
     """
     linkage = closure.linkage
     if len(linkage.inputs) > 1:
         if linkage.pose is not None:
             return linkage.pose.inputs
+        usual = (pi / 3.0,) * len(linkage.inputs)
+        turning = not any(given.slider for given in linkage.inputs)
+        if turning and _ease(closure, closure.position(*usual)) > _EASY:
+            return usual
         return max(grid(closure, _MANY), key=lambda found: _ease(closure, found[1]))[0]
     interval = Way(closure).widest_range
     assert interval is not None, 'reading the file has proved that it closes somewhere'

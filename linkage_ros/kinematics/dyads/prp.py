@@ -76,28 +76,29 @@ class PRPDyad:
         Indices of E1 and E2 among the pins.
     arms
         Indices, among the coordinates, of the angles of the links that carry the lines.
-    directions
-        Directions of the lines less those coordinates, in [rad].
+    units
+        Directions of the lines where those coordinates are 0.
 
     """
 
-    __slots__ = ('_arms', '_directions', '_starts')
+    __slots__ = ('_across', '_arms', '_starts', '_units')
 
     def __init__(
-        self, starts: tuple[int, int], arms: tuple[int, int], directions: tuple[float, float]
+        self, starts: tuple[int, int], arms: tuple[int, int], units: tuple[complex, complex]
     ) -> None:
         self._starts = starts
         self._arms = arms
-        self._directions = directions
+        self._units = units
+        self._across = units[1] * units[0].conjugate()
 
     def close(self, known: State) -> PRPPose:
         """Append both slides."""
         x, pins = known
-        (i, j), (one, other) = self._arms, self._directions
+        (i, j), (one, other) = self._arms, self._units
         start, end = (pins[k] for k in self._starts)
-        units = rect(1.0, x[i] + one), rect(1.0, x[j] + other)
+        units = rect(1.0, x[i]) * one, rect(1.0, x[j]) * other
         # The angle between the lines first: two directions would cancel where they are parallel.
-        across = rect(1.0, x[j] - x[i] + (other - one))
+        across = rect(1.0, x[j] - x[i]) * self._across
         between = (end - start) * units[0].conjugate()
         if abs(across.imag) <= ROUNDING:
             gap = abs(between.imag)

@@ -27,7 +27,7 @@ of the rates and of the accelerations. There is one solution at every state, and
 
 from __future__ import annotations
 
-from math import atan2, cos, sin
+from math import atan2
 from typing import NamedTuple
 
 from linkage_ros.kinematics.rail import Rail, Sight
@@ -68,16 +68,16 @@ class RPPDyad:
         The known line.
     constant
         κ, in the unit of the lengths.
-    angle
-        α, in [rad]; no multiple of π.
+    unit
+        e^{iα}, not real.
 
     """
 
     __slots__ = ('_constants', '_rail')
 
-    def __init__(self, rail: Rail, constant: complex, angle: float) -> None:
+    def __init__(self, rail: Rail, constant: complex, unit: complex) -> None:
         self._rail = rail
-        self._constants = (constant, sin(angle), cos(angle))
+        self._constants = (constant, unit.imag, unit.real)
 
     def close(self, known: State) -> RPPPose:
         """Append both slides."""

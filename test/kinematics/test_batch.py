@@ -1,0 +1,385 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Many states at once are solved as well as one: against the reference, and against the scalar dyad.
+
+The accelerations' reference differentiates the closing equation twice, in 70 digits.
+"""
+
+from __future__ import annotations
+
+from math import inf, nan, pi, remainder
+from typing import Any
+import warnings
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from linkage_ros.kinematics.batch import rrr
+from linkage_ros.kinematics.batch.rrr import BLOCK, CODES, RRRBatch
+from linkage_ros.kinematics.status import Status
+from mpmath import mp, mpc, mpf
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+
+from .on_crank import FourBar
+from .reference import four_bar, Quantity, turned
+from .samples import FOUR_BARS, four_bars, FourBarCase
+from .tolerance import ANGLE, NEEDLE_RATE, RATE, TOGGLE, Worst
+
+COUNT = 1000
+ACCELERATED = 60
+
+ACCELERATION = 4.0
+"""Limit for accelerations in units of u·κ; of 12,700 loops of all families the worst had 2.3."""
+
+STATUSES = tuple(Status)
+CLOSED, TOGGLED, OPEN, INDETERMINATE = (
+    CODES[s] for s in (Status.CLOSED, Status.TOGGLE, Status.OPEN, Status.INDETERMINATE)
+)
+
+# Lengths a, b, c, d.
+SHAPES = {
+    'crank-rocker': (0.04, 0.12, 0.08, 0.1),
+    'crank-rocker, long rocker': (0.04, 0.08, 0.12, 0.1),
+    'drag link': (0.1, 0.12, 0.08, 0.04),
+    'stretches': (4.0, 5.0, 3.0, 6.5),
+    'folds': (4.0, 2.0, 4.5, 5.0),
+    'short pair': (40.0, 3.0, 2.5, 41.0),
+}
+CHANGE_POINTS = {
+    'parallelogram': (0.04, 0.12, 0.04, 0.12),
+    'parallelogram, long crank': (2.0, 1.0, 2.0, 1.0),
+    'kite that folds': (1.0, 1.0, 2.0, 2.0),
+    'kite whose pins meet': (2.0, 3.0, 3.0, 2.0),
+    'a + b = c + d': (3.0, 2.0, 4.0, 1.0),
+    'a + c = b + d': (3.0, 4.0, 2.0, 1.0),
+    'a + d = b + c': (1.0, 2.0, 3.0, 4.0),
+}
+
+length = st.floats(0.1, 10.0)
+cranks = st.lists(st.floats(-7.0, 7.0), min_size=1, max_size=20)
+side = st.sampled_from((1, -1))
+
+Array = NDArray[np.float64]
+
+
+def solved(dyad: RRRBatch, phi: Any, rate: Any = 1.0, acceleration: Any = 0.0) -> list[Any]:
+    """Return status, positions, velocities and accelerations."""
+    phi = np.asarray(phi, np.float64)
+    outs = np.full((3, 2, phi.size), 777.0)
+    return [dyad.solve(phi, rate, acceleration, *outs), *outs]
+
+
+def accelerations(case: FourBarCase) -> list[Quantity]:
+    """Return α3 and α4 at a crank rate of 1; κ from differences."""
+    *inputs, phi, side_of_b = case
+    with mp.workdps(70):
+        x = [*map(mpf, inputs), mpf(phi)]
+        values = _accelerations(x, side_of_b)
+        conditions = [abs(value) for value in values]
+        for i, size in enumerate((*x[:4], turned(x[4]))):
+            step = mpf(10) ** -28 * (abs(x[i]) if i < 4 else 1)
+            ends = []
+            for sign in (1, -1):
+                moved = list(x)
+                moved[i] += sign * step
+                ends.append(_accelerations(moved, side_of_b))
+            for j in (0, 1):
+                conditions[j] += abs(size * (ends[0][j] - ends[1][j]) / (2 * step))
+        return [Quantity(value, k) for value, k in zip(values, conditions, strict=True)]
+
+
+def _accelerations(x: list[mpf], side_of_b: int) -> tuple[mpf, mpf]:
+    a, b, c, d, phi = x
+    crank = a * mp.expj(phi)
+    diagonal = d - crank
+    s = abs(diagonal)
+    foot = (s * s + b * b - c * c) / (2 * s)
+    height = mp.sqrt((b + c - s) * (b + c + s) * (s - abs(b - c)) * (s + abs(b - c))) / (2 * s)
+    coupler = diagonal / s * mpc(foot, side_of_b * height)
+    rocker = coupler - diagonal
+
+    def two(right: mpc) -> tuple[mpf, mpf]:
+        # coupler·x − rocker·y = right, for real x and y
+        area = (coupler.conjugate() * rocker).imag
+        return (right.conjugate() * rocker).imag / area, (right.conjugate() * coupler).imag / area
+
+    # crank + coupler − rocker − d = 0, differentiated once and twice by the time:
+    omega3, omega4 = two(-crank)
+    return two(-1j * (crank + coupler * omega3**2 - rocker * omega4**2))
+
+
+@pytest.fixture(params=['tangent', 'sine and cosine'])
+def half_angle(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rrr, '_BY_TANGENT', request.param == 'tangent' and rrr._BY_TANGENT)
+
+
+@pytest.mark.usefixtures('half_angle')
+@pytest.mark.parametrize('family', FOUR_BARS)
+def test_all_is_right_in_every_family(family: str) -> None:
+    worst = Worst()
+    closed = 0
+    for case in four_bars(family, COUNT):
+        *lengths, phi, sign = case
+        truth = four_bar(*case)
+        (code,), position, velocity, acceleration = solved(RRRBatch(*lengths, sign), [phi])
+        gap = float(max(truth.gap, 0))
+        worst.note_status(STATUSES[code], gap, gap, sum(lengths), case)
+        assert np.isnan(position).all() == (code == OPEN), case
+        assert np.isnan(velocity).all() == (code != CLOSED), case
+        assert np.isnan(acceleration).all() == (code != CLOSED), case
+        if truth.gap > 0 or code == OPEN:
+            continue
+        limit = ANGLE if code == CLOSED else TOGGLE
+        worst.note('θ3', truth.coupler.half_turn_error_of(position[0, 0]), limit, case)
+        worst.note('θ4', truth.rocker.half_turn_error_of(position[1, 0]), limit, case)
+        if code == CLOSED:
+            closed += 1
+            limit = NEEDLE_RATE if family == 'needles' else RATE
+            worst.note('ω3', truth.coupler_rate.error_of(velocity[0, 0]), limit, case)
+            worst.note('ω4', truth.rocker_rate.error_of(velocity[1, 0]), limit, case)
+            if closed <= ACCELERATED:
+                alpha3, alpha4 = accelerations(case)
+                worst.note('α3', alpha3.error_of(acceleration[0, 0]), ACCELERATION, case)
+                worst.note('α4', alpha4.error_of(acceleration[1, 0]), ACCELERATION, case)
+    worst.check()
+    assert closed >= ACCELERATED, 'a sweep that closes nothing proves nothing'
+
+
+def check_against_scalar(
+    lengths: tuple[float, float, float, float],
+    sign: int,
+    phi: list[float],
+    rate: float = 1.0,
+    acceleration: float = 0.0,
+) -> set[Status]:
+    """
+    Compare every state; angles not modulo 2π, since a motion is to go on as the scalar's does.
+
+    What a rounding error does to the triangle grows with the lengths' square over the cross
+    product. In units of it, over 170,000 states angles differed by 9e-16, rates by 1.1e-14 and
+    accelerations by 3.3e-14, the latter two as a part of themselves, or of 1 where smaller.
+    """
+    found = solved(RRRBatch(*lengths, sign), phi, rate, acceleration)
+    scalar = FourBar(*lengths, sign)
+    for i, angle in enumerate(phi):
+        code, position, velocity, change = (array[..., i] for array in found)
+        pose = scalar.close(angle)
+        condition = max(lengths) ** 2 / abs(pose.cross) if pose.cross else inf
+        if condition > 1e6 and STATUSES[code] is not pose.status:
+            # Which float next to a limit is the last that closes, or toggles, may differ.
+            assert INDETERMINATE not in (code, CODES[pose.status])
+            continue
+        assert STATUSES[code] is pose.status, angle
+        if code in (OPEN, INDETERMINATE):
+            assert np.isnan([*position, *velocity, *change]).all()
+            continue
+        limit = 2e-15 * min(condition, 1e8)
+        assert position == pytest.approx([pose.first, pose.second], rel=0.0, abs=limit)
+        if code == TOGGLED:
+            assert np.isnan([*velocity, *change]).all()
+        else:
+            for one, other, digits in (
+                (velocity, scalar.rates(pose, rate), 3e-14),
+                (change, scalar.accelerations(pose, rate, acceleration), 1e-13),
+            ):
+                limit = digits * condition
+                assert one == pytest.approx(other, rel=limit, abs=limit)
+    return {STATUSES[code] for code in found[0]}
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(length, length, length, length, cranks, side)
+def test_any_lengths_are_solved_as_by_the_scalar_dyad(
+    a: float, b: float, c: float, d: float, phi: list[float], sign: int
+) -> None:
+    check_against_scalar((a, b, c, d), sign, phi, 1.0, 0.3)
+
+
+@pytest.mark.parametrize('name', [*SHAPES, *CHANGE_POINTS])
+@pytest.mark.parametrize('sign', [1, -1])
+def test_every_shape_is_solved_as_by_the_scalar_dyad_over_four_turns(name: str, sign: int) -> None:
+    # Off the change points, near which the scalar dyad's accelerations lose their digits.
+    angles = (np.arange(1, 2000) * 0.0126 - 4 * pi + 1e-3).tolist()
+    found = check_against_scalar({**SHAPES, **CHANGE_POINTS}[name], sign, angles, 1.0, 0.3)
+    limited = {'stretches', 'folds', 'short pair'}
+    assert found == ({Status.CLOSED, Status.OPEN} if name in limited else {Status.CLOSED})
+
+
+@pytest.mark.parametrize('name', CHANGE_POINTS)
+@pytest.mark.parametrize('at', [0.0, pi, 2 * pi, -pi])
+def test_change_points_are_passed_as_by_the_scalar_dyad(name: str, at: float) -> None:
+    lengths = CHANGE_POINTS[name]
+    near = [10.0**-i for i in (1, 3, 6, 9, 12)] + ([] if at else [1e-100, 1e-150])
+    angles = [at, *(at + sign * x for x in near for sign in (1, -1))]
+    codes, positions, velocities, _ = solved(RRRBatch(*lengths, 1), angles)
+    scalar = FourBar(*lengths, 1)
+    for i, angle in enumerate(angles):
+        pose = scalar.close(angle)
+        assert STATUSES[codes[i]] is pose.status
+        if codes[i] in (CLOSED, TOGGLED):
+            assert positions[:, i] == pytest.approx([pose.first, pose.second], rel=0, abs=2e-15)
+        if codes[i] == CLOSED:
+            assert velocities[:, i] == pytest.approx(scalar.rates(pose, 1.0), rel=3e-15, abs=3e-15)
+
+
+def test_accelerations_keep_their_digits_at_a_change_point() -> None:
+    near = [sign * 10.0**-i for i in (1, 3, 6, 9, 12, 100, 290) for sign in (1, -1)]
+
+    # The coupler of a parallelogram does not turn, and its rocker turns with the crank.
+    for turn, angles in ((0.0, near), (pi, near[:10]), (2 * pi, near[:10])):
+        codes, _, _, found = solved(
+            RRRBatch(*CHANGE_POINTS['parallelogram'], 1), [turn + x for x in angles], 1.0, 0.5
+        )
+        assert not codes.any()
+        assert found[0] == pytest.approx(0.0, abs=1e-15)
+        assert found[1] == pytest.approx(0.5, abs=1e-15)
+
+    # Elsewhere the reference says it; it takes digits to say.
+    for name in ('kite that folds', 'kite whose pins meet', 'a + b = c + d', 'a + c = b + d'):
+        lengths = CHANGE_POINTS[name]
+        angles = [x for x in near if abs(x) > 1e-13]
+        codes, _, _, found = solved(RRRBatch(*lengths, 1), angles)
+        assert not codes.any()
+        for i, phi in enumerate(angles):
+            with mp.workdps(70):
+                exact = _accelerations([*map(mpf, lengths), mpf(phi)], 1 if phi > 0 else -1)
+            assert found[:, i] == pytest.approx([float(x) for x in exact], rel=2e-14, abs=1e-300)
+
+
+def test_the_pose_says_what_a_state_does_not_have() -> None:
+    # Open, at the limit, closed; and no angle at all.
+    lengths = (4.0, 5.0, 3.0, 6.5)
+    limit = float(mp.acos((mpf(4) ** 2 + mpf(6.5) ** 2 - 64) / (2 * mpf(4) * mpf(6.5))))
+    found = solved(RRRBatch(*lengths, 1), [limit + 0.1, limit, limit - 0.1, nan, inf, -inf])
+    codes, position, velocity, acceleration = found
+    lost = INDETERMINATE
+    assert codes.tolist() == [OPEN, TOGGLED, CLOSED, lost, lost, lost]
+    assert codes.dtype == np.uint8
+    assert np.isnan(position).tolist() == [[True, False, False, True, True, True]] * 2
+    for array in (velocity, acceleration):
+        assert np.isnan(array).tolist() == [[True, True, False, True, True, True]] * 2
+
+
+@pytest.mark.parametrize(
+    ('lengths', 'code'),
+    [((2.0, 3.0, 3.0, 2.0), INDETERMINATE), ((2.0, 3.0, 3.5, 2.0), OPEN)],
+    ids=['kite', 'unequal'],
+)
+def test_where_the_pins_meet_there_is_no_pose(
+    lengths: tuple[float, float, float, float], code: int
+) -> None:
+    codes, *arrays = solved(RRRBatch(*lengths, 1), [1.0, 0.0, -0.0, 1e-200, 2.0])
+    assert codes.tolist() == [CLOSED, code, code, code, CLOSED]
+    for array in arrays:
+        assert np.isnan(array).tolist() == [[False, True, True, True, False]] * 2
+
+
+@pytest.mark.parametrize('name', [*SHAPES, 'parallelogram', 'a + d = b + c'])
+def test_how_the_states_are_cut_into_blocks_changes_nothing(name: str) -> None:
+    dyad = RRRBatch(*{**SHAPES, **CHANGE_POINTS}[name], -1)
+    phi = np.linspace(-9.0, 7.0, 2 * BLOCK + 77)
+    whole = solved(dyad, phi, 2.0, 0.7)
+    for part in (slice(0, 1), slice(5, 1000), slice(BLOCK - 3, BLOCK + 4), slice(BLOCK, None)):
+        for one, other in zip(solved(dyad, phi[part], 2.0, 0.7), whole, strict=True):
+            # A vector's last elements may be worked out by other instructions.
+            np.testing.assert_allclose(one, other[..., part], rtol=1e-11, atol=1e-11)
+
+
+def test_no_state_at_all_is_solved_too() -> None:
+    codes, *arrays = solved(RRRBatch(1.0, 2.0, 2.5, 3.0, 1), [])
+    assert codes.shape == (0,)
+    assert all(array.shape == (2, 0) for array in arrays)
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(cranks, st.floats(-50.0, 50.0), st.floats(-50.0, 50.0))
+def test_rates_and_accelerations_follow_the_crank_s(
+    phi: list[float], rate: float, acceleration: float
+) -> None:
+    dyad = RRRBatch(*SHAPES['crank-rocker'], 1)
+    _, position, per_rate, per_square = solved(dyad, phi)
+    rates, changes = np.full(len(phi), rate), np.full(len(phi), acceleration)
+    for found in (
+        solved(dyad, phi, rate, acceleration),
+        solved(dyad, phi, rates, acceleration),
+        solved(dyad, phi, rates, changes),
+    ):
+        np.testing.assert_array_equal(found[1], position)
+        np.testing.assert_allclose(found[2], rate * per_rate, rtol=1e-15, atol=1e-300)
+        expected = rate * rate * per_square + acceleration * per_rate
+        size = rate * rate * np.abs(per_square) + np.abs(acceleration * per_rate)
+        assert (np.abs(found[3] - expected) <= 1e-15 * size + 1e-300).all()
+
+
+def test_what_is_not_asked_for_is_not_written_and_the_rest_is_the_same() -> None:
+    dyad = RRRBatch(*SHAPES['crank-rocker'], 1)
+    phi = np.linspace(0.0, 6.0, 100)
+    _, *whole = solved(dyad, phi, 2.0, 0.5)
+    for asked in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 0, 0)):
+        outs = [np.empty((2, 100)) if one else None for one in asked]
+        assert not dyad.solve(phi, 2.0, 0.5, *outs).any()
+        for out, expected in zip(outs, whole, strict=True):
+            if out is not None:
+                np.testing.assert_array_equal(out, expected)
+
+
+def test_results_go_to_any_rows() -> None:
+    dyad = RRRBatch(*SHAPES['crank-rocker'], 1)
+    phi = np.linspace(0.0, 6.0, 100)
+    _, expected, _, _ = solved(dyad, phi)
+    table = np.zeros((100, 5))
+    dyad.solve(phi, out_position=(table[:, 3], table[:, 1]))
+    np.testing.assert_array_equal(table[:, [3, 1]].T, expected)
+    assert not table[:, [0, 2, 4]].any()
+
+
+@pytest.mark.parametrize('exponent', [-1000, -300, 3, 900])
+@pytest.mark.parametrize('name', ['crank-rocker', 'folds', 'parallelogram'])
+def test_the_unit_of_the_lengths_changes_no_bit(name: str, exponent: int) -> None:
+    lengths = {**SHAPES, **CHANGE_POINTS}[name]
+    phi = np.linspace(-3.0, 3.0, 50)
+    one = solved(RRRBatch(*lengths, 1), phi)
+    other = solved(RRRBatch(*(x * 2.0**exponent for x in lengths), 1), phi)
+    for array, same in zip(one, other, strict=True):
+        np.testing.assert_array_equal(array, same)
+
+
+def test_no_state_makes_numpy_warn() -> None:
+    angles = [0.0, -0.0, pi, 1e-310, 1e308, nan, inf, *np.linspace(-7.0, 7.0, 50)]
+    with warnings.catch_warnings(), np.errstate(all='warn'):
+        warnings.simplefilter('error')
+        for lengths in (*SHAPES.values(), *CHANGE_POINTS.values(), (1.0, 1e-200, 1e-200, 1.0)):
+            solved(RRRBatch(*lengths, 1), angles)
+
+
+def test_margins_may_be_given() -> None:
+    # A change point as decimals; a hair less of a margin, and the crank cannot pass.
+    lengths = (0.4, 0.2, 0.5, 0.1)
+    dyad = RRRBatch(*lengths, 1)
+    assert dyad.margins == (0.0, pytest.approx(0.2))
+    assert solved(dyad, [1e-12])[0] == CLOSED
+    assert solved(RRRBatch(*lengths, 1, (-1e-16, 0.2)), [1e-12])[0] == OPEN
+
+
+def test_angles_go_on_steadily_through_change_points() -> None:
+    phi = np.linspace(-9.0, 9.0, 9000)
+    for lengths in CHANGE_POINTS.values():
+        _, positions, velocities, _ = solved(RRRBatch(*lengths, 1), phi)
+        for angle, rate in zip(positions, velocities, strict=True):
+            steps = np.abs([remainder(step, 2 * pi) for step in np.diff(angle)])
+            assert (steps <= 0.002 * 1.5 * (np.abs(rate).max() + 1e-9)).all()
