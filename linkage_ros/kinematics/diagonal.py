@@ -25,7 +25,8 @@ change point), where the coordinates of A and D cancel. For all others there are
 from __future__ import annotations
 
 from cmath import phase
-from math import atan2, cos, fsum, hypot, inf, pi, remainder, sin, sqrt
+from fractions import Fraction
+from math import atan2, cos, fsum, inf, pi, remainder, sin, sqrt
 from typing import NamedTuple, Protocol
 
 from linkage_ros.kinematics.step import State
@@ -51,32 +52,31 @@ def margin(*lengths: float) -> float:
     return 0.0 if abs(total) <= 4.0 * UNIT_ROUNDOFF * fsum(map(abs, lengths)) else total
 
 
-def reach(constant: float, part: float, span: float) -> tuple[float, float]:
+def reach(constant: float, part: float) -> tuple[float, float]:
     """
-    Return the root of ``constant + part²/span``, and the gap where that is negative.
+    Return the root of ``constant + part²``, and that sum where it is negative.
 
     A dyad that folds or stretches does so where such a sum, its reach, goes to zero. The constant
-    is a margin of the linkage; the part is signed by the half angle. Where the constant is zero,
-    the root is part/√span and has its sign. The span is negative where the square is to be taken
-    away; there is no change point then. A sum within its own rounding error of zero is zero: those
-    are the last few floats on either side of a toggle, where the rate has no correct digit.
+    is a bracket of the linkage; the part is signed by the half angle. Where the constant is zero,
+    the root is the part and has its sign. A sum within its own rounding error of zero is zero:
+    those are the last few floats on either side of a toggle, where the rate has no correct digit.
 
     Returns
     -------
     root : float
         0 at a toggle.
-    gap : float
-        0 where the dyad closes, else what it misses by, in the unit of the lengths.
+    missing : float
+        0 where the dyad closes, else what is missing of the sum.
 
     """
-    if constant == 0.0 and span > 0.0:
-        return part / sqrt(span), 0.0
-    square = part * part / span
-    return root_of(constant + square, abs(constant) + abs(square))
+    if constant == 0.0:
+        return part, 0.0
+    square = part * part
+    return root_of(constant + square, abs(constant) + square)
 
 
 def root_of(total: float, size: float) -> tuple[float, float]:
-    """Return root and gap as `reach` does, of a sum whose terms are of a size."""
+    """Return root and what is missing as `reach` does, of a sum whose terms are of a size."""
     rounding = ROUNDING * size
     if total > rounding:
         return sqrt(total), 0.0
@@ -94,27 +94,30 @@ class Diagonal(NamedTuple):
 
     Attributes
     ----------
-    length
-        s = |AD|.
+    square
+        s² = |AD|²; 0 where no direction can be told.
     direction
         Of AD, in [rad].
     fold, stretch
-        √(s − lower) and √(upper − s): how far the dyad is from its limits. Signed at a change
-        point.
+        √(s² − lower²) and √(upper² − s²): how far the dyad is from its limits. Signed at a change
+        point; the latter is infinite where the dyad has no upper limit.
     gap
         What A and D are too near or too far by; 0 where the dyad closes.
-    half_sine, half_cosine
-        sin(φ/2) and cos(φ/2) of a `CrankDiagonal`.
+    near, far
+        2·√(ad)·sin(φ/2) and 2·√(ad)·cos(φ/2) of a `CrankDiagonal`, else 0.
+    excess
+        What s² has beyond the diagonal's ``least``, its constant part.
 
     """
 
-    length: float
+    square: float
     direction: float
     fold: float
     stretch: float
     gap: float
-    half_sine: float
-    half_cosine: float
+    near: float
+    far: float
+    excess: float
 
 
 class Growth(NamedTuple):
@@ -146,7 +149,17 @@ class GrowthChange(NamedTuple):
 
 
 class AnyDiagonal(Protocol):
-    """What a dyad asks of a diagonal."""
+    """
+    What a dyad asks of a diagonal.
+
+    Attributes
+    ----------
+    least
+        A constant that s² is never below.
+
+    """
+
+    least: Fraction
 
     def at(self, known: State, /) -> Diagonal:
         """Return the diagonal."""
@@ -164,17 +177,14 @@ class CrankDiagonal:
     """
     The diagonal between two links that are pinned together at O.
 
-    With a = OA, d = OD and φ the angle from OD to OA::
+    With a = OA, d = OD and φ the angle from OD to OA, near = 2·√(ad)·sin(φ/2) and far =
+    2·√(ad)·cos(φ/2)::
 
-        s   = hypot(d − a, 2·√(ad)·sin(φ/2))
+        s²  = (d − a)² + near²
         dir = dir(OD) + atan2(−a·sin φ, (d − a) + 2a·sin²(φ/2))
 
-    and, with near = 2·√(ad)·sin(φ/2) and far = 2·√(ad)·cos(φ/2), s exceeds its least value |d − a|
-    by near²/(s + |d − a|) and falls short of its greatest, a + d, by far²/(s + a + d)::
-
-        s − lower = (|d − a| − lower) + near²/(s + |d − a|)
-        upper − s = (upper − a − d) + far²/(s + a + d)
-                  = (upper − |d − a|) − near²/(s + |d − a|)
+        s² − lower² = ((d − a)² − lower²) + near²
+        upper² − s² = (upper² − (a + d)²) + far² = (upper² − (d − a)²) − near²
 
     Where a and d are long beside upper, so that no stretch can be near s = a + d, the last line is
     taken: the one before it would cancel a + d. The brackets are constants of the linkage.
@@ -196,8 +206,8 @@ class CrankDiagonal:
     """
 
     __slots__ = (
-        '_constants', '_reaches', 'arms', 'brackets', 'fold_margin', 'half_turn', 'limits',
-        'sides', 'stretch_margin',
+        '_constants', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits', 'sides',
+        'stretch_margin',
     )  # fmt: skip
 
     def __init__(
@@ -212,24 +222,22 @@ class CrankDiagonal:
     ) -> None:
         lower, upper = limits
         least = abs(d - a)
+        self.least = (Fraction(d) - Fraction(a)) ** 2
         self.sides = (a, d)
         self.limits = limits
-        self.brackets = (fold * (least + lower), stretch * (upper + a + d))
         self.fold_margin, self.stretch_margin = fold, stretch
-        # Two roots, since a·d may underflow where the lengths differ by many decades.
-        self._constants = (a, d, d - a, 2.0 * sqrt(a) * sqrt(d), lower)
+        self.brackets = (fold * (least + lower), stretch * (upper + a + d))
         short_pair = a + d > 2.0 * upper
-        if short_pair:
-            stretch = fsum((upper, -max(a, d), min(a, d)))
-        self._reaches = (fold, stretch, short_pair, stretch == inf, least, a + d)
+        whole = (fsum((upper, -max(a, d), min(a, d)))) * (upper + least) if short_pair else 0.0
+        # Two roots, since a·d may underflow where the lengths differ by many decades.
+        self._constants = (a, d - a, 2.0 * sqrt(a) * sqrt(d), *self.brackets, short_pair, whole)
         self.arms = (*arms, offset)
         self.half_turn = (sin(0.5 * offset), cos(0.5 * offset))
 
     def at(self, known: State) -> Diagonal:
         """Return the diagonal."""
         x = known[0]
-        a, _, difference, root, lower = self._constants
-        fold, stretch, short_pair, endless, least, greatest = self._reaches
+        a, difference, root, fold, stretch, short_pair, whole = self._constants
         first, second, offset = self.arms
         base = x[second]
         half = 0.5 * (x[first] - base)
@@ -241,28 +249,47 @@ class CrankDiagonal:
                 half_sine * cosine + half_cosine * sine,
                 half_cosine * cosine - half_sine * sine,
             )
-        near = root * half_sine
-        s = hypot(difference, near)
-        if s < SMALLEST:
-            return Diagonal(0.0, 0.0, 0.0, 0.0, lower, half_sine, half_cosine)
+        near, far = root * half_sine, root * half_cosine
+        excess = near * near
+        square = difference * difference + excess
+        lower, upper = self.limits
+        if square < SMALLEST:
+            return Diagonal(0.0, 0.0, 0.0, 0.0, lower, near, far, 0.0)
         direction = base + atan2(
             -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
         )
-        root_fold, gap = reach(fold, near, s + least)
-        if gap or endless:
-            root_stretch = inf
-        elif short_pair:
-            root_stretch, gap = reach(stretch, near, -(s + least))
+        root_fold, missing = reach(fold, near)
+        if missing:
+            gap = missing / (sqrt(square) + lower)
+            return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0)
+        if upper == inf:
+            return new(Diagonal, (square, direction, root_fold, inf, 0.0, near, far, excess))
+        if short_pair:
+            root_stretch, missing = root_of(whole - near * near, abs(whole) + near * near)
         else:
-            root_stretch, gap = reach(stretch, root * half_cosine, s + greatest)
-        return new(Diagonal, (s, direction, root_fold, root_stretch, gap, half_sine, half_cosine))
+            root_stretch, missing = reach(stretch, far)
+        gap = missing / (sqrt(square) + upper) if missing else 0.0
+        return new(
+            Diagonal,
+            (square, direction, root_fold, root_stretch, gap, near, far, excess),
+        )
 
     def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> Growth:
-        """Return φ̇·(q − i·p), and what OD turns by."""
+        """
+        Return φ̇·(q − i·p), and what OD turns by.
+
+        With n̂ the diagonal's direction turned left::
+
+            p = OA·AD/s² = −d(direction)/dφ = (a·(d − a) − near²/2)/s²
+            q = OA·n̂/s   = (ds/dφ)/s        = near·far/(2s²)
+        """
         v = speeds[0]
         first, second, _ = self.arms
+        square, _, _, _, _, near, far, _ = diagonal
+        a, difference = self._constants[:2]
+        p = (a * difference - 0.5 * near * near) / square
+        q = 0.5 * near * far / square
         base = v[second]
-        p, q = self.swing(diagonal)
         return new(Growth, (complex(q, -p), v[first] - base, base))
 
     def accelerations(
@@ -271,49 +298,28 @@ class CrankDiagonal:
         """
         Return the derivative of `rates`.
 
-        From p' = −q·(1 + 2p) and q' = p + p² − q², the derivatives by φ. With near and far as
-        above, q = near·far/(2s²), and the bend is::
+        By φ, p' = −q·(1 + 2p) with 1 + 2p = (d² − a²)/s², and q' = p + p² − q². The bend is::
 
-            (((d − a)² − lower²)·(far/s)²/(s² − lower²)
-             − (upper² − (a + d)²)·(near/s)²/(upper² − s²))/4
+            ((d − a)² − lower²)·far²/(s² − lower²)/(4s²)
+              − (upper² − (a + d)²)·near²/(upper² − s²)/(4s²)
 
-        which is q' + q²·(1 − cot(σβ)·cot(σγ')) of an RRR dyad, and q' + q²·(1 − c²) of an RPR one,
+        which is q' + q² − q²·cot(σβ)·cot(σγ') of an RRR dyad, and q' + q²·(1 − c²) of an RPR one,
         with what cancels there taken out: at a change point one of the brackets is 0.
         """
         a = changes[0]
         first, second, _ = self.arms
         q, p = growth.unit.real, -growth.unit.imag
-        a_length, d, difference, root, _ = self._constants
-        s, _, fold, stretch, _, half_sine, half_cosine = diagonal
-        lower, upper = self.limits
-        # 1 + 2p = (d² − a²)/s², which is exactly 0 where a = d.
-        square = complex(p + (p - q) * (p + q), q * (difference / s) * ((a_length + d) / s))
-        near, far = root * (half_sine / s), root * (half_cosine / s)
+        square, _, fold, stretch, _, near, far, _ = diagonal
+        (short, long), (fold_bracket, stretch_bracket) = self.sides, self.brackets
+        turn = complex(p + (p - q) * (p + q), q * ((long - short) * (long + short) / square))
         bend = 0.0
-        if self.brackets[0]:
-            bend = self.brackets[0] * (far / fold) * (far / fold) / (s + lower)
-        if upper == inf:
+        if fold_bracket:
+            bend = fold_bracket * (far / fold) * (far / fold)
+        if stretch == inf:
             bend -= near * near
-        elif self.brackets[1]:
-            bend -= self.brackets[1] * (near / stretch) * (near / stretch) / (s + upper)
-        return new(GrowthChange, (square, a[first] - a[second], a[second], 0.25 * bend))
-
-    def swing(self, diagonal: Diagonal) -> tuple[float, float]:
-        """
-        Return p and q: how the diagonal turns and grows with φ.
-
-        With n̂ the diagonal's direction turned left::
-
-            p = OA·AD/s² = −d(direction)/dφ = a·((d − a)/s² − 2d·(sin(φ/2)/s)²)
-            q = OA·n̂/s   = (ds/dφ)/s        = 2ad·sin(φ/2)·cos(φ/2)/s²
-
-        Where A meets D, OA·AD and s² vanish together; written with the half angle, p does not.
-        """
-        a, d, difference, _, _ = self._constants
-        s = diagonal.length
-        half_sine = diagonal.half_sine / s
-        p = a * (difference / s / s - 2.0 * d * half_sine * half_sine)
-        return p, 2.0 * a * d * half_sine * (diagonal.half_cosine / s)
+        elif stretch_bracket:
+            bend -= stretch_bracket * (near / stretch) * (near / stretch)
+        return new(GrowthChange, (turn, a[first] - a[second], a[second], 0.25 * bend / square))
 
 
 class UnsignedDiagonal(CrankDiagonal):
@@ -347,6 +353,8 @@ class FreeDiagonal:
 
     __slots__ = ('_ends', '_limits')
 
+    least = Fraction(0)
+
     def __init__(self, ends: tuple[int, int], limits: tuple[float, float]) -> None:
         self._ends = ends
         self._limits = limits
@@ -379,11 +387,15 @@ class FreeDiagonal:
 def free_diagonal(vector: complex, size: float, lower: float, upper: float) -> Diagonal:
     """Return the diagonal of a vector whose ends have coordinates of a size."""
     s = abs(vector)
-    if s < SMALLEST:
-        return Diagonal(0.0, 0.0, 0.0, 0.0, lower, 0.0, 0.0)
-    root_fold, gap = root_of(s - lower, size + lower)
-    if gap or upper == inf:
-        root_stretch = inf
-    else:
-        root_stretch, gap = root_of(upper - s, size + upper)
-    return new(Diagonal, (s, phase(vector), root_fold, root_stretch, gap, 0.0, 0.0))
+    square = s * s
+    if square < SMALLEST:
+        return Diagonal(0.0, 0.0, 0.0, 0.0, lower, 0.0, 0.0, 0.0)
+    root_fold, missing = root_of((s - lower) * (s + lower), (size + lower) * (s + lower))
+    if missing:
+        return Diagonal(square, 0.0, 0.0, 0.0, missing / (s + lower), 0.0, 0.0, 0.0)
+    root_stretch, gap = inf, 0.0
+    if upper != inf:
+        root_stretch, missing = root_of((upper - s) * (upper + s), (size + upper) * (upper + s))
+        gap = missing / (upper + s)
+    direction = phase(vector)
+    return new(Diagonal, (square, direction, root_fold, root_stretch, gap, 0.0, 0.0, square))

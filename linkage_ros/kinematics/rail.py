@@ -160,7 +160,7 @@ class CrankRail:
     def _root(self, bracket: float, part: float, link: float, side: float) -> tuple[float, float]:
         """Return the root of the link's length less what it has to reach, and the gap."""
         if bracket == 0.0 or abs(bracket) + part * part < link + abs(side):
-            return reach(bracket, part, 1.0)
+            return reach(bracket, part)
         return root_of(link + side, link + abs(side))
 
     def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
@@ -189,19 +189,20 @@ class CrankRail:
         sight: Sight,
         _pull: complex,
         along: float,
-        _link_rate: float,
+        link_rate: float,
         speeds: State,
         changes: State,
     ) -> float:
         """
         Return ÿ + y·λ̇².
 
-        Of the two terms, which cancel at a change point, there remains, by ψ̇²::
+        The two cancel at a change point. What remains of their ψ̇² is also::
 
             (e·(b − y)² − y·(b − e − a)·(a + b − e))/w²
               = (e·(b + y)² − y·(b + e − a)·(a + b + e))/w²
 
-        The brackets b ∓ e − a are constants of the linkage; the nearer limit is the better form.
+        where the brackets b ∓ e − a are constants of the linkage. Of the forms the one of smaller
+        terms is taken.
         """
         first, second = self._arms
         v, changed = speeds[0], changes[0]
@@ -209,11 +210,16 @@ class CrankRail:
         link, e, y = self._link, pivot.imag, sight.place.imag
         swing = v[first] - v[second]
         if y > 0.0:
-            rest = e * sight.below**4 - y * below * (a + link - e)
+            terms = e * sight.below**4, y * below * (a + link - e)
         else:
-            rest = e * sight.above**4 - y * above * (a + link + e)
-        change = (changed[first] - changed[second]) * sight.arm.real
-        return change + swing * swing * (rest / along / along)
+            terms = e * sight.above**4, y * above * (a + link + e)
+        parts = -swing * swing * sight.arm.imag, y * link_rate * link_rate
+        square = (swing / along) ** 2
+        if (abs(terms[0]) + abs(terms[1])) * square < abs(parts[0]) + abs(parts[1]):
+            rest = (terms[0] - terms[1]) * square
+        else:
+            rest = parts[0] + parts[1]
+        return (changed[first] - changed[second]) * sight.arm.real + rest
 
 
 class UnsignedRail(CrankRail):

@@ -90,7 +90,9 @@ class Way:
 
     def inputs(self, value: float) -> tuple[float, ...]:
         """Return the values of all inputs."""
-        return (*self._held[: self._index], value, *self._held[self._index + 1 :])
+        held = list(self._held)
+        held[self._index] = value
+        return tuple(held)
 
     def position(self, value: float) -> Position:
         """Return the position at a value of the input."""
@@ -128,7 +130,7 @@ class Way:
 
     @property
     def widest_range(self) -> InputRange | None:
-        """The widest range; of equal ones the last, since slides are meant positive."""
+        """Return the widest range; of equal ones the last, since slides are meant positive."""
         return max(
             reversed(self.ranges),
             key=lambda interval: round(interval.highest - interval.lowest, 6),

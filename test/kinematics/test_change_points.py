@@ -215,7 +215,7 @@ def test_lengths_that_cancel_but_for_their_last_digit_are_a_change_point() -> No
 
 
 @pytest.mark.parametrize('b', [0.2, 1.0, 1.3, 7.0])
-@pytest.mark.parametrize('phi', [1e-9, -1e-9, 1e-15, 1e-16, 1e-20, -1e-100, 1e-200])
+@pytest.mark.parametrize('phi', [1e-9, -1e-9, 1e-15, 1e-16, 1e-20, -1e-100, 1e-150])
 @pytest.mark.parametrize('sign', [1, -1])
 def test_where_the_crank_pin_meets_the_ground_pivot_rates_stay_right(
     b: float, phi: float, sign: int

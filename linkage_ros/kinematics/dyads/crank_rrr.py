@@ -23,15 +23,16 @@ open loops, coupler and rocker short beside crank and ground. Formulas and reaso
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, sin, sqrt
+from math import atan2, cos, sin, sqrt
 
 from linkage_ros.kinematics.diagonal import (
     CrankDiagonal,
     Diagonal,
     Growth,
     ROUNDING,
+    SMALLEST,
 )
-from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose, RRRRates
+from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose, RRRRates, sums
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new
@@ -59,17 +60,15 @@ class CrankRRRDyad(RRRDyad):
     def __init__(self, diagonal: CrankDiagonal, b: float, c: float, sign: int) -> None:
         super().__init__(diagonal, b, c, sign)
         a, d = diagonal.sides
-        root = 2.0 * sqrt(a) * sqrt(d)
-        fold, stretch = diagonal.fold_margin, diagonal.stretch_margin
+        fold, stretch = diagonal.brackets
         self._closing = (
-            *diagonal.arms, 2.0 * a, d - a, root, abs(d - a), a + d,
-            fold, abs(fold), stretch, abs(stretch),
-            b + c, abs(b - c), b >= c, 2.0 * sign, 0.5 * sign,
+            *diagonal.arms, 2.0 * a, d - a, (d - a) * (d - a), 2.0 * sqrt(a) * sqrt(d),
+            fold, abs(fold), stretch, abs(stretch), *sums(b, c, diagonal.least), float(sign),
         )  # fmt: skip
+        self._moving = (*diagonal.arms[:2], a * (d - a))
         self._pulling = (
-            *diagonal.arms[:2], root, *diagonal.limits, *diagonal.brackets, d - a, a + d,
+            *diagonal.arms[:2], fold, stretch, (d - a) * (d + a), (b - c) * (b + c),
         )  # fmt: skip
-        self._moving = (*diagonal.arms[:2], a, 2.0 * d, 2.0 * a * d, d - a, b, c, min(b, c))
 
     @staticmethod
     def fits(diagonal: CrankDiagonal) -> bool:
@@ -81,8 +80,8 @@ class CrankRRRDyad(RRRDyad):
     def close(self, known: State) -> RRRPose:
         """Append the directions of both links."""
         (
-            i, j, offset, twice_a, difference, root, least, greatest,
-            fold, fold_size, stretch, stretch_size, both, apart, b_longer, twice_sign, half_sign,
+            i, j, offset, twice_a, apart, apart_square, root,
+            fold, fold_size, stretch, stretch_size, more, less, sign,
         ) = self._closing  # fmt: skip
         x = known[0]
         base = x[j]
@@ -95,80 +94,60 @@ class CrankRRRDyad(RRRDyad):
                 half_cosine * cosine - half_sine * sine,
             )
         near, far = root * half_sine, root * half_cosine
-        s = hypot(difference, near)
-        if not s:
-            return super().close(known)
-        nearer, farther = near * near / (s + least), far * far / (s + greatest)
-        fold_total, stretch_total = fold + nearer, stretch + farther
+        near_square, far_square = near * near, far * far
+        square = apart_square + near_square
+        folding, stretching = fold + near_square, stretch + far_square
         if (
-            fold_total <= ROUNDING * (fold_size + nearer)
-            or stretch_total <= ROUNDING * (stretch_size + farther)
-        ):  # fmt: skip
+            folding <= ROUNDING * (fold_size + near_square)
+            or stretching <= ROUNDING * (stretch_size + far_square)
+            or square < SMALLEST
+        ):
             return super().close(known)
-        root_fold, root_stretch = sqrt(fold_total), sqrt(stretch_total)
-        root_perimeter, root_wide = sqrt(both + s), sqrt(s + apart)
-        if b_longer:
-            beta_y, beta_x = root_fold * root_stretch, root_perimeter * root_wide
-            gamma_y, gamma_x = root_perimeter * root_fold, root_wide * root_stretch
-        else:
-            beta_y, beta_x = root_wide * root_stretch, root_perimeter * root_fold
-            gamma_y, gamma_x = root_perimeter * root_wide, root_fold * root_stretch
-        cross = half_sign * beta_y * beta_x
-        if -1e-300 < cross < 1e-300:
+        fold_root, stretch_root = sqrt(folding), sqrt(stretching)
+        cross = sign * fold_root * stretch_root
+        if -SMALLEST < cross < SMALLEST:
             return super().close(known)
         direction = base + atan2(
-            -twice_a * half_sine * half_cosine, difference + twice_a * half_sine * half_sine
+            -twice_a * half_sine * half_cosine, apart + twice_a * half_sine * half_sine
         )
-        first = direction + twice_sign * atan2(beta_y, beta_x)
-        second = direction + twice_sign * atan2(gamma_y, gamma_x)
+        more, less = more + near_square, less - near_square
+        first = direction + atan2(cross, more)
+        second = direction + atan2(cross, less)
         x += (first, second)
         diagonal = new(
-            Diagonal, (s, direction, root_fold, root_stretch, 0.0, half_sine, half_cosine)
+            Diagonal,
+            (square, direction, fold_root, stretch_root, 0.0, near, far, near_square),
         )
-        halves = (beta_y, beta_x, gamma_y, gamma_x)
-        return new(RRRPose, (_CLOSED, 0.0, first, second, cross, diagonal, halves))
+        return new(RRRPose, (_CLOSED, 0.0, first, second, cross, diagonal, more, less))
 
     def rates(self, pose: RRRPose, _known: State, speeds: State) -> RRRRates:
         """Append the rates of both links."""
-        i, j, a, twice_d, twice_ad, difference, b, c, short = self._moving
-        _, _, _, _, cross, diagonal, (beta_y, beta_x, gamma_y, gamma_x) = pose
-        s, _, _, _, _, half_sine, half_cosine = diagonal
-        part = half_sine / s
-        p = a * (difference / s / s - twice_d * part * part)
-        q = twice_ad * part * (half_cosine / s)
-        if s < short:
-            square, rest = s * (s / cross), (b - c) * ((b + c) / cross)
-            cot_beta, cot_gamma = 0.5 * (rest + square), 0.5 * (rest - square)
-        else:
-            area = 4.0 * cross
-            cot_beta = (beta_x * beta_x - beta_y * beta_y) / area
-            cot_gamma = (gamma_x * gamma_x - gamma_y * gamma_y) / area
+        i, j, along = self._moving
+        _, _, _, _, cross, (square, _, _, _, _, near, far, _), more, less = pose
+        p, q = (along - 0.5 * near * near) / square, 0.5 * near * far / square
+        cot_beta, cot_gamma = more / cross, less / cross
         v = speeds[0]
         base = v[j]
         swing = v[i] - base
         v += (base + swing * (q * cot_gamma - p), base + swing * (q * cot_beta - p))
-        growth = new(Growth, (complex(q, -p), swing, base))
-        return new(RRRRates, (growth, cot_beta, cot_gamma))
+        return new(RRRRates, (new(Growth, (complex(q, -p), swing, base)), cot_beta, cot_gamma))
 
     def accelerations(
         self, pose: RRRPose, rates: RRRRates, _known: State, _speeds: State, changes: State
     ) -> None:
         """Append the accelerations of both links."""
-        i, j, root, lower, upper, fold_bracket, stretch_bracket, difference, whole = self._pulling
-        s, _, fold, stretch, _, half_sine, half_cosine = pose[5]
+        i, j, fold_bracket, stretch_bracket, lengths, difference = self._pulling
+        _, _, _, _, cross, (square, _, fold, stretch, _, near, far, _), _, _ = pose
         (unit, swing, _), cot_beta, cot_gamma = rates
         q, turned = unit.real, unit.imag
-        near, far = root * (half_sine / s), root * (half_cosine / s)
-        bend = fold_bracket * (far / fold) * (far / fold) / (s + lower)
-        bend -= stretch_bracket * (near / stretch) * (near / stretch) / (s + upper)
-        bend = 0.25 * bend - q * q
+        bend = fold_bracket * (far / fold) * (far / fold)
+        bend -= stretch_bracket * (near / stretch) * (near / stretch)
+        bend = 0.25 * bend / square
+        swirl = q * (lengths / square) - 2.0 * q * (q * (difference / cross))
         a = changes[0]
         base = a[j]
-        pull, square = a[i] - base, swing * swing
-        swirl = q * (difference / s) * (whole / s)
-        first = swirl + cot_gamma * bend - q * (q * cot_beta)
-        second = swirl + cot_beta * bend - q * (q * cot_gamma)
+        pull, whirl = a[i] - base, swing * swing
         a += (
-            base + pull * (turned + q * cot_gamma) + square * first,
-            base + pull * (turned + q * cot_beta) + square * second,
+            base + pull * (turned + q * cot_gamma) + whirl * (swirl + cot_gamma * bend),
+            base + pull * (turned + q * cot_beta) + whirl * (swirl + cot_beta * bend),
         )

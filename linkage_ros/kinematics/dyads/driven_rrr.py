@@ -156,7 +156,7 @@ class DrivenRRRDyad:
         one, other = (side.at(x) for side in self._sides)
         b, c = abs(one), abs(other)
         diagonal = free_diagonal(end - start, abs(start) + abs(end), abs(b - c), b + c)
-        pose = close_triangle(diagonal, b, c, abs(b - c), self._sign)
+        pose = close_triangle(diagonal, *2 * ((b - c) * (b + c),), self._sign)
         x.append(pose.first - phase(one))
         x.append(pose.second - phase(other))
         return DrivenRRRPose(pose.status, pose.gap, pose, (one, other))
@@ -169,9 +169,9 @@ class DrivenRRRDyad:
         one, other = (side.changes(x, v)[0] for side in self._sides)
         units = self._units(pose)
         between = velocities[end] + other * units[1] - velocities[start] - one * units[0]
-        b, c = map(abs, pose.sides)
         growth = Growth(between / (pins[end] - pins[start]), 1.0, 0.0)
-        return DrivenRRRRates(triangle_rates(pose.triangle, b, c, growth, speeds), (one, other))
+        rates = triangle_rates(pose.triangle, growth, speeds)
+        return DrivenRRRRates(rates, (one, other))
 
     def accelerations(
         self,
@@ -196,7 +196,9 @@ class DrivenRRRDyad:
         )
         between = pulls[end] + other - pulls[start] - one
         square = between / (pins[end] - pins[start]) - unit * unit
-        triangle_accelerations(rates.triangle, GrowthChange(square, 0.0, 0.0, None), changes)
+        b, c = map(abs, pose.sides)
+        change = GrowthChange(square, 0.0, 0.0, None)
+        triangle_accelerations(pose.triangle, (b - c) * (b + c), rates.triangle, change, changes)
 
     def transmission_angle(self, pose: DrivenRRRPose) -> float:
         """Return the angle between the two sides at B, folded into [0, π/2], in [rad]."""

@@ -19,7 +19,7 @@ RPR: a rail pinned at A along which a block slides that is pinned at D; the inve
 The rail's direction is û, n̂ is û turned left by 90°, and the line along which D travels passes A
 at the offset h: AD = r·û + h·n̂. With s = |AD|::
 
-    r = σ·√((s − |h|)·(s + |h|))        ψ = dir(û) = dir(AD) − atan2(h, r)
+    r = σ·√(s² − h²)        ψ = dir(û) = dir(AD) − atan2(h, r)
 
 σ = +1 where D lies ahead of A along û, −1 where it lies behind. For a straight rail h = 0 and r =
 ±s. Where |d − a| = |h| (a straight rod: the crank as long as the distance to the swivel), r passes
@@ -36,7 +36,7 @@ s²/r²::
 
 from __future__ import annotations
 
-from math import atan2, inf, sqrt
+from math import atan2, inf
 from typing import NamedTuple
 
 from linkage_ros.kinematics.diagonal import (
@@ -106,12 +106,12 @@ class RPRDyad:
         """Append the direction of the rail, and the slide."""
         offset, sign = self._constants
         diagonal = self.diagonal.at(known)
-        s, direction, root_fold, _, gap, _, _ = diagonal
+        square, direction, fold, _, gap, *_ = diagonal
         if gap:
             return RPRPose(Status.OPEN, gap, 0.0, 0.0, diagonal)
-        if not s:
+        if not square:
             return RPRPose(Status.INDETERMINATE, 0.0, 0.0, 0.0, diagonal)
-        slide = sign * root_fold * sqrt(s + abs(offset))
+        slide = sign * fold
         rail = direction - atan2(offset, slide)
         known[0].append(rail)
         known[0].append(slide)
