@@ -19,16 +19,18 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test bench lint format clean
+.PHONY: help demo test bench accuracy gallery lint format clean
 
 help:
-	@echo 'make demo    run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
-	@echo 'make test    lint, then all tests'
-	@echo 'make bench   measure'
-	@echo 'make lint    ruff and mypy'
-	@echo 'make format  let ruff put right what it can'
-	@echo 'make clean   remove what make and colcon have built; recorded runs stay'
-	@echo 'PYTHON=...   the Python to build .venv with, 3.10 or newer (now: $(PYTHON))'
+	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
+	@echo 'make test      lint, then all tests'
+	@echo 'make bench     measure'
+	@echo 'make accuracy  prove the kinematics on 11 million cases (30 min)'
+	@echo 'make gallery   draw the linkages that come with the package'
+	@echo 'make lint      ruff and mypy'
+	@echo 'make format    let ruff put right what it can'
+	@echo 'make clean     remove what make and colcon have built; recorded runs stay'
+	@echo 'PYTHON=...     the Python to build .venv with, 3.10 or newer (now: $(PYTHON))'
 
 $(STAMP): setup.py
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || { \
@@ -56,6 +58,12 @@ test: $(STAMP)
 
 bench: $(STAMP)
 	@$(BIN)/python -m bench
+
+accuracy: $(STAMP)
+	@$(BIN)/python -m campaigns.accuracy
+
+gallery: $(STAMP)
+	@$(BIN)/python docs/make_gallery.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check

@@ -54,7 +54,9 @@ def shared(folder):
 ROS = ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces']
 REPORT = ['matplotlib', 'rich']
 # The name `test` matters: colcon runs pytest only when it finds it in this extra.
-TEST = ['pytest', 'pytest-timeout', 'hypothesis', 'mpmath', 'rosbags']
+TEST = ['pytest', 'pytest-timeout', 'hypothesis', 'mpmath', 'python-flint>=0.6', 'rosbags']
+# What the speed of the kinematics is measured against.
+BENCH = ['pylinkage[numba]>=1.3,<1.4']
 STYLE = [
     'mypy',
     'ruff',
@@ -105,7 +107,7 @@ setup(
         'ros': ROS,
         'report': REPORT,
         'test': TEST,
-        'dev': [*ROS, *REPORT, *TEST, *STYLE, *COLCON],
+        'dev': [*ROS, *REPORT, *TEST, *BENCH, *STYLE, *COLCON],
     },
     zip_safe=True,
     entry_points={

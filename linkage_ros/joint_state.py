@@ -14,7 +14,7 @@
 
 
 """
-JointState messages as bytes (CDR): one joint read out of them, and a whole message written.
+JointState messages as bytes (CDR): some joints read out of them, and a whole message written.
 
 A message taken as bytes and read here costs a tenth of one that is built as an object; and the
 same bytes go to the recorder. Encoding: CDR version 1 (encapsulation 00 00 or 00 01), of
@@ -23,12 +23,14 @@ same bytes go to the recorder. Encoding: CDR version 1 (encapsulation 00 00 or 0
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
+from operator import itemgetter
 from struct import error as StructError
 from struct import Struct
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from linkage_ros.cdr import aligned, ENCAPSULATION, head_of_joints
 from linkage_ros.tuples import new
 
 NANOSECONDS = 1_000_000_000
@@ -43,8 +45,8 @@ class Rejection(Enum):
     MISSING = 'crank joint missing'
     TWICE = 'crank joint named twice'
     NO_RATE = 'no velocities'
-    NOT_FINITE = 'angle or rate not finite'
-    TOO_LARGE = 'angle or rate beyond 1e10 rad, rad/s'
+    NOT_FINITE = 'position or rate not finite'
+    TOO_LARGE = 'position or rate beyond 1e10'
     STAMP_ZERO = 'stamp zero'
     STAMP_INVALID = 'stamp negative or with 1e9 ns or more'
     STAMP_FUTURE = 'stamp in the future'
@@ -53,92 +55,102 @@ class Rejection(Enum):
 
 class CrankSample(NamedTuple):
     """
-    The crank as a message tells it.
+    The crank as a message tells it: all inputs, in the order of the linkage.
 
     Attributes
     ----------
     stamp
         Time of the measurement, in [ns].
-    angle
-        Angle of the input joint, in [rad].
-    rate
-        Its rate, in [rad/s]; None where the message has no velocities.
+    angles
+        Angle of each input joint, in [rad]; of one that slides its position, in [m].
+    rates
+        Their rates, in [rad/s] or [m/s]; None where the message has no velocities.
 
     """
 
     stamp: int
-    angle: float
-    rate: float | None
+    angles: tuple[float, ...]
+    rates: tuple[float, ...] | None
+
+
+_Pick = Callable[[tuple[Any, ...]], tuple[Any, ...]]
 
 
 class _Layout(NamedTuple):
     """Where things stand in a message; two messages of one publisher have the same layout."""
 
+    size: int
     fields: Struct
+    """Encapsulation, stamp, all up to the first position, positions, count, rates, count."""
+    pick_fixed: _Pick
     fixed: tuple[bytes, bytes, int, int]
     """Encapsulation, all from the frame_id up to the first position, and two counts."""
-    size: int
+    pick_positions: _Pick
+    pick_rates: _Pick | None
 
 
 class JointStateReader:
     """
-    Reads one joint out of serialized messages.
+    Reads some joints out of serialized messages.
 
     Parameters
     ----------
-    joint
-        Name of the joint.
+    joints
+        Names of the joints, one or more. In a message they may stand in any order, among others.
 
     """
 
-    __slots__ = ('_joint', '_layout')
+    __slots__ = ('_joints', '_layout')
 
-    def __init__(self, joint: str) -> None:
-        self._joint = joint.encode()
+    def __init__(self, joints: Sequence[str]) -> None:
+        self._joints = tuple(joint.encode() for joint in joints)
         self._layout: _Layout | None = None
 
     def read(self, data: bytes) -> CrankSample | Rejection:
-        """Return the joint's sample, or why there is none."""
+        """Return the sample of the joints, in the order of their names, or why there is none."""
         layout = self._layout
-        if layout is not None and len(data) >= layout.size:
-            kind, seconds, nanoseconds, head, angle, rates, *rate, efforts = (
-                layout.fields.unpack_from(data)
-            )
-            if (kind, head, rates, efforts) == layout.fixed:
-                if seconds < 0 or nanoseconds >= NANOSECONDS:
-                    return Rejection.STAMP_INVALID
-                stamp = seconds * NANOSECONDS + nanoseconds
-                return new(CrankSample, (stamp, angle, rate[0] if rate else None))
-        found = _find(data, self._joint)
+        if layout is not None:
+            size, fields, pick_fixed, fixed, pick_positions, pick_rates = layout
+            if len(data) >= size:
+                values = fields.unpack_from(data)
+                if pick_fixed(values) == fixed:
+                    seconds = values[1]
+                    nanoseconds = values[2]
+                    if seconds < 0 or nanoseconds >= NANOSECONDS:
+                        return Rejection.STAMP_INVALID
+                    rates = pick_rates(values) if pick_rates else None
+                    stamp = seconds * NANOSECONDS + nanoseconds
+                    return new(CrankSample, (stamp, pick_positions(values), rates))
+        found = _find(data, self._joints)
         if isinstance(found, Rejection):
             return found
         self._layout = found
         return self.read(data)
 
 
-def _find(data: bytes, joint: bytes) -> _Layout | Rejection:
+def _find(data: bytes, joints: Sequence[bytes]) -> _Layout | Rejection:
     order = {b'\x00\x00': '>', b'\x00\x01': '<'}.get(data[:2])
     if order is None:
         return Rejection.MALFORMED
     count = Struct(f'{order}I')
     try:
         at = 12 + 4 + count.unpack_from(data, 12)[0]
-        at = _aligned(at, 4)
+        at = aligned(at, 4)
         n_names = count.unpack_from(data, at)[0]
         at += 4
         names = []
         # A name takes five bytes or more: no count makes this loop longer than the message.
         for _ in range(min(n_names, len(data))):
-            at = _aligned(at, 4)
+            at = aligned(at, 4)
             length = count.unpack_from(data, at)[0]
             name_start, at = at + 4, at + 4 + length
             name_end = at - 1
             names.append(data[name_start:name_end])
         arrays = []
         for _ in range(3):
-            at = _aligned(at, 4)
+            at = aligned(at, 4)
             n = count.unpack_from(data, at)[0]
-            first = _aligned(at + 4, 8) if n else at + 4
+            first = aligned(at + 4, 8) if n else at + 4
             arrays.append((at, n, first))
             at = first + 8 * n
     except StructError:
@@ -150,20 +162,36 @@ def _find(data: bytes, joint: bytes) -> _Layout | Rejection:
         return Rejection.EMPTY
     if n_positions != n_names or n_rates not in (0, n_names) or n_efforts not in (0, n_names):
         return Rejection.UNEQUAL
-    if names.count(joint) != 1:
-        return Rejection.TWICE if joint in names else Rejection.MISSING
-    skip = 8 * names.index(joint)
-    angle = positions + skip
-    layout = f'{order}2s2xiI{positions - 12}s{skip}xd{rate_at - angle - 8}xI'
-    after = rate_at + 4
-    if n_rates:
-        layout += f'{rates + skip - after}xd'
-        after = rates + skip + 8
+    for joint in joints:
+        if names.count(joint) != 1:
+            return Rejection.TWICE if joint in names else Rejection.MISSING
+
+    # Fields stand in the order of the message, and are picked in that of the joints.
+    places = sorted(map(names.index, joints))
+    fields = f'{order}2s2xiI{positions - 12}s'
+    after = positions
+    for first, n, following in ((positions, n_positions, rate_at), (rates, n_rates, effort_at)):
+        for place in places if n else ():
+            fields += f'{first + 8 * place - after}xd'
+            after = first + 8 * place + 8
+        fields += f'{following - after}xI'
+        after = following + 4
+    ranks = [places.index(names.index(joint)) for joint in joints]
+    rate_count = 4 + len(joints)
     return _Layout(
-        Struct(f'{layout}{effort_at - after}xI'),
-        (data[:2], data[12:positions], n_rates, n_efforts),
-        at,
+        size=at,
+        fields=Struct(fields),
+        pick_fixed=itemgetter(0, 3, rate_count, -1),
+        fixed=(data[:2], data[12:positions], n_rates, n_efforts),
+        pick_positions=_pick(4 + rank for rank in ranks),
+        pick_rates=_pick(rate_count + 1 + rank for rank in ranks) if n_rates else None,
     )
+
+
+def _pick(places: Iterable[int]) -> _Pick:
+    """Return what takes some values out of a tuple, as a tuple, in one call of C."""
+    first, *others = places
+    return itemgetter(first, *others) if others else itemgetter(slice(first, first + 1))
 
 
 class JointStateWriter:
@@ -184,17 +212,9 @@ class JointStateWriter:
 
     def __init__(self, names: Sequence[str]) -> None:
         n = len(names)
-        head = bytearray(Struct('<II').pack(1, 0)[:5])  # an empty frame_id
-        head += bytes(_aligned(12 + len(head), 4) - 12 - len(head)) + Struct('<I').pack(n)
-        for name in names:
-            text = name.encode() + b'\0'
-            head += bytes(_aligned(len(head), 4) - len(head))
-            head += Struct('<I').pack(len(text)) + text
-        head += bytes(_aligned(len(head), 4) - len(head)) + Struct('<I').pack(n)
-        head += bytes(_aligned(12 + len(head), 8) - 12 - len(head))
         # After n doubles the offset is a multiple of 8: the next count, then four bytes of
         # padding.
-        self.names = bytes(head)
+        self.names = head = head_of_joints(names, n)
         self._join = Struct('<II').pack(n, 0)
         self._tail = Struct('<I').pack(0)
         self._middle = Struct('<II').pack(0, 0)
@@ -218,14 +238,9 @@ class JointStateWriter:
         seconds, nanoseconds = divmod(stamp, NANOSECONDS)
         if rates:
             return self._with_rates.pack(
-                b'\x00\x01\x00\x00', seconds, nanoseconds, self.names,
+                ENCAPSULATION, seconds, nanoseconds, self.names,
                 *positions, self._join, *rates, self._tail,
             )  # fmt: skip
         return self._positions_only.pack(
-            b'\x00\x01\x00\x00', seconds, nanoseconds, self.names, *positions, self._middle
+            ENCAPSULATION, seconds, nanoseconds, self.names, *positions, self._middle
         )
-
-
-def _aligned(offset: int, size: int) -> int:
-    """Return the next place for a value of ``size`` bytes; alignment counts from byte 4."""
-    return offset + (4 - offset) % size

@@ -14,7 +14,7 @@
 
 
 """
-From a scene to its tick: drive, closure, the stages that the scene calls for, and the message.
+From a scene to its tick: drive, closure, the stages that the scene calls for, and the messages.
 
 Building puts in only what the scene names; a tick asks no scene.
 """
@@ -25,7 +25,7 @@ from importlib import import_module
 from typing import NamedTuple
 
 from linkage_ros.drives.topic import TopicDrive
-from linkage_ros.effects.stage import EFFECTS, Motion, Stage
+from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS, Stage, Writer
 from linkage_ros.effects.turns import Continuous, Wrapped
 from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.kinematics.closure import Closure, Position
@@ -45,15 +45,18 @@ class Tick(NamedTuple):
         What is published; nothing where nothing is.
     message
         The JointState, serialized; empty where nothing is published.
+    trajectory
+        The JointTrajectory, serialized; empty where nothing is published, or none is called for.
 
     """
 
     position: Position | None
     motion: Motion | None
     message: bytes
+    trajectory: bytes
 
 
-_SILENT = Tick(None, None, b'')
+_SILENT = Tick(None, None, b'', b'')
 
 
 class Pipeline:
@@ -78,10 +81,11 @@ class Pipeline:
 
     def __init__(self, scene: Scene) -> None:
         self.closure = Closure(scene.linkage)
-        self._reader = JointStateReader(scene.linkage.input.joint)
-        effects = {name: import_module(EFFECTS[name]) for name in EFFECTS if name in scene.effects}
+        self._reader = JointStateReader([driven.joint for driven in scene.linkage.inputs])
+        called_for = {*scene.effects, *(n for name in scene.effects for n in NEEDS.get(name, ()))}
+        effects = {name: import_module(EFFECTS[name]) for name in EFFECTS if name in called_for}
         stages: list[Stage] = [
-            effect.build(effect.read(scene.effects.section(name)), self.closure)
+            effect.build(effect.read(scene.effects.section(name, required=False)), self.closure)
             for name, effect in effects.items()
         ]
         scene.effects.finish(tuple(EFFECTS))
@@ -90,8 +94,12 @@ class Pipeline:
         self._drive = TopicDrive(
             scene.drive, needs_rate=any(e.NEEDS_CRANK_RATE for e in effects.values())
         )
-        write = JointStateWriter(list(scene.linkage.joints)).write
-        self._path = (self._drive.state, self.closure.position, tuple(stages), write)
+        joints = list(scene.linkage.joints)
+        write = JointStateWriter(joints).write
+        write_motion: Writer | None = None
+        if 'acceleration' in effects:
+            write_motion = effects['acceleration'].writer(joints)
+        self._path = (self._drive.state, self.closure.position, tuple(stages), write, write_motion)
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """
@@ -120,19 +128,25 @@ class Pipeline:
             The time, and the stamp of the message, in [ns].
 
         """
-        state, close, stages, write = self._path
+        state, close, stages, write, write_motion = self._path
         crank = state(now)
         if crank is None:
             return _SILENT
-        position = close(crank[0])
+        position = close(*crank[0])
         joints = position[2]
         if not joints:
-            return Tick(position, None, b'')
-        motion = new(Motion, (crank, position, joints, ()))
+            return Tick(position, None, b'', b'')
+        motion = new(Motion, (crank, position, joints, (), (), None))
         for stage in stages:
             motion = stage(motion)
-        _, _, joints, rates = motion
-        return new(Tick, (position, motion, write(now, joints, rates)))
+        _, _, joints, rates, _, _ = motion
+        trajectory = b'' if write_motion is None else write_motion(now, motion)
+        return new(Tick, (position, motion, write(now, joints, rates), trajectory))
+
+    @property
+    def writes_trajectory(self) -> bool:
+        """Whether a tick that publishes has a JointTrajectory too."""
+        return self._path[-1] is not None
 
     @property
     def newest_stamp(self) -> int:

@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from cmath import exp
 from math import pi, remainder, tau
 import os
 from pathlib import Path
@@ -109,7 +110,14 @@ def test_without_velocity_the_array_is_empty():
         assert list(read(message).position) == list(read(with_rates).position)
 
 
-@pytest.mark.parametrize(('effects', 'imported'), [('{}', False), ('{velocity: {}}', True)])
+@pytest.mark.parametrize(
+    ('effects', 'imported'),
+    [
+        ('{}', set()),
+        ('{velocity: {}}', {'effects.velocity'}),
+        ('{acceleration: {}}', {'effects.velocity', 'effects.acceleration', 'joint_trajectory'}),
+    ],
+)
 def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
     (tmp_path / 'linkage.yaml').write_bytes(FOUR_BAR)
     (tmp_path / 'scene.yaml').write_text(f'linkage: linkage.yaml\neffects: {effects}')
@@ -117,7 +125,7 @@ def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
         'import sys; from linkage_ros.pipeline import Pipeline; '
         'from linkage_ros.scene.load import load_scene; '
         f'Pipeline(load_scene({str(tmp_path / "scene.yaml")!r})); '
-        'print("linkage_ros.effects.velocity" in sys.modules, "rclpy" in sys.modules)'
+        'print(*sys.modules)'
     )
     done = subprocess.run(
         [sys.executable, '-c', program],
@@ -127,15 +135,18 @@ def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
         text=True,
         check=True,
     )
-    assert done.stdout.split() == [str(imported), 'False']
+    modules = set(done.stdout.split())
+    optional = {'effects.velocity', 'effects.acceleration', 'joint_trajectory'}
+    assert {name for name in optional if f'linkage_ros.{name}' in modules} == imported
+    assert not modules & {'rclpy', 'trajectory_msgs'}
 
 
 def test_before_the_first_sample_and_after_the_last_there_is_silence():
     silent = pipeline()
-    assert silent.tick(BEGIN) == (None, None, b'')
+    assert silent.tick(BEGIN) == (None, None, b'', b'')
     silent.offer(CRANK.write(BEGIN, [0.5], [1.0]), BEGIN)
     assert silent.tick(BEGIN + 200 * MS).message
-    assert silent.tick(BEGIN + 201 * MS) == (None, None, b'')
+    assert silent.tick(BEGIN + 201 * MS) == (None, None, b'', b'')
 
 
 @pytest.mark.parametrize(
@@ -148,20 +159,123 @@ def test_before_the_first_sample_and_after_the_last_there_is_silence():
 def test_where_there_is_no_pose_nothing_is_published(linkage, angle, status, gap):
     stuck = pipeline(linkage=linkage)
     stuck.offer(CRANK.write(BEGIN, [angle], [1.0]), BEGIN)
-    position, motion, message = stuck.tick(BEGIN)
+    position, motion, message, trajectory = stuck.tick(BEGIN)
     assert position.status is status
     assert position.gap == pytest.approx(gap)
     assert motion is None
-    assert message == b''
+    assert message == trajectory == b''
 
 
 def test_at_a_toggle_positions_are_published_and_rates_are_not():
     toggle = pipeline(linkage=b'four_bar: {a: 1, b: 1, c: 1, d: 3}')
     toggle.offer(CRANK.write(BEGIN, [0.0], [1.0]), BEGIN)
-    position, _, message = toggle.tick(BEGIN)
+    position, _, message, _ = toggle.tick(BEGIN)
     assert position.status is Status.TOGGLE
     assert len(read(message).position) == 2
     assert len(read(message).velocity) == 0
+
+
+def read_motion(message):
+    return STORE.deserialize_cdr(message, 'trajectory_msgs/msg/JointTrajectory')
+
+
+def test_without_acceleration_there_is_no_trajectory():
+    for scene in (b'', b'effects: {velocity: {}}'):
+        plain = pipeline(scene)
+        plain.offer(CRANK.write(BEGIN, [0.5], [1.0]), BEGIN)
+        assert not plain.writes_trajectory
+        assert plain.tick(BEGIN).trajectory == b''
+
+
+@pytest.mark.parametrize(
+    'effects',
+    [b'{acceleration: {}}', b'{acceleration: {}, velocity: {}}'],
+    ids=['alone', 'beside velocity'],
+)
+def test_a_trajectory_says_what_the_joint_state_says_and_accelerations(effects):
+    # To name acceleration is to name velocity; turns are added to both messages.
+    both, velocity = pipeline(b'effects: ' + effects), pipeline(b'effects: {velocity: {}}')
+    assert both.writes_trajectory
+    for number in range(300):
+        now, angle = BEGIN + number * 2 * MS, 0.1 * number
+        message = CRANK.write(now, [remainder(angle, tau)], [50.0])
+        assert both.offer(message, now) is velocity.offer(message, now) is None
+        _, motion, state, trajectory = both.tick(now)
+        assert state == velocity.tick(now).message
+        written = read_motion(trajectory)
+        assert written.header == read(state).header
+        assert written.joint_names == read(state).name
+        (point,) = written.points
+        assert list(point.positions) == list(read(state).position)
+        assert list(point.velocities) == list(read(state).velocity)
+        assert tuple(point.accelerations) == motion.accelerations
+        assert len(point.accelerations) == 2
+
+
+def test_at_a_toggle_a_trajectory_has_positions_only():
+    scene, linkage = b'effects: {acceleration: {}}', b'four_bar: {a: 1, b: 1, c: 1, d: 3}'
+    toggle = pipeline(scene, linkage)
+    toggle.offer(CRANK.write(BEGIN, [0.0], [1.0]), BEGIN)
+    position, _, _, trajectory = toggle.tick(BEGIN)
+    assert position.status is Status.TOGGLE
+    (point,) = read_motion(trajectory).points
+    assert len(point.positions) == 2
+    assert len(point.velocities) == len(point.accelerations) == 0
+
+
+def test_acceleration_needs_the_cranks_rate():
+    held = pipeline(b'effects: {acceleration: {}}\ndrive: {topic: {carry_forward: false}}')
+    assert held.offer(CRANK.write(BEGIN, [1.0], []), BEGIN) is Rejection.NO_RATE
+
+
+TWO_CRANKS = b"""
+links:
+  ground: {O1: [0, 0], O2: [0.1, 0]}
+  left: {O1: [0, 0], A: [0.04, 0]}
+  right: {O2: [0, 0], C: [0.05, 0]}
+  upper: {A: [0, 0], B: [0.12, 0]}
+  lower: {C: [0, 0], B: [0.11, 0]}
+input:
+  - {joint: left_crank, parent: ground, child: left}
+  - {joint: right_crank, parent: ground, child: right}
+assembly: {B: left}
+joints:
+  upper_joint: {parent: ground, child: upper}
+  lower_joint: {parent: ground, child: lower}
+"""
+
+
+def test_two_inputs_come_out_of_one_message_in_any_order():
+    def closes(positions, left, right):
+        upper, lower = positions
+        return 0.04 * exp(1j * left) + 0.12 * exp(1j * upper) == pytest.approx(
+            0.1 + 0.05 * exp(1j * right) + 0.11 * exp(1j * lower), abs=1e-12
+        )
+
+    for names, values in (
+        (['left_crank', 'right_crank'], [0.3, 2.0]),
+        (['x', 'right_crank', 'left_crank'], [9.0, 2.0, 0.3]),
+    ):
+        writer = JointStateWriter(names)
+        five_bar = pipeline(b'effects: {acceleration: {}}', TWO_CRANKS)
+        assert five_bar.offer(CRANK.write(BEGIN, [0.3], [1.0]), BEGIN) is Rejection.MISSING
+        assert five_bar.tick(BEGIN).position is None
+        rates = [10.0 * value for value in values]
+        assert five_bar.offer(writer.write(BEGIN, values, rates), BEGIN) is None
+        _, motion, message, _ = five_bar.tick(BEGIN + 10 * MS)
+        assert motion.crank.rates == (3.0, 20.0)
+        assert motion.crank.angles == pytest.approx((0.33, 2.2))
+        assert closes(read(message).position, 0.33, 2.2)
+        # The motion is straight in both angles: differences along it are rates.
+        (before, _), (now, rates), (after, _) = (
+            (read(each).position, read(each).velocity)
+            for each in (
+                five_bar.tick(BEGIN + ten_us * MS // 100).message for ten_us in (999, 1000, 1001)
+            )
+        )
+        assert list(rates) == pytest.approx(list((after - before) / 2e-5), rel=1e-5)
+        slopes = (after - 2.0 * now + before) / 1e-10
+        assert list(motion.accelerations) == pytest.approx(list(slopes), rel=1e-5)
 
 
 def test_a_rejected_message_leaves_the_next_ticks_as_they_were():

@@ -17,8 +17,8 @@
 A run once more, from its bag: the same pipeline over the same samples in the same order.
 
 The bag holds the messages in the order in which the tick took and published them. The log time is
-that by which the tick judged a sample, the publish time of a joint state that for which it solved.
-So the pipeline, built from the scene in the bag, comes to the same states.
+that by which the tick judged a sample, the publish time of a joint state, or a motion, that for
+which it solved. So the pipeline, built from the scene in the bag, comes to the same states.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from typing import NamedTuple
 
 from linkage_ros.bag.reader import Bag
 from linkage_ros.errors import BagError
+from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
@@ -39,14 +40,16 @@ RUN_FILE = 'run.json'
 
 class ReplayedTick(NamedTuple):
     """
-    A joint state of a bag and what the same tick comes to now.
+    What a bag holds of a tick and what the same tick comes to now.
 
     Attributes
     ----------
     time
         Time of the tick, in [ns].
     recorded
-        The message in the bag.
+        Its joint state in the bag; empty where only its motion is there.
+    recorded_motion
+        Its motion in the bag; empty where there is none.
     tick
         What the pipeline makes of the bag's samples.
 
@@ -54,6 +57,7 @@ class ReplayedTick(NamedTuple):
 
     time: int
     recorded: bytes
+    recorded_motion: bytes
     tick: Tick
 
 
@@ -70,28 +74,56 @@ def recorded_scene(bag: Bag) -> Scene:
 
     """
     run = _run(bag)
-    return parse_scene(str(run['scene']), str(bag.path), bag.attachments)
+    return parse_scene(run.scene, str(bag.path), bag.attachments)
 
 
 def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
-    """Run a scene over a bag's samples; yield a tick for every recorded joint state."""
+    """Run a scene over a bag's samples; yield every tick of which the bag holds a message."""
     run = _run(bag)
+    # Where crank and joint states share a topic, as in the tick: by their joints.
+    shared = run.crank_topic == run.joint_states_topic
+    own = JointStateWriter(list(scene.linkage.joints)).names if shared else b''
     pipeline = Pipeline(scene)
     last = 0
-    for message in bag.messages():
-        if message.log_time < last and message.topic != '/diagnostics':
-            pipeline = Pipeline(scene)
-        if message.topic == run['joint_states_topic']:
-            tick = pipeline.tick(message.publish_time)
-            yield ReplayedTick(message.publish_time, message.data, tick)
-        elif message.topic == run['crank_topic']:
-            pipeline.offer(message.data, message.log_time)
-        else:
+    ticked: ReplayedTick | None = None  # its motion may follow
+    for topic, log_time, publish_time, data in bag.messages():
+        if topic not in run.topics:
             continue
-        last = message.log_time
+        if topic == run.motion_topic and ticked is not None and ticked.time == publish_time:
+            yield ticked._replace(recorded_motion=data)
+            ticked = None
+            continue
+        if ticked is not None:
+            yield ticked
+            ticked = None
+        if log_time < last:
+            pipeline = Pipeline(scene)
+        last = log_time
+        if topic == run.motion_topic:  # the recorder had to drop its joint state
+            yield ReplayedTick(publish_time, b'', data, pipeline.tick(publish_time))
+        elif topic == run.joint_states_topic and data.startswith(own, 12):
+            ticked = ReplayedTick(publish_time, data, b'', pipeline.tick(publish_time))
+        else:
+            pipeline.offer(data, log_time)
+    if ticked is not None:
+        yield ticked
 
 
-def _run(bag: Bag) -> dict[str, str]:
+class _Run(NamedTuple):
+    """What a run's account of itself says."""
+
+    scene: str
+    crank_topic: str
+    joint_states_topic: str
+    motion_topic: str
+    """Empty where none was published, and in bags older than it."""
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        return self[1:]
+
+
+def _run(bag: Bag) -> _Run:
     missing = {RUN_FILE, SCENE_FILE, LINKAGE_FILE} - set(bag.attachments)
     if missing:
         raise BagError(
@@ -101,6 +133,11 @@ def _run(bag: Bag) -> dict[str, str]:
         )
     try:
         run = json.loads(bag.attachments[RUN_FILE])
-        return {key: str(run[key]) for key in ('scene', 'crank_topic', 'joint_states_topic')}
-    except (ValueError, KeyError, TypeError):
+        return _Run(
+            scene=str(run['scene']),
+            crank_topic=str(run['crank_topic']),
+            joint_states_topic=str(run['joint_states_topic']),
+            motion_topic=str(run.get('motion_topic', '')),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag') from None

@@ -69,41 +69,40 @@ class Display:
         ticks = node.loop.counts.ticks
         rate = (ticks - self._before[0]) / (now - self._before[1])
         self._before = (ticks, now)
-        joints = list(node.scene.linkage.joints)
+        linkage = node.scene.linkage
+        names = [*(driven.joint for driven in linkage.inputs), *linkage.joints]
         if self._live is None:
-            print(_line(node.loop, joints, rate), flush=True)
+            print(_line(node.loop, names, rate), flush=True)
             return
         if not self._entered:
             self._live.start()
             self._entered = True
-        crank = node.scene.linkage.input.joint
-        self._live.update(_table(node.loop, crank, joints, rate), refresh=True)
+        self._live.update(_table(node.loop, names, rate), refresh=True)
 
 
 def _state(loop: TickLoop) -> tuple[str, list[tuple[float, float | None]]]:
-    """Return the input's age as text, and angle and rate of crank and joints."""
+    """Return the input's age as text, and value and rate of inputs and joints."""
     tick = loop.counts.last
     if tick is None or tick.position is None:
         return 'no crank', []
     if tick.motion is None:
         return f'{tick.position.status.value}, gap {tick.position.gap:.3g} m', []
-    crank, _, joints, rates = tick.motion
-    values: list[tuple[float, float | None]] = [(crank.angle, crank.rate)]
+    crank, _, joints, rates, _, _ = tick.motion
+    values: list[tuple[float, float | None]] = list(zip(crank.angles, crank.rates, strict=True))
     values += zip(joints, rates or [None] * len(joints), strict=True)
     return f'{crank.age * 1e-6:.2f} ms', values
 
 
-def _line(loop: TickLoop, joints: list[str], rate: float) -> str:
+def _line(loop: TickLoop, names: list[str], rate: float) -> str:
     age, values = _state(loop)
     counts = loop.counts
     shown = '  '.join(
-        f'{name} {value:+.4f}'
-        for name, (value, _) in zip(['crank', *joints], values, strict=False)
+        f'{name} {value:+.4f}' for name, (value, _) in zip(names, values, strict=False)
     )
     return f'{rate:7.1f} ticks/s  lost {counts.lost}  late {counts.late}  age {age}  {shown}'
 
 
-def _table(loop: TickLoop, crank: str, joints: list[str], rate: float) -> Any:
+def _table(loop: TickLoop, names: list[str], rate: float) -> Any:
     age, values = _state(loop)
     counts = loop.counts
     status = Text(
@@ -116,6 +115,6 @@ def _table(loop: TickLoop, crank: str, joints: list[str], rate: float) -> Any:
     table.add_column('joint')
     table.add_column('position [rad, m]', justify='right', min_width=18)
     table.add_column('rate [1/s]', justify='right', min_width=14)
-    for name, (value, speed) in zip([crank, *joints], values, strict=False):
+    for name, (value, speed) in zip(names, values, strict=False):
         table.add_row(name, f'{value:+.6f}', '' if speed is None else f'{speed:+.5f}')
     return Group(status, table)

@@ -29,6 +29,9 @@ COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
     'demo': 'run the demo scene with a crank of its own, on a ROS graph of its own',
     'plot': 'draw the joints of a bag over the angle of its crank',
+    'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
+    'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
+    'draw': 'draw a linkage, and its joints over its range',
 }
 """Name of each subcommand, also that of its module in this folder, and what it does."""
 

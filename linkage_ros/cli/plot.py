@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Draw the joints of a bag, and their rates, over the angle of its crank."""
+"""Draw the joints of a bag, and their rates, over its crank, the first where there are several."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from linkage_ros.bag.replay import recorded_scene, replay
 from linkage_ros.effects.turns import wrapped
 from linkage_ros.errors import BagError, LinkageError
 from linkage_ros.joint_state import JointStateReader, Rejection
-from linkage_ros.kinematics.linkage import RevoluteJoint
+from linkage_ros.kinematics.linkage import Input, RevoluteJoint
 
 _COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
 """Okabe and Ito's, which colour-blind readers can tell."""
@@ -55,6 +55,8 @@ def draw(bag_path: Path, picture: Path) -> None:
     """
     Draw a bag: each published joint, and its rate where there is one, over one turn of the crank.
 
+    A crank that slides is drawn over as far as it went.
+
     Raises
     ------
     LinkageError
@@ -69,29 +71,31 @@ def draw(bag_path: Path, picture: Path) -> None:
     scene = recorded_scene(bag)
     positions: Curves = {name: ([], []) for name in scene.linkage.joints}
     rates: Curves = {name: ([], []) for name in scene.linkage.joints}
-    readers = {name: JointStateReader(name) for name in scene.linkage.joints}
+    turns = {name: isinstance(j, RevoluteJoint) for name, j in scene.linkage.joints.items()}
+    driven = scene.linkage.inputs[0]
+    reader = JointStateReader(list(scene.linkage.joints))
     states = 0
-    for _, recorded, tick in replay(bag, scene):
-        if tick.motion is None:
+    for _, recorded, _, tick in replay(bag, scene):
+        if tick.motion is None or not recorded:
             continue
         states += 1
-        crank = tick.motion.crank.angle % tau
-        for name, reader in readers.items():
-            sample = reader.read(recorded)
-            if isinstance(sample, Rejection):
-                raise BagError(bag_path, f'{name}: {sample.value}', 'name another bag')
-            turning = isinstance(scene.linkage.joints[name], RevoluteJoint)
-            _add(
-                positions[name], crank, wrapped(sample.angle) if turning else sample.angle, turning
-            )
-            if sample.rate is not None:
-                _add(rates[name], crank, sample.rate, False)
+        sample = reader.read(recorded)
+        if isinstance(sample, Rejection):
+            raise BagError(bag_path, f'a joint state: {sample.value}', 'name another bag')
+        crank = tick.motion.crank.angles[0]
+        if not driven.slider:
+            crank %= tau
+        for (name, turning), value in zip(turns.items(), sample.angles, strict=True):
+            _add(positions[name], crank, wrapped(value) if turning else value, turning)
+        for name, rate in zip(turns, sample.rates or (), strict=False):
+            _add(rates[name], crank, rate, False)
     if not states:
         raise BagError(bag_path, 'holds no joint states', 'record a run with a crank')
-    title = f'{scene.name}: dependent joints over one turn of {scene.linkage.input.joint}'
-    turns = [isinstance(joint, RevoluteJoint) for joint in scene.linkage.joints.values()]
-    units = [unit for unit, used in (('rad', any(turns)), ('m', not all(turns))) if used]
-    _figure(f'{title} ({states} joint states)', units, positions, rates, picture)
+    over = driven.joint if driven.slider else f'one turn of {driven.joint}'
+    title = f'{scene.name}: dependent joints over {over} ({states} joint states)'
+    used = (('rad', any(turns.values())), ('m', not all(turns.values())))
+    units = [unit for unit, is_used in used if is_used]
+    _figure(title, driven, units, positions, rates, picture)
 
 
 def _add(curve: tuple[list[float], list[float]], x: float, y: float, turning: bool) -> None:
@@ -104,7 +108,9 @@ def _add(curve: tuple[list[float], list[float]], x: float, y: float, turning: bo
     ys.append(y)
 
 
-def _figure(title: str, units: list[str], positions: Curves, rates: Curves, picture: Path) -> None:
+def _figure(
+    title: str, driven: Input, units: list[str], positions: Curves, rates: Curves, picture: Path
+) -> None:
     import matplotlib as mpl  # local import: an extra, and slow to load
 
     mpl.use('Agg')
@@ -119,7 +125,13 @@ def _figure(title: str, units: list[str], positions: Curves, rates: Curves, pict
     )
     for (label, curves), axis in zip(panels, axes[:, 0], strict=True):
         _panel(axis, label, curves)
-    axes[-1, 0].set_xlabel('crank angle [rad]')
+    if driven.slider:
+        axes[-1, 0].set_xlabel(f'{driven.joint} [m]')
+    else:
+        axes[-1, 0].set_xlabel('crank angle [rad]')
+        axes[-1, 0].set_xlim(0.0, tau)
+        ticks = [0.0, pi / 2, pi, 3 * pi / 2, tau]
+        axes[-1, 0].set_xticks(ticks, ['0', 'π/2', 'π', '3π/2', '2π'])
     figure.suptitle(title, fontsize=11)
     figure.tight_layout()
     try:
@@ -140,7 +152,5 @@ def _panel(axis: Any, label: str, curves: Curves) -> None:
             linewidth=1.6,
         )
     axis.set_ylabel(label)
-    axis.set_xlim(0.0, tau)
-    axis.set_xticks([0.0, pi / 2, pi, 3 * pi / 2, tau], ['0', 'π/2', 'π', '3π/2', '2π'])
     axis.grid(alpha=0.3)
     axis.legend(loc='best', frameon=False)

@@ -69,14 +69,24 @@ def _proof(folder: Path) -> str:
         bag = read_bag(folder)
         scene = recorded_scene(bag)
         closure = Closure(scene.linkage)
-        states = same = 0
+        found = {'joint states': [0, 0], 'motions': [0, 0]}
         worst = 0.0
-        for _, recorded, tick in replay(bag, scene):
-            states += 1
-            same += tick.message == recorded
+        for _, recorded, recorded_motion, tick in replay(bag, scene):
+            for counts, before, now in zip(
+                found.values(),
+                (recorded, recorded_motion),
+                (tick.message, tick.trajectory),
+                strict=True,
+            ):
+                counts[0] += bool(before) and before == now
+                counts[1] += bool(before)
             if tick.motion is not None:
                 worst = max(worst, closure.residual(tick.motion.position))
     except LinkageError as error:
         return str(error)
-    proof = f'{same} of {states} joint states replay to the same bytes'
-    return f'{proof}; worst loop residual {worst:.1e} m'
+    proof = ' and '.join(
+        f'{same} of {of} {what}'
+        for what, (same, of) in found.items()
+        if of or what == 'joint states'
+    )
+    return f'{proof} replay to the same bytes; worst loop residual {worst:.1e} m'

@@ -25,7 +25,7 @@ from linkage_ros.joint_state import CrankSample, Rejection
 from linkage_ros.tuples import new
 
 LARGEST = 1e10
-"""Angles beyond this, in [rad], are 2e-6 rad apart as doubles: none of a machine. So for rates."""
+"""Angles beyond this, in [rad], are 2e-6 rad apart as doubles: none of a machine. Rates alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,23 +55,32 @@ class CrankState(NamedTuple):
 
     Attributes
     ----------
-    angle
-        In [rad].
-    rate
-        In [rad/s].
+    angles
+        Of each input, in the order of the linkage, in [rad]; of one that slides in [m].
+    rates
+        In [rad/s] or [m/s].
+    accelerations
+        In [rad/s²] or [m/s²]; 0 where they are unknown.
     age
         Time of the tick less that of the sample, in [ns].
 
     """
 
-    angle: float
-    rate: float
+    angles: tuple[float, ...]
+    rates: tuple[float, ...]
+    accelerations: tuple[float, ...]
     age: int
+
+
+_Values = tuple[float, ...]
 
 
 class TopicDrive:
     """
     The newest good sample, and nothing else.
+
+    A JointState has no accelerations: those of the state are 0, which is what carrying forward by
+    the rate takes them for.
 
     Parameters
     ----------
@@ -90,7 +99,7 @@ class TopicDrive:
         self._max_age = use.max_age
         self._max_lead = use.max_lead
         self._needs_rate = needs_rate or use.carry_forward
-        self._sample: tuple[int, float, float] | None = None
+        self._sample: tuple[int, _Values, _Values, _Values] | None = None
 
     @property
     def stamp(self) -> int:
@@ -109,32 +118,38 @@ class TopicDrive:
             The time, in [ns].
 
         """
-        stamp, angle, rate = sample
-        if rate is None:
+        stamp, angles, rates = sample
+        zeros = (0.0,) * len(angles)
+        if rates is None:
             if self._needs_rate:
                 return Rejection.NO_RATE
-            rate = 0.0
-        if not (isfinite(angle) and isfinite(rate)):
-            return Rejection.NOT_FINITE
-        if abs(angle) > LARGEST or abs(rate) > LARGEST:
-            return Rejection.TOO_LARGE
+            rates = zeros
+        for value in angles + rates:
+            if not -LARGEST <= value <= LARGEST:
+                finite = all(map(isfinite, angles + rates))
+                return Rejection.TOO_LARGE if finite else Rejection.NOT_FINITE
         if stamp == 0:
             return Rejection.STAMP_ZERO
         if stamp > now + self._max_lead:
             return Rejection.STAMP_FUTURE
         if self._sample is not None and stamp < self._sample[0]:
             return Rejection.STAMP_OLD
-        self._sample = (stamp, angle, rate)
+        self._sample = (stamp, angles, rates, zeros)
         return None
 
     def state(self, now: int) -> CrankState | None:
         """Return the crank at a time, in [ns]; nothing where the newest sample is too old."""
         if self._sample is None:
             return None
-        stamp, angle, rate = self._sample
+        stamp, angles, rates, zeros = self._sample
         age = now - stamp
         if age > self._max_age:
             return None
         if self._carry_forward:
-            angle += rate * (age * 1e-9)
-        return new(CrankState, (angle, rate, age))
+            seconds = age * 1e-9
+            if len(angles) == 1:  # a loop over one takes five times as long, in every tick
+                angles = (angles[0] + rates[0] * seconds,)
+            else:
+                pairs = zip(angles, rates, strict=True)
+                angles = tuple([angle + rate * seconds for angle, rate in pairs])
+        return new(CrankState, (angles, rates, zeros, age))

@@ -24,6 +24,11 @@ Each is a module, imported only where a scene names the effect, with
     Read its parameters, strictly; a frozen type.
 ``build(parameters, closure: Closure) -> Stage``
     Build the stage of the tick.
+
+An effect that publishes a message of its own has also
+
+``writer(joints: Sequence[str]) -> Writer``
+    Build what writes the message, from the motion as it is published.
 """
 
 from __future__ import annotations
@@ -32,12 +37,16 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from linkage_ros.drives.topic import CrankState
-from linkage_ros.kinematics.closure import Position
+from linkage_ros.kinematics.closure import Position, Velocity
 
 EFFECTS = {
     'velocity': 'linkage_ros.effects.velocity',
+    'acceleration': 'linkage_ros.effects.acceleration',
 }
 """Name of each effect, and the module that holds it."""
+
+NEEDS = {'acceleration': ('velocity',)}
+"""What an effect starts from: to name it is to name these too."""
 
 
 class Motion(NamedTuple):
@@ -54,6 +63,10 @@ class Motion(NamedTuple):
         Values of the published joints, in [rad] or [m].
     rates
         Their rates, in [rad/s] or [m/s]; empty where no one asked, or at a toggle.
+    accelerations
+        Their accelerations, in [rad/s²] or [m/s²]; empty as the rates are.
+    velocity
+        The loop's, from which its acceleration starts; nothing where there are no rates.
 
     """
 
@@ -61,6 +74,10 @@ class Motion(NamedTuple):
     position: Position
     joints: tuple[float, ...]
     rates: tuple[float, ...]
+    accelerations: tuple[float, ...]
+    velocity: Velocity | None
 
 
 Stage = Callable[[Motion], Motion]
+Writer = Callable[[int, Motion], bytes]
+"""Writes a message, given its stamp, in [ns], and the motion."""

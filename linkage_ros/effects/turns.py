@@ -49,7 +49,7 @@ class Continuous:
 
     def __call__(self, motion: Motion) -> Motion:
         """Return the motion with the turns added."""
-        crank, position, joints, rates = motion
+        crank, position, joints, rates, accelerations, velocity = motion
         last = self._last
         if last is None:
             now = [wrapped(v) if i in self._turning else v for i, v in enumerate(joints)]
@@ -59,7 +59,7 @@ class Continuous:
                 if not -pi < last[i] - now[i] < pi:
                     now[i] += round((last[i] - now[i]) / tau) * tau
         self._last = now
-        return new(Motion, (crank, position, tuple(now), rates))
+        return new(Motion, (crank, position, tuple(now), rates, accelerations, velocity))
 
 
 class Wrapped:
@@ -80,9 +80,9 @@ class Wrapped:
 
     def __call__(self, motion: Motion) -> Motion:
         """Return the motion with whole turns left out."""
-        crank, position, joints, rates = motion
+        crank, position, joints, rates, accelerations, velocity = motion
         now = [wrapped(v) if turns else v for v, turns in zip(joints, self._turning, strict=True)]
-        return new(Motion, (crank, position, tuple(now), rates))
+        return new(Motion, (crank, position, tuple(now), rates, accelerations, velocity))
 
 
 def wrapped(angle: float) -> float:

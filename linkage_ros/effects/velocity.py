@@ -45,12 +45,13 @@ def read(content: Section) -> VelocityParameters:
 
 def build(_parameters: VelocityParameters, closure: Closure) -> Stage:
     """Build the stage."""
-    toggle, rates = Status.TOGGLE, closure.rates
+    toggle, velocity_of = Status.TOGGLE, closure.velocity
 
     def velocity(motion: Motion) -> Motion:
-        crank, position, joints, _ = motion
+        crank, position, joints, _, _, _ = motion
         if position.status is toggle:
             return motion
-        return new(Motion, (crank, position, joints, rates(position, crank.rate)))
+        found = velocity_of(position, *crank.rates)
+        return new(Motion, (crank, position, joints, found.joints, (), found))
 
     return velocity

@@ -79,7 +79,8 @@ def critical_inputs(closure: Closure) -> tuple[float, ...]:
     found = []
     for interval in closure.input_ranges:
         if not interval.whole:
-            found += [interval.lowest, interval.highest]
+            ends = interval.lowest, interval.highest
+            found += [end for end, is_one in zip(ends, interval.limited, strict=True) if is_one]
     for step in closure.steps:
         diagonal = getattr(step, 'diagonal', None)
         if isinstance(diagonal, CrankDiagonal) and diagonal.arms[:2] == (1, 0):

@@ -36,11 +36,17 @@ _SAMPLES = 720
 
 
 class InputRange(NamedTuple):
-    """An interval of an input in which every loop closes, in [rad] or [m]; turns not wrapped."""
+    """
+    An interval of an input in which every loop closes, in [rad] or [m]; turns not wrapped.
+
+    ``limited`` says of each end whether the linkage ends there; a slide may go on, beyond what was
+    searched.
+    """
 
     lowest: float
     highest: float
     turning: bool = True
+    limited: tuple[bool, bool] = (True, True)
 
     @property
     def whole(self) -> bool:
@@ -50,6 +56,8 @@ class InputRange(NamedTuple):
     def __str__(self) -> str:
         if self.whole:
             return 'every crank angle'
+        if self.limited == (False, False):
+            return 'every slide'
         return f'{self.lowest:.6g} to {self.highest:.6g} {"rad" if self.turning else "m"}'
 
 
@@ -58,13 +66,10 @@ def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
     if len(closure.linkage.inputs) > 1:
         return ()
     if closure.linkage.inputs[0].slider:
-        reach = sum(
-            max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
-            for points in closure.structure.links.values()
-        )
+        far = reach(closure)
         return tuple(
-            InputRange(low, high, turning=False)
-            for low, high in _search(closure, -reach, reach, 4 * _SAMPLES)
+            InputRange(low, high, False, (low > -far, high < far))
+            for low, high in search(_closes(closure), -far, far, 4 * _SAMPLES)
         )
     intervals = [(-pi, pi)]
     exact = True
@@ -80,9 +85,8 @@ def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
             exact = False
     if not exact:
         start, end = intervals[0][0], intervals[-1][1]
-        intervals = [
-            part for low, high in intervals for part in _search(closure, low, high, _SAMPLES)
-        ]
+        closes = _closes(closure)
+        intervals = [part for low, high in intervals for part in search(closes, low, high)]
         ends_meet = end - start >= tau and len(intervals) > 1
         if ends_meet and intervals[0][0] == start and intervals[-1][1] == end:
             # One interval that runs through the end of the turn.
@@ -129,14 +133,18 @@ def _crank_intervals(diagonal: CrankDiagonal) -> list[tuple[float, float]]:
     return [(-highest, -lowest), (lowest, highest)]
 
 
-def _search(
-    closure: Closure, low: float, high: float, samples: int
+def reach(closure: Closure) -> float:
+    """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
+    return sum(
+        max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
+        for points in closure.structure.links.values()
+    )
+
+
+def search(
+    closes: Callable[[float], bool], low: float, high: float, samples: int = _SAMPLES
 ) -> Iterator[tuple[float, float]]:
-    """Yield the parts of an interval in which every loop closes."""
-
-    def closes(value: float) -> bool:
-        return closure.position(value).status in (Status.CLOSED, Status.TOGGLE)
-
+    """Yield the parts of an interval in which loops close; what is between samples is missed."""
     begin = None
     before = low
     for i in range(samples + 1):
@@ -150,6 +158,11 @@ def _search(
         before = value
     if begin is not None:
         yield begin, high
+
+
+def _closes(closure: Closure) -> Callable[[float], bool]:
+    """Return whether the loops close at a value of the single input."""
+    return lambda value: closure.position(value).status in (Status.CLOSED, Status.TOGGLE)
 
 
 def _limit(closes: Callable[[float], bool], inside: float, outside: float) -> float:

@@ -317,8 +317,7 @@ class Planner:
             self._pin_to(outer.link, outer)
 
     def _iterate(self, group: Iterated) -> None:
-        # local import: numpy is loaded only where something is iterated
-        from linkage_ros.kinematics.constraints import Constraints
+        from linkage_ros.kinematics.constraints import Constraints  # local import: it loads numpy
 
         constraints = Constraints(self._linkage, self._joints, group.links, self)
         slides = constraints.slides

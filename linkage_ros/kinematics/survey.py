@@ -19,12 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import product
 from math import cos, isfinite, pi, remainder, sqrt, tau
 from typing import NamedTuple
 
 from linkage_ros.kinematics.closure import Closure, Position
-from linkage_ros.kinematics.ranges import InputRange
+from linkage_ros.kinematics.ranges import InputRange, reach, search
 from linkage_ros.kinematics.status import Status
 
 _SAMPLES = 720
@@ -158,39 +158,15 @@ class Way:
             for p, q, turns in zip(here, there, self.closure.turning, strict=True)
         )
 
-    def _searched(self) -> Iterator[tuple[float, float]]:
-        """Yield the intervals in which every loop closes, of several inputs."""
-        low, high = (-pi, pi) if self.turning else (-reach(self.closure), reach(self.closure))
-        values = [low + (high - low) * i / _SAMPLES for i in range(_SAMPLES + 1)]
-        closing = [self.closes(value) for value in values]
-        found: list[list[float]] = []
-        if closing[0]:
-            found.append([low, high])
-        for (before, closed), (value, closes) in pairwise(zip(values, closing, strict=True)):
-            if closes and not closed:
-                found.append([self._limit(value, before), high])
-            elif closed and not closes:
-                found[-1][1] = self._limit(before, value)
-        if self.turning and len(found) > 1 and closing[0] and closing[-1]:
+    def _searched(self) -> list[tuple[float, float]]:
+        """Return the intervals in which every loop closes, of several inputs."""
+        far = pi if self.turning else reach(self.closure)
+        found = list(search(self.closes, -far, far))
+        if self.turning and len(found) > 1 and found[0][0] == -far and found[-1][1] == far:
             # One interval that runs through the end of the turn.
-            found[-1][1] = found.pop(0)[1] + tau
-        yield from ((begin, end) for begin, end in found)
-
-    def _limit(self, inside: float, outside: float) -> float:
-        while (middle := 0.5 * (inside + outside)) not in (inside, outside):
-            if self.closes(middle):
-                inside = middle
-            else:
-                outside = middle
-        return inside
-
-
-def reach(closure: Closure) -> float:
-    """Return a length that no slide exceeds, in [m]."""
-    return sum(
-        max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
-        for points in closure.structure.links.values()
-    )
+            (_, high), *others, (low, _) = found
+            found = [*others, (low, high + tau)]
+        return found
 
 
 def usual_inputs(closure: Closure) -> tuple[float, ...]:

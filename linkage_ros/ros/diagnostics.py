@@ -17,13 +17,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from linkage_ros.joint_state import NANOSECONDS
-from linkage_ros.kinematics.mobility import describe
+from linkage_ros.kinematics.closure import Position
+from linkage_ros.kinematics.linkage import Input
+from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.status import Status
 from linkage_ros.ros.tick_loop import Counts, TickLoop
 
@@ -35,6 +37,13 @@ OK, WARN, ERROR, STALE = (
 )
 
 _RATE_TOLERANCE = 0.1
+
+_NEARNESS = {
+    'transmission_angle': 'Transmission angle (rad)',
+    'conditioning': 'Conditioning',
+    'toggle_distance': 'Input to the nearest toggle ({unit})',
+}
+"""What is told of `Closure.nearness`, and as what."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +79,10 @@ class Health:
     ----------
     node
         Name of the node.
+    scene
+        Name of the scene.
+    inputs
+        The driven joints.
     rate
         Ticks wanted a second; 0 for one for every sample.
     clock
@@ -86,11 +99,14 @@ class Health:
         Its counts at the beginning and the end of the window.
     recording_failure
         Why there is no recording although one was wanted; '' where there is none to tell.
+    limits
+        For each attribute of the nearness to trouble below what it is warned of; 0 for never.
 
     """
 
     node: str
     scene: str
+    inputs: Sequence[Input]
     rate: float
     clock: int
     max_age: int
@@ -100,6 +116,7 @@ class Health:
     before: Snapshot
     now: Snapshot
     recording_failure: str
+    limits: Mapping[str, float]
 
     def statuses(self) -> list[DiagnosticStatus]:
         """Return the statuses, one for each task."""
@@ -169,7 +186,7 @@ class Health:
     def _closure(self) -> DiagnosticStatus:
         counts = self.loop.counts
         level, message = OK, 'Closed'
-        reachable = describe(self.loop.closure.crank_ranges)
+        reachable = describe(self.loop.closure.input_ranges)
         last = counts.last_unclosed
         if last is not None and self.now.unclosed > self.before.unclosed:
             level = ERROR
@@ -182,7 +199,7 @@ class Health:
             level, message = WARN, 'At a toggle: position valid, velocity not'
         values: dict[str, object] = {
             'Scene': self.scene,
-            'Reachable crank angles': reachable,
+            'Reachable': reachable,
             'Ticks at a toggle': counts.unclosed[Status.TOGGLE],
             'Ticks open': counts.unclosed[Status.OPEN],
             'Ticks indeterminate': counts.unclosed[Status.INDETERMINATE],
@@ -190,9 +207,27 @@ class Health:
         }
         tick = counts.last
         if tick is not None and tick.motion is not None:
-            values['Crank angle (rad)'] = f'{tick.motion.crank.angle:.6f}'
-            values['Residual (m)'] = f'{self.loop.closure.residual(tick.motion.position):.3g}'
+            _, position, *_ = tick.motion
+            for driven, angle in zip(self.inputs, tick.motion.crank.angles, strict=True):
+                values[f'Input {driven.joint} ({_unit(driven)})'] = f'{angle:.6f}'
+            values['Residual (m)'] = f'{self.loop.closure.residual(position):.3g}'
+            near, warning = self._nearness(position)
+            values |= near
+            if warning and level == OK:
+                level, message = WARN, warning
         return self._status('loop closure', level, message, values)
+
+    def _nearness(self, position: Position) -> tuple[dict[str, str], str]:
+        """Return how near trouble a position is, and of what there is to warn."""
+        unit = ' or '.join(sorted({_unit(driven) for driven in self.inputs}))
+        values, warnings = {}, []
+        nearness = self.loop.closure.nearness(position)
+        for name, text in _NEARNESS.items():
+            key, value, limit = text.format(unit=unit), getattr(nearness, name), self.limits[name]
+            values[key] = f'{value:.6g}'
+            if value < limit:
+                warnings.append(f'{key} is {value:.3g}, below warn.{name} of {limit:.3g}')
+        return values, '; '.join(warnings)
 
     def _recording(self) -> DiagnosticStatus:
         level, message = OK, 'Not recording'
@@ -222,3 +257,7 @@ class Health:
             hardware_id=self.scene,
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
+
+
+def _unit(driven: Input) -> str:
+    return 'm' if driven.slider else 'rad'

@@ -35,7 +35,7 @@ from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros import pacing
 from linkage_ros.ros.bag_topics import bag_topic
 from linkage_ros.ros.diagnostics import Health, Snapshot
-from linkage_ros.ros.parameters import declare_parameters
+from linkage_ros.ros.parameters import declare_parameters, nearness_limits
 from linkage_ros.ros.run_recording import RunRecording
 from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
 from linkage_ros.ros.warnings import Warnings
@@ -45,6 +45,7 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.serialization import serialize_message
@@ -97,6 +98,7 @@ class LinkageNode(LifecycleNode):
         self._joint_states = self.create_publisher(
             JointState, 'joint_states', OUTPUT_QOS, qos_overriding_options=overridable
         )
+        self._motion: Publisher | None = None
         self._diagnostics = self.create_publisher(
             DiagnosticArray, '/diagnostics', _DIAGNOSTICS_QOS
         )
@@ -140,7 +142,8 @@ class LinkageNode(LifecycleNode):
                     'parameter scene', "'' names no file", 'start with --ros-args -p scene:=FILE'
                 )
             scene = load_scene(file)
-            Pipeline(scene)  # what it calls for is proven now, not at the first tick
+            pipeline = Pipeline(scene)  # what it calls for is proven now, not at the first tick
+            self._advertise_motion(pipeline.writes_trajectory)
         except LinkageError as error:
             self.failure = error
             self.get_logger().error(str(error))
@@ -161,10 +164,11 @@ class LinkageNode(LifecycleNode):
             self._start_recording()
         self.loop.start(self._pace(self.scene.rate))
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
+        cranks = ', '.join(driven.joint for driven in self.scene.linkage.inputs)
+        to = [each.topic_name for each in (self._joint_states, self._motion) if each is not None]
         self.get_logger().info(
-            f'{self.scene.name}: ticking {rate}; '
-            f'crank {self.scene.linkage.input.joint} from {self.crank_topic}; '
-            f'{", ".join(self.scene.linkage.joints)} to {self._joint_states.topic_name}'
+            f'{self.scene.name}: ticking {rate}; crank {cranks} from {self.crank_topic}; '
+            f'{", ".join(self.scene.linkage.joints)} to {" and ".join(to)}'
         )
         return TransitionCallbackReturn.SUCCESS
 
@@ -178,6 +182,7 @@ class LinkageNode(LifecycleNode):
     def on_cleanup(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Forget the scene."""
         self.scene = None
+        self._advertise_motion(False)
         return TransitionCallbackReturn.SUCCESS
 
     @_reporting
@@ -191,7 +196,30 @@ class LinkageNode(LifecycleNode):
         """Return to unconfigured."""
         self.get_logger().error('a transition failed; the node is unconfigured now')
         self.end()
+        self._advertise_motion(False)
         return TransitionCallbackReturn.SUCCESS
+
+    def _advertise_motion(self, wanted: bool) -> None:
+        """Have the publisher of ~/motion, or have none."""
+        if wanted and self._motion is None:
+            try:
+                # Within the function: a scene without accelerations must not wait for it.
+                from trajectory_msgs.msg import JointTrajectory
+            except ImportError:
+                raise LinkageError(
+                    'effects.acceleration',
+                    'the ROS package trajectory_msgs is not installed',
+                    'install it, or leave out acceleration',
+                ) from None
+            self._motion = self.create_publisher(
+                JointTrajectory,
+                '~/motion',
+                OUTPUT_QOS,
+                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            )
+        elif not wanted and self._motion is not None:
+            self.destroy_publisher(self._motion)
+            self._motion = None
 
     def _build_loop(self, scene: Scene) -> TickLoop:
         shared = self.crank_topic == self._joint_states.topic_name
@@ -200,6 +228,7 @@ class LinkageNode(LifecycleNode):
             partial(self._crank.handle.take_message, JointState, True),
             self._joint_states.handle.publish_raw,
             JointStateWriter(list(scene.linkage.joints)).names if shared else b'',
+            None if self._motion is None else self._motion.handle.publish_raw,
         )
 
     def _pace(self, rate: float) -> Pace:
@@ -231,11 +260,14 @@ class LinkageNode(LifecycleNode):
         offered = [
             info.qos_profile for info in self.get_publishers_info_by_topic(self.crank_topic)
         ]
-        return [
+        topics = [
             bag_topic(self.crank_topic, JointState, offered[0] if offered else CRANK_QOS),
             bag_topic(joint_states.topic_name, JointState, joint_states.qos_profile),
             bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS),
         ]
+        if (motion := self._motion) is not None:
+            topics.append(bag_topic(motion.topic_name, motion.msg_type, motion.qos_profile))
+        return topics
 
     # Services.
 
@@ -308,6 +340,7 @@ class LinkageNode(LifecycleNode):
         health = Health(
             node=self.get_name(),
             scene=self.scene.name,
+            inputs=self.scene.linkage.inputs,
             rate=0.0 if simulated else self.scene.rate,
             clock=clock.nanoseconds,
             max_age=self.scene.drive.max_age,
@@ -317,6 +350,7 @@ class LinkageNode(LifecycleNode):
             before=self._before,
             now=now,
             recording_failure=self.recording.failure,
+            limits=nearness_limits(self),
         )
         self._before = now
         message = DiagnosticArray(status=health.statuses())

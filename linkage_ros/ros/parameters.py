@@ -17,6 +17,8 @@
 
 from __future__ import annotations
 
+from math import pi
+
 from rcl_interfaces.msg import (
     FloatingPointRange,
     ParameterDescriptor,
@@ -25,6 +27,13 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 
 _PERIOD = FloatingPointRange(from_value=0.1, to_value=3600.0)
+
+_LIMITS = {
+    'warn.transmission_angle': (0.0, pi / 2, 'Transmission angle [rad]'),
+    'warn.conditioning': (1e-6, 1.0, 'Smallest singular value of the scaled loop Jacobian'),
+    'warn.toggle_distance': (1e-3, 1e6, 'Input to the nearest toggle [rad or m]'),
+}
+"""Default, highest value and meaning."""
 
 
 def declare_parameters(node: Node) -> None:
@@ -63,3 +72,19 @@ def declare_parameters(node: Node) -> None:
                 additional_constraints='may be changed at any time',
             ),
         )
+    for name, (default_limit, highest, description) in _LIMITS.items():
+        node.declare_parameter(
+            name,
+            default_limit,
+            ParameterDescriptor(
+                type=ParameterType.PARAMETER_DOUBLE,
+                description=f'{description}, below which the diagnostics warn; 0: never',
+                floating_point_range=[FloatingPointRange(from_value=0.0, to_value=highest)],
+                additional_constraints='may be changed at any time',
+            ),
+        )
+
+
+def nearness_limits(node: Node) -> dict[str, float]:
+    """Return below what each measure of the nearness to trouble is warned of."""
+    return {name.removeprefix('warn.'): float(node.get_parameter(name).value) for name in _LIMITS}

@@ -30,7 +30,7 @@ from linkage_ros.bag.replay import RUN_FILE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
-from linkage_ros.ros.tick_loop import CRANK, JOINT_STATES, TickLoop
+from linkage_ros.ros.tick_loop import CRANK, JOINT_STATES, MOTION, TickLoop
 from linkage_ros.scene.scene import RecordParameters, Scene
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
@@ -117,6 +117,8 @@ def _attachments(scene: Scene, topics: Sequence[Topic]) -> dict[str, tuple[str, 
         'python': platform.python_version(),
         'machine': platform.machine(),
     }
+    if len(topics) > MOTION:
+        run['motion_topic'] = topics[MOTION].name
     return {
         **{name: ('application/yaml', data) for name, data in scene.files.items()},
         RUN_FILE: ('application/json', json.dumps(run).encode()),

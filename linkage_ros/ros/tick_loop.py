@@ -36,8 +36,8 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.ros.duration_histogram import DurationHistogram
 
-CRANK, JOINT_STATES, DIAGNOSTICS = range(3)
-"""The recorder's topics."""
+CRANK, JOINT_STATES, DIAGNOSTICS, MOTION = range(4)
+"""The recorder's topics; the last of them only where it is published."""
 
 
 _CLOSED = Status.CLOSED
@@ -83,6 +83,8 @@ class TickLoop:
     own
         What the node's own messages have behind the stamp where they come back on the crank's
         topic, so that they can be told; empty where they do not.
+    publish_motion
+        Publishes a serialized JointTrajectory, where the pipeline writes one.
 
     """
 
@@ -92,11 +94,13 @@ class TickLoop:
         take: Take,
         publish: Callable[[bytes], None],
         own: bytes = b'',
+        publish_motion: Callable[[bytes], None] | None = None,
     ) -> None:
         self._build = build
         self._take = take
         self._publish = publish
         self._own = own
+        self._publish_motion = publish_motion
         self._last_time = 0
         self._pipeline = build()
         self._stopping = Event()
@@ -182,12 +186,16 @@ class TickLoop:
         """Solve now for a time, both in [ns]; publish, record and count."""
         counts = self.counts
         counts.last = tick = self._pipeline.tick(at)
-        position, _, message = tick
+        position, _, message, trajectory = tick
         if message:
             self._publish(message)
             if (recorder := self.recorder) is not None:
                 recorder.offer(JOINT_STATES, now, at, message)
             counts.published += 1
+            if (publish_motion := self._publish_motion) is not None:
+                publish_motion(trajectory)
+                if recorder is not None:
+                    recorder.offer(MOTION, now, at, trajectory)
         counts.ticks += 1
         if position is None:
             counts.silent += 1

@@ -26,7 +26,7 @@ from time import monotonic
 
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.mobility import describe
+from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.status import Status
 from linkage_ros.ros.tick_loop import Counts
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -39,7 +39,7 @@ _REMEDIES = {
     Rejection.TWICE: 'name the joint once',
     Rejection.NO_RATE: 'fill velocity, or set carry_forward: false and leave out velocity',
     Rejection.NOT_FINITE: 'look at the sensor',
-    Rejection.TOO_LARGE: 'the unit is radians',
+    Rejection.TOO_LARGE: 'the units are rad and m',
     Rejection.STAMP_ZERO: 'stamp the messages',
     Rejection.STAMP_INVALID: 'stamp the messages with the time',
     Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
@@ -99,7 +99,7 @@ class Warnings:
                 line = text.format(
                     ticks=ticks,
                     gap=counts.last_unclosed.gap,
-                    reachable=describe(closure.crank_ranges),
+                    reachable=describe(closure.input_ranges),
                 )
                 if self.say(status.value, line, period):
                     self._unclosed[status] = counts.unclosed[status]

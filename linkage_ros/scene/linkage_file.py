@@ -139,7 +139,7 @@ def _closable(content: Section, linkage: Linkage, shorthand: str = '') -> Linkag
             raise DefinitionError(
                 'links',
                 'the loops close at no value of the input',
-                'no link may be longer than the others of its loop together; see also assembly',
+                'the longest link of a loop must be shorter than its others together',
             )
     except DefinitionError as error:
         raise content.error(shorthand or error.where, error.reason, error.remedy) from None

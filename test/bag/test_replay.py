@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+import json
 from math import tau
 from pathlib import Path
 
@@ -33,6 +34,8 @@ import pytest
 SECOND = 1_000_000_000
 LINKAGE = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
 RUN = b'{"scene": "s", "crank_topic": "/crank", "joint_states_topic": "/joint_states"}'
+WITH_MOTION = RUN.replace(b'}', b', "motion_topic": "/motion"}')
+SHARED = RUN.replace(b'/crank', b'/joint_states')
 CRANK = JointStateWriter(['other', 'crank_joint'])
 
 
@@ -40,38 +43,40 @@ def sample(stamp: int, angle: float, rate: float) -> bytes:
     return CRANK.write(stamp, (0.0, angle), (0.0, rate))
 
 
-def files(scene: str) -> dict[str, tuple[str, bytes]]:
+def files(scene: str, run: bytes = RUN) -> dict[str, tuple[str, bytes]]:
     return {
         'scene.yaml': ('application/yaml', f'linkage: l.yaml\n{scene}'.encode()),
         'linkage.yaml': ('application/yaml', LINKAGE),
-        RUN_FILE: ('application/json', RUN),
+        RUN_FILE: ('application/json', run),
     }
 
 
 class Run:
     """A tick by hand: offers and ticks as the node's tick loop makes them, recorded."""
 
-    def __init__(self, folder: Path, scene: str) -> None:
-        topics = [
-            Topic(name, 'sensor_msgs/msg/JointState', '', '')
-            for name in ('/crank', '/joint_states')
-        ]
-        self.recorder = Recorder(BagWriter(folder, topics, files(scene)))
+    def __init__(self, folder: Path, scene: str, run: bytes = RUN) -> None:
+        names = [name for key, name in json.loads(run).items() if key.endswith('_topic')]
+        topics = [Topic(name, 'sensor_msgs/msg/JointState', '', '') for name in names]
+        self.recorder = Recorder(BagWriter(folder, topics, files(scene, run)))
         self.folder = folder
         # The scene as the bag has it: what is tested is the order and the times, not the loading.
         self.scene = recorded_scene(read_bag(folder, allow_truncated=True))
         self.pipeline = Pipeline(self.scene)
         self.published: list[bytes] = []
+        self.motions: list[bytes] = []
 
     def offer(self, now: int, message: bytes) -> None:
         self.recorder.offer(0, now, now - 1000, message)
         self.pipeline.offer(message, now)
 
-    def tick(self, now: int, at: int) -> None:
-        message = self.pipeline.tick(at).message
-        if message:
+    def tick(self, now: int, at: int, drop: str = '') -> None:
+        _, _, message, motion = self.pipeline.tick(at)
+        if message and drop != 'joint state':
             self.recorder.offer(1, now, at, message)
             self.published.append(message)
+        if motion and drop != 'motion':
+            self.recorder.offer(2, now, at, motion)
+            self.motions.append(motion)
 
     def replayed(self) -> list[tuple[bytes, bytes]]:
         self.recorder.stop()
@@ -134,6 +139,56 @@ def test_another_scene_replays_to_other_bytes(tmp_path: Path) -> None:
     assert again.tick.message != again.recorded
 
 
+def test_motions_replay_to_the_same_bytes_beside_their_joint_states(tmp_path: Path) -> None:
+    run = Run(tmp_path / 'bag', 'effects: {acceleration: {}}\n', WITH_MOTION)
+    for begin in (5 * SECOND, 2 * SECOND):
+        for k in range(300):
+            now = begin + k * 1_000_000
+            run.offer(now, sample(now - 200_000, 0.05 * k, 50.0))
+            run.tick(now, now)
+        run.pipeline = Pipeline(run.scene)
+    assert run.replayed() == [(message, message) for message in run.published]
+    again = list(replay(read_bag(run.folder), run.scene))
+    assert [each.recorded_motion for each in again] == run.motions
+    assert [each.tick.trajectory for each in again] == run.motions
+    assert len(run.motions) == 600
+
+
+DROPS = ['', 'motion', 'joint state', '', 'joint state', 'motion', 'motion', '']
+
+
+# Three samples of one stamp, and one for each tick; then a sample for every tenth tick only.
+@pytest.mark.parametrize(('ticks_at_first', 'per_sample'), [(3, 1), (1, 10)])
+def test_what_the_recorder_had_to_drop_shifts_nothing(
+    tmp_path: Path, ticks_at_first: int, per_sample: int
+) -> None:
+    run = Run(tmp_path / 'bag', 'rate: 0\neffects: {acceleration: {}}\n', WITH_MOTION)
+    drops = 4 * DROPS
+    for k, drop in enumerate(drops):
+        stamp = SECOND + max(k + 1 - ticks_at_first, 0) * 1_000_000
+        if k % per_sample == 0:
+            run.offer(stamp + 250_000, sample(stamp, 0.9 * k, 900.0))
+        run.tick(stamp + 250_000, stamp, drop)
+    run.recorder.stop()
+    again = list(replay(read_bag(run.folder), run.scene))
+    assert [bool(each.recorded) for each in again] == [drop != 'joint state' for drop in drops]
+    assert [bool(each.recorded_motion) for each in again] == [drop != 'motion' for drop in drops]
+    for each in again:
+        assert each.recorded in (b'', each.tick.message)
+        assert each.recorded_motion in (b'', each.tick.trajectory)
+
+
+def test_crank_and_joint_states_on_one_topic_are_told_apart(tmp_path: Path) -> None:
+    # As where joint_state_broadcaster feeds the node, and the node publishes beside it.
+    run = Run(tmp_path / 'bag', 'effects: {velocity: {}}\n', SHARED)
+    for k in range(200):
+        now = SECOND + k * 1_000_000
+        run.offer(now, sample(now, 0.05 * k, 50.0))
+        run.tick(now, now)
+    assert len(run.published) == 200
+    assert run.replayed() == [(message, message) for message in run.published]
+
+
 @pytest.mark.parametrize('missing', ['scene.yaml', 'linkage.yaml', RUN_FILE])
 def test_a_bag_that_does_not_say_what_ran_is_refused(tmp_path: Path, missing: str) -> None:
     attached = {name: data for name, data in files('').items() if name != missing}
@@ -142,8 +197,9 @@ def test_a_bag_that_does_not_say_what_ran_is_refused(tmp_path: Path, missing: st
         recorded_scene(read_bag(tmp_path / 'bag'))
 
 
-def test_a_damaged_account_of_the_run_is_refused(tmp_path: Path) -> None:
-    attached = {**files(''), RUN_FILE: ('application/json', b'{"scene": 3')}
+@pytest.mark.parametrize('damaged', [b'{"scene": 3', b'{"scene": 3}', b'[]', b'"scene"', b'\xff'])
+def test_a_damaged_account_of_the_run_is_refused(tmp_path: Path, damaged: bytes) -> None:
+    attached = {**files(''), RUN_FILE: ('application/json', damaged)}
     BagWriter(tmp_path / 'bag', [], attached).close()
     with pytest.raises(BagError, match='damaged'):
         recorded_scene(read_bag(tmp_path / 'bag'))

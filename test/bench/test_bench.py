@@ -23,6 +23,8 @@ import re
 import subprocess
 import sys
 
+from bench.kinematics_compiled import compiler
+from bench.kinematics_pylinkage import AVAILABLE
 from bench.report import Table
 from bench.spread import percentile, ratios, spread
 import pytest
@@ -68,6 +70,21 @@ def test_ticks_are_measured_against_the_bare_loop(tmp_path):
     assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))
     assert 'lateness' in kept
     assert 'bare loop' in kept
+
+
+@pytest.mark.timeout(90)
+def test_solving_is_measured_against_straight_line_c_and_pylinkage(tmp_path):
+    kept = _bench(tmp_path, '--only', 'kinematics')
+    names = ['µs a state: four-bar / straight line', 'µs a state: Jansen leg / four-bar']
+    if AVAILABLE:
+        names += ['µs a state: pylinkage / four-bar', 'Mstates/s: numpy / pylinkage']
+    if compiler():
+        names += ['Mstates/s: numpy / C']
+    for name in names:
+        cells = _row(kept, name)
+        assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))
+        assert re.match('[≤≥] ', cells[4])
+    assert 'CPU of a tick' not in kept
 
 
 def _bench(runs: Path, *arguments: str) -> str:

@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -35,7 +36,7 @@ def scene(tmp_path: Path) -> Path:
     (tmp_path / 'rod.yaml').write_text('inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}\n')
     scene = tmp_path / 'rod scene.yaml'
     scene.write_text(
-        'linkage: rod.yaml\nrate: 0\neffects: {velocity: {}}\nrecord: {name: "b 1"}\n'
+        'linkage: rod.yaml\nrate: 0\neffects: {acceleration: {}}\nrecord: {name: "b 1"}\n'
     )
     return scene
 
@@ -63,6 +64,9 @@ def test_a_run_is_remapped_recorded_and_drawn(
     )
     assert answer.returncode == 0, answer.stderr
     assert '/motor' in answer.stdout
+    proof = re.search(r'(\d+) of (\d+) joint states and (\d+) of (\d+) motions', answer.stdout)
+    assert len(set(proof.groups())) == 1
+    assert int(proof.group(1)) > 100
     bag = read_bag(tmp_path / 'runs' / 'b 1')
     assert recorded_scene(bag).name == 'rod scene'
     assert sum(message.topic == '/joint_states' for message in bag.messages()) > 100

@@ -42,7 +42,7 @@ GOOD = None
 
 
 def sample(stamp, angle, rate=0.0):
-    return CrankSample(stamp * MS, angle, rate)
+    return CrankSample(stamp * MS, (angle,), (rate,))
 
 
 # Name: (parameters, [(time, sample or None, its rejection or (angle, rate, age in ms) or None)]).
@@ -147,42 +147,43 @@ def test_timeline(name):
             assert drive.state(time * MS) is None
         else:
             angle, rate, age = expected
-            assert drive.state(time * MS) == (pytest.approx(angle, abs=1e-12), rate, age * MS)
+            angles = (pytest.approx(angle, abs=1e-12),)
+            assert drive.state(time * MS) == (angles, (rate,), (0.0,), age * MS)
 
 
 @pytest.mark.parametrize(
     ('bad', 'reason'),
     [
-        (CrankSample(NOW, nan, 0.0), Rejection.NOT_FINITE),
-        (CrankSample(NOW, inf, 0.0), Rejection.NOT_FINITE),
-        (CrankSample(NOW, 0.0, nan), Rejection.NOT_FINITE),
-        (CrankSample(NOW, 0.0, -inf), Rejection.NOT_FINITE),
-        (CrankSample(NOW, 1.0000001e10, 0.0), Rejection.TOO_LARGE),
-        (CrankSample(NOW, -1e300, 0.0), Rejection.TOO_LARGE),
-        (CrankSample(NOW, 0.0, 1.0000001e10), Rejection.TOO_LARGE),
-        (CrankSample(0, 0.0, 0.0), Rejection.STAMP_ZERO),
-        (CrankSample(NOW + 101 * MS, 0.0, 0.0), Rejection.STAMP_FUTURE),
-        (CrankSample(2**31 * SECOND, 0.0, 0.0), Rejection.STAMP_FUTURE),
-        (CrankSample(NOW - 11 * MS, 0.0, 0.0), Rejection.STAMP_OLD),
-        (CrankSample(1, 0.0, 0.0), Rejection.STAMP_OLD),
+        (CrankSample(NOW, (nan,), (0.0,)), Rejection.NOT_FINITE),
+        (CrankSample(NOW, (inf,), (0.0,)), Rejection.NOT_FINITE),
+        (CrankSample(NOW, (0.0,), (nan,)), Rejection.NOT_FINITE),
+        (CrankSample(NOW, (0.0,), (-inf,)), Rejection.NOT_FINITE),
+        (CrankSample(NOW, (1.0000001e10,), (0.0,)), Rejection.TOO_LARGE),
+        (CrankSample(NOW, (-1e300,), (0.0,)), Rejection.TOO_LARGE),
+        (CrankSample(NOW, (0.0,), (1.0000001e10,)), Rejection.TOO_LARGE),
+        (CrankSample(0, (0.0,), (0.0,)), Rejection.STAMP_ZERO),
+        (CrankSample(NOW + 101 * MS, (0.0,), (0.0,)), Rejection.STAMP_FUTURE),
+        (CrankSample(2**31 * SECOND, (0.0,), (0.0,)), Rejection.STAMP_FUTURE),
+        (CrankSample(NOW - 11 * MS, (0.0,), (0.0,)), Rejection.STAMP_OLD),
+        (CrankSample(1, (0.0,), (0.0,)), Rejection.STAMP_OLD),
     ],
 )
 def test_a_bad_sample_changes_nothing(bad, reason):
     drive = TopicDrive(CARRIED, needs_rate=True)
-    assert drive.offer(CrankSample(NOW - 10 * MS, 0.5, 2.0), NOW) is GOOD
+    assert drive.offer(CrankSample(NOW - 10 * MS, (0.5,), (2.0,)), NOW) is GOOD
     before = drive.state(NOW)
     assert drive.offer(bad, NOW) is reason
     assert drive.state(NOW) == before
     assert drive.stamp == NOW - 10 * MS
-    assert drive.offer(CrankSample(NOW, 0.6, 2.0), NOW) is GOOD
-    assert drive.state(NOW) == CrankState(0.6, 2.0, 0)
+    assert drive.offer(CrankSample(NOW, (0.6,), (2.0,)), NOW) is GOOD
+    assert drive.state(NOW) == CrankState((0.6,), (2.0,), (0.0,), 0)
 
 
 @pytest.mark.parametrize('angle', [1e10, -1e10])
 def test_the_largest_numbers_are_good(angle):
     drive = TopicDrive(CARRIED, needs_rate=True)
-    assert drive.offer(CrankSample(NOW, angle, angle), NOW) is GOOD
-    assert drive.state(NOW) == CrankState(angle, angle, 0)
+    assert drive.offer(CrankSample(NOW, (angle,), (angle,)), NOW) is GOOD
+    assert drive.state(NOW) == CrankState((angle,), (angle,), (0.0,), 0)
 
 
 @pytest.mark.parametrize(
@@ -191,10 +192,10 @@ def test_the_largest_numbers_are_good(angle):
 )
 def test_without_a_rate(parameters, needs_rate, good):
     drive = TopicDrive(parameters, needs_rate)
-    rejection = drive.offer(CrankSample(NOW, 0.5, None), NOW)
+    rejection = drive.offer(CrankSample(NOW, (0.5,), None), NOW)
     if good:
         assert rejection is GOOD
-        assert drive.state(NOW) == CrankState(0.5, 0.0, 0)
+        assert drive.state(NOW) == CrankState((0.5,), (0.0,), (0.0,), 0)
     else:
         assert rejection is Rejection.NO_RATE
         assert drive.state(NOW) is None
@@ -203,8 +204,8 @@ def test_without_a_rate(parameters, needs_rate, good):
 samples = st.builds(
     CrankSample,
     st.integers(0, 2 * NOW) | st.sampled_from([0, NOW, NOW + 100 * MS]),
-    st.floats() | st.floats(-10, 10),
-    st.none() | st.floats() | st.floats(-10, 10),
+    st.tuples(st.floats() | st.floats(-10, 10)),
+    st.none() | st.tuples(st.floats() | st.floats(-10, 10)),
 )
 
 
@@ -220,4 +221,28 @@ def test_whatever_is_offered_the_state_is_that_of_the_last_good_sample(offered):
     if good is None or NOW - good.stamp > HELD.max_age:
         assert state is None
     else:
-        assert state == CrankState(good.angle, good.rate, NOW - good.stamp)
+        assert state == CrankState(good.angles, good.rates, (0.0,), NOW - good.stamp)
+
+
+def test_of_several_inputs_each_is_carried_by_its_own_rate():
+    drive = TopicDrive(CARRIED, needs_rate=True)
+    assert drive.offer(CrankSample(NOW, (1.0, -2.0, 0.5), (10.0, 0.0, -3.0)), NOW) is GOOD
+    angles, rates, accelerations, age = drive.state(NOW + 100 * MS)
+    assert angles == pytest.approx((2.0, -2.0, 0.2))
+    assert rates == (10.0, 0.0, -3.0)
+    assert accelerations == (0.0, 0.0, 0.0), 'what a JointState cannot tell'
+    assert age == 100 * MS
+
+
+@pytest.mark.parametrize(
+    ('bad', 'reason'),
+    [(nan, Rejection.NOT_FINITE), (-inf, Rejection.NOT_FINITE), (2e10, Rejection.TOO_LARGE)],
+)
+@pytest.mark.parametrize('place', range(4))
+def test_of_several_inputs_one_that_is_bad_spoils_the_sample(bad, reason, place):
+    drive = TopicDrive(CARRIED, needs_rate=True)
+    values = [0.1, 0.2, 0.3, 0.4]
+    values[place] = bad
+    sample = CrankSample(NOW, tuple(values[:2]), tuple(values[2:]))
+    assert drive.offer(sample, NOW) is reason
+    assert drive.state(NOW) is None

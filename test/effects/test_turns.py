@@ -32,7 +32,7 @@ steps = st.floats(-3.0, 3.0)
 
 
 def motion(*joints):
-    return Motion(None, None, joints, ())
+    return Motion(None, None, joints, (), (), None)
 
 
 @given(st.lists(steps, min_size=1, max_size=60), st.floats(-pi, pi))
@@ -109,7 +109,8 @@ def test_many_turns_add_up_without_drift():
 
 
 def test_the_rest_of_the_motion_is_passed_on():
-    crank, position, rates = object(), object(), (1.0, 2.0)
+    crank, position, velocity = object(), object(), object()
+    rest = (1.0, 2.0), (3.0, 4.0), velocity
     for stage in (Continuous([True, False]), Wrapped([True, False])):
-        after = stage(Motion(crank, position, (0.5, 0.5), rates))
-        assert after == (crank, position, (0.5, 0.5), rates)
+        after = stage(Motion(crank, position, (0.5, 0.5), *rest))
+        assert after == (crank, position, (0.5, 0.5), *rest)

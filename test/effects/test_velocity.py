@@ -45,7 +45,8 @@ EVERY_OTHER = closure('four_bar: {a: 1, b: 1, c: 1, d: 2}')
 def moved(loop, angle, rate):
     """Return the motion that leaves the stage."""
     position = loop.position(angle)
-    motion = Motion(CrankState(angle, rate, 0), position, position.joints, ())
+    crank = CrankState((angle,), (rate,), (0.0,), 0)
+    motion = Motion(crank, position, position.joints, (), (), None)
     return velocity.build(velocity.VelocityParameters(), loop)(motion)
 
 
@@ -73,11 +74,12 @@ def test_at_a_toggle_there_is_none():
     assert motion.position.status is Status.TOGGLE
     assert len(motion.joints) == 2
     assert motion.rates == ()
+    assert motion.velocity is None
 
 
 @given(st.floats(-17.0, -1.0))
 def test_next_to_a_toggle_rates_are_finite_or_none(exponent):
-    limit = EVERY_OTHER.crank_ranges[0].highest
+    limit = EVERY_OTHER.input_ranges[0].highest
     angle = limit - 10.0**exponent
     if EVERY_OTHER.position(angle).joints:
         assert all(map(isfinite, moved(EVERY_OTHER, angle, 1e10).rates))
@@ -86,7 +88,8 @@ def test_next_to_a_toggle_rates_are_finite_or_none(exponent):
 def test_the_rest_of_the_motion_is_passed_on():
     position = FOUR_BAR.position(1.0)
     motion = moved(FOUR_BAR, 1.0, 2.0)
-    assert motion[:3] == (CrankState(1.0, 2.0, 0), position, position.joints)
+    assert motion[:3] == (CrankState((1.0,), (2.0,), (0.0,), 0), position, position.joints)
+    assert motion.velocity == FOUR_BAR.velocity(position, 2.0)
 
 
 def test_it_has_no_parameters():

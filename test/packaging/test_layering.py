@@ -28,8 +28,8 @@ PACKAGE = 'linkage_ros'
 # as no two import each other.
 HEIGHTS = (
     ('errors', 'stop', 'tuples'),
-    ('kinematics', 'shipped'),
-    ('synthesis', 'scene', 'drives', 'joint_state'),
+    ('kinematics', 'shipped', 'cdr'),
+    ('synthesis', 'scene', 'drives', 'drawing', 'joint_state', 'joint_trajectory'),
     ('effects',),
     ('pipeline',),
     ('bag', 'accuracy'),
@@ -48,6 +48,7 @@ ROS = (
     'sensor_msgs',
     'std_msgs',
     'std_srvs',
+    'trajectory_msgs',
 )
 
 # An import of ours within a function is for pipeline.py, which imports what a scene calls for,

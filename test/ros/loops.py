@@ -18,12 +18,29 @@
 from __future__ import annotations
 
 from cmath import exp, phase
-from math import sqrt
+from math import acos, remainder, sqrt, tau
 
 import pytest
 
 A, B, C, D = 0.040, 0.120, 0.080, 0.100
 """Lengths of config/linkages/four_bar.yaml, in [m]."""
+
+FIVE_BAR = """
+links:
+  ground: {O1: [0, 0], O2: [0.1, 0]}
+  left: {O1: [0, 0], A: [0.04, 0]}
+  right: {O2: [0, 0], C: [0.05, 0]}
+  upper: {A: [0, 0], B: [0.12, 0]}
+  lower: {C: [0, 0], B: [0.11, 0]}
+input:
+  - {joint: left_crank, parent: ground, child: left}
+  - {joint: right_crank, parent: ground, child: right}
+assembly: {B: left}
+joints:
+  upper_joint: {parent: ground, child: upper}
+  lower_joint: {parent: ground, child: lower}
+"""
+"""Two cranks on the ground, two links between them, all straight."""
 
 
 def four_bar(theta: float) -> tuple[float, float]:
@@ -51,6 +68,31 @@ def rates(loop, theta: float, omega: float) -> tuple[float, ...]:
         phase(exp(1j * (t - h))) / (2 * step) * omega
         for t, h in zip(there, here, strict=True)
     )
+
+
+def accelerations(loop, theta: float, omega: float) -> tuple[float, ...]:
+    """Return the joints' accelerations at a constant rate, from the difference of positions."""
+    # Five of them: of three, either what is left out or the rounding shows in the fourth digit.
+    step = 1e-3
+    theta = remainder(theta, tau)  # turns alone would cost a digit of every difference
+    here = loop(theta)
+    sums = [0.0] * len(here)
+    for steps, weight in ((-2, -1.0), (-1, 16.0), (1, 16.0), (2, -1.0)):
+        for i, (there, h) in enumerate(zip(loop(theta + steps * step), here, strict=True)):
+            sums[i] += weight * phase(exp(1j * (there - h)))
+    return tuple(value / (12.0 * step**2) * omega**2 for value in sums)
+
+
+def transmission_angle(theta: float) -> float:
+    """Return the acute angle between coupler and rocker of the four-bar, by the law of cosines."""
+    square = abs(D - A * exp(1j * theta)) ** 2
+    return acos(abs(B * B + C * C - square) / (2 * B * C))
+
+
+def five_bar_gap(upper: float, lower: float, left: float, right: float) -> complex:
+    """Return by how much the two halves of FIVE_BAR miss each other, in [m]."""
+    here = 0.04 * exp(1j * left) + 0.12 * exp(1j * upper)
+    return here - (0.1 + 0.05 * exp(1j * right) + 0.11 * exp(1j * lower))
 
 
 def modulo_turns(angle: float) -> object:

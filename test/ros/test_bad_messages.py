@@ -55,8 +55,8 @@ def stamped(offset_or_stamp):
 
 
 CRANK = 'crank_joint'
-NOT_FINITE = 'angle or rate not finite'
-TOO_LARGE = 'angle or rate beyond 1e10 rad, rad/s'
+NOT_FINITE = 'position or rate not finite'
+TOO_LARGE = 'position or rate beyond 1e10'
 UNEQUAL = 'arrays of unequal length'
 EMPTY = 'no joints or no positions'
 MALFORMED = 'malformed message'

@@ -215,6 +215,7 @@ def test_a_refused_parameter_says_why(graph, write_scene, start):
         return result.successful, result.reason
 
     assert change(parameter('warning_period', double_value=2.0)) == (True, '')
+    assert change(parameter('warn.transmission_angle', double_value=0.5)) == (True, '')
     for refused in (
         parameter('scene', string_value='other.yaml'),
         parameter('autostart', bool_value=False),
@@ -223,6 +224,9 @@ def test_a_refused_parameter_says_why(graph, write_scene, start):
         parameter('diagnostics_period', double_value=float('inf')),
         parameter('warning_period', double_value=-1.0),
         parameter('warning_period', string_value='often'),
+        parameter('warn.transmission_angle', double_value=1.6),
+        parameter('warn.conditioning', double_value=-1e-6),
+        parameter('warn.toggle_distance', double_value=float('nan')),
         parameter('rtae', double_value=1.0),
     ):
         successful, reason = change(refused)
@@ -230,6 +234,7 @@ def test_a_refused_parameter_says_why(graph, write_scene, start):
         assert len(reason.splitlines()) == 1
 
     names = ['scene', 'autostart', 'diagnostics_period', 'warning_period', 'runs_directory']
+    names += [f'warn.{what}' for what in ('transmission_angle', 'conditioning', 'toggle_distance')]
     request = DescribeParameters.Request(names=names)
     answer = graph.call(DescribeParameters, f'{NODE}/describe_parameters', request)
     assert all(descriptor.description for descriptor in answer.descriptors)

@@ -56,7 +56,7 @@ LINKAGES = {
     'shorthand and links': (FOUR_BAR + b'links: {}', ':2: links: unknown key; known: four_bar'),
     'closes nowhere': (
         FOUR_BAR.replace(b'0.1}', b'1.0}'),
-        ':1: four_bar: the loop of 0.04, 0.12, 0.08, 1 m closes at no crank angle; the longest',
+        ':1: four_bar: the loops close at no value of the input; the longest link of a loop',
     ),
     'swivel that is no point': (
         SLIDER.replace(b', 0.1', b''),
@@ -84,11 +84,11 @@ LINKAGES = {
     ),
     'no pin': (
         WRITTEN_OUT.replace(b'rocker: {O4', b'rocker: {O5'),
-        ":6: links.rocker: no point is named both on 'ground' and on 'rocker'",
+        ':6: links.rocker: is free: its pins and sliders do not hold it',
     ),
     'crank that is no link': (
         WRITTEN_OUT.replace(b'child: crank}', b'child: krank}'),
-        ":7: input.child: 'krank' is not a link that moves; name one of coupler, crank, rocker",
+        ":7: input.child: 'krank' is not a link; name one of coupler, crank, ground, rocker",
     ),
     'no side': (
         WRITTEN_OUT.replace(b'B: left', b''),
@@ -96,7 +96,7 @@ LINKAGES = {
     ),
     'joint of no link': (
         WRITTEN_OUT.replace(b'child: coupler}', b'child: copler}'),
-        ":10: joints.coupler_joint.child: 'copler' is not a link; name one of ground, crank",
+        ":10: joints.coupler_joint.child: 'copler' is not a link; name one of coupler, crank, gr",
     ),
     'the input published': (
         WRITTEN_OUT.replace(b'rocker_joint', b'crank_joint'),
@@ -112,7 +112,7 @@ LINKAGES = {
     ),
     'slide of no slider': (
         WRITTEN_OUT.replace(b'{parent: crank, child: coupler}', b'{slider: rod}'),
-        ":10: joints.coupler_joint.slider: 'rod' is not a slider; name one of",
+        ":10: joints.coupler_joint.slider: 'rod' is not a slider; this linkage has none",
     ),
 }
 

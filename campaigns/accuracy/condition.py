@@ -1,0 +1,153 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Condition numbers κ = Σ|xᵢ ∂y/∂xᵢ| + |y| of positions, velocities and accelerations.
+
+The sum goes over all coordinates, directions and angles of the linkage, the input angle at its
+size within (-π, π], its rate and its acceleration. A published angle counts as π at least: a
+direction is a sum of angles of up to half a turn, and where they cancel, rounding stays.
+"""
+
+from __future__ import annotations
+
+from math import pi, remainder
+from typing import Any
+
+from campaigns.accuracy.mechanism import Key, Turn
+from campaigns.accuracy.reference import Outcome, Reference, series, Truth
+from campaigns.accuracy.tangent import Array, Tangent
+from flint import arb, ctx
+import numpy as np
+
+FACTORIALS = (1.0, 1.0, 2.0)
+
+_PRECISION = 1024
+_STEP = 300
+"""Exponent of the step of the differences: truncation and rounding are both beyond 50 digits."""
+
+
+def condition_numbers(
+    reference: Reference, truths: list[Truth], phi: list[float], alpha: list[float]
+) -> Array:
+    """
+    Return κ of all cases in doubles, [case, joint, derivative].
+
+    Parameters
+    ----------
+    reference
+        The linkage.
+    truths
+        Its solution in each case; all are closed.
+    phi, alpha
+        Input angles and accelerations.
+
+    """
+    mechanism = reference.mechanism
+    motions = [truth.motion for truth in truths]
+    values: dict[str | int, Array] = {}
+    for name in mechanism.links:
+        values[name] = np.array([series(m.unit[name]) for m in motions]).T
+    for name in mechanism.sliders:
+        values[name] = np.array([series(m.slide[name]) for m in motions]).real.T
+    for i in range(len(mechanism.dyads)):
+        values[i] = np.array([series(m.inverse[i]) for m in motions]).real.T
+    tangent = Tangent(
+        mechanism,
+        reference.constants(),
+        reference.numbers,
+        values,
+        np.array([remainder(angle, 2 * pi) for angle in phi]),
+        np.array(alpha),
+    )
+    kappa = np.empty((len(truths), len(mechanism.joints), 3))
+    for j, joint in enumerate(mechanism.joints.values()):
+        if isinstance(joint, Turn):
+            change = tangent.turn[joint.child] - tangent.turn[joint.parent]
+        else:
+            change = tangent.slide[joint]
+        kappa[:, j] = np.abs(change).sum(axis=2).T
+    sizes = np.array([[series(y) for y in truth.joints] for truth in truths]).real
+    return (kappa + _at_least_half_a_turn(reference, sizes)) * FACTORIALS
+
+
+def exact_condition_numbers(
+    reference: Reference, phi: float, alpha: float, apart: bool = False
+) -> Array | None:
+    """
+    Return κ of one case by differences in balls, [joint, derivative]; None where it is singular.
+
+    Parameters
+    ----------
+    reference
+        The linkage.
+    phi, alpha
+        Input angle and acceleration.
+    apart
+        Whether each number is to change by itself even where the linkage says what hangs together.
+
+    """
+    base = reference.solve(phi, alpha, _PRECISION)
+    if base.outcome is not Outcome.CLOSED:
+        return None
+    precision = base.precision
+    ctx.prec = precision
+    step = arb(2) ** -_STEP
+    numbers = reference.numbers
+    ties = reference.mechanism.ties
+    if ties is None or apart:
+        ties = tuple({key: value} for key, value in numbers.items() if value)
+    kappa = np.zeros((len(base.joints), 3))
+    exact = _coefficients(base)
+
+    def add(changed: Truth) -> None:
+        nonlocal kappa
+        for j, (one, other) in enumerate(zip(exact, _coefficients(changed), strict=True)):
+            for k in range(3):
+                kappa[j, k] += abs(float((other[k] - one[k]) / step))
+
+    for tie in ties:
+        varied: dict[Key, Any] = dict(numbers)
+        for key, change in tie.items():
+            varied[key] = arb(numbers[key]) + step * arb(change)
+        add(Reference(reference.mechanism, varied).solve(phi, alpha, precision))
+    turned = remainder(phi, 2 * pi)
+    add(reference.solve(arb(phi) + step * arb(turned), alpha, precision))
+    add(reference.solve(phi, arb(alpha) * (1 + step), precision))
+    # By the rate ω, which a motion has as 1: y' is as ω, and y'' = g·ω² + h·α.
+    for j, y in enumerate(exact):
+        kappa[j, 1] += abs(float(y[1]))
+    still = _coefficients(reference.solve(phi, 0.0, precision))
+    for j, y in enumerate(still):
+        kappa[j, 2] += 2 * abs(float(y[2]))
+    sizes = np.array([[float(c) for c in y] for y in exact])
+    kappa += _at_least_half_a_turn(reference, sizes[None])[0]
+    if ties is reference.mechanism.ties:
+        # What hangs together may not move at all: κ would be 0, but terms as great as the
+        # crank's own rate and acceleration are rounded to come to that.
+        kappa[:, 1:] = np.maximum(kappa[:, 1:], (1.0, max(1.0, abs(alpha))))
+    return kappa * FACTORIALS
+
+
+def _coefficients(truth: Truth) -> list[list[Any]]:
+    return [[y[0], y[1], y[2]] for y in truth.joints]
+
+
+def _at_least_half_a_turn(reference: Reference, sizes: Array) -> Array:
+    sizes = np.abs(sizes)
+    for j, joint in enumerate(reference.mechanism.joints.values()):
+        if isinstance(joint, Turn):
+            # Within (-π, π] none is greater.
+            sizes[:, j, 0] = pi
+    return sizes

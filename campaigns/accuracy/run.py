@@ -1,0 +1,117 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The campaign: what there is to be done, done in parts, by as many processes as are wanted.
+
+Each linkage has a generator of its own, seeded by the campaign's seed, its family and its number:
+what comes out does not depend on how the work was shared, and any linkage can be made again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from math import ceil
+import multiprocessing
+import random
+from typing import NamedTuple
+
+from campaigns.accuracy.adversarial import ADVERSARIAL
+from campaigns.accuracy.judge import Findings, judge
+from campaigns.accuracy.mechanism import Mechanism
+from campaigns.accuracy.random_families import ANGLES, RANDOM
+from campaigns.accuracy.tally import Tally
+
+_PART = 20
+"""Linkages that a process is given at a time: about a tenth of a second's work."""
+
+_FEWEST_ANGLES = 5
+
+
+class Part(NamedTuple):
+    """Some linkages of a family, or the rest of them until there are cases enough."""
+
+    seed: int
+    family: str
+    first: int
+    size: int
+
+
+def make(seed: int, family: str, index: int) -> tuple[Mechanism, list[float], list[float]]:
+    """Return a linkage of a family with its input angles and accelerations."""
+    rng = random.Random(f'{seed}/{family}/{index}')
+    generate = RANDOM[family][1] if family in RANDOM else ADVERSARIAL[family].make
+    mechanism, phi = generate(rng)
+    return mechanism, phi, [rng.gauss(0.0, 1.0) for _ in phi]
+
+
+def examine(seed: int, family: str, index: int) -> Findings:
+    """Judge one linkage."""
+    return judge(*make(seed, family, index))
+
+
+def parts(cases: int, adversarial: int, seed: int) -> list[Part]:
+    """Return the work for at least as many cases."""
+    shares = sum(share for share, _ in RANDOM.values())
+    wanted = {
+        family: ceil(cases * share / shares / ANGLES) for family, (share, _) in RANDOM.items()
+    }
+    for family in ADVERSARIAL:
+        # As many linkages as it takes by the number of angles that its first one has.
+        angles = len(make(seed, family, 0)[1])
+        wanted[family] = ceil(adversarial / len(ADVERSARIAL) / angles)
+    return [
+        Part(seed, family, first, min(_PART, count - first))
+        for family, count in wanted.items()
+        for first in range(0, count, _PART)
+    ]
+
+
+def do(part: Part) -> tuple[Part, Tally]:
+    """Do one part."""
+    tally = Tally()
+    for index in range(part.first, part.first + part.size):
+        tally.add(index, examine(part.seed, part.family, index))
+    return part, tally
+
+
+def run(
+    work: list[Part], jobs: int, progress: Callable[[Part], None] | None = None
+) -> dict[str, Tally]:
+    """
+    Do all parts and return what was found by family.
+
+    Parameters
+    ----------
+    work
+        The parts.
+    jobs
+        How many processes; 1: this one.
+    progress
+        Called with each part when it is done.
+
+    """
+    tallies = {family: Tally() for family in (*RANDOM, *ADVERSARIAL)}
+    with ExitStack() as stack:
+        done: Iterator[tuple[Part, Tally]] = map(do, work)
+        if jobs > 1:
+            # Spawned, not forked: whoever calls may have threads.
+            pool = stack.enter_context(multiprocessing.get_context('spawn').Pool(jobs))
+            done = pool.imap_unordered(do, work)
+        for part, tally in done:
+            tallies[part.family].merge(tally)
+            if progress is not None:
+                progress(part)
+    return {family: tally for family, tally in tallies.items() if tally.counts}

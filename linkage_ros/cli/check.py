@@ -1,0 +1,221 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Say what a linkage is: freedom, order of solution, four-bars, ranges, toggles, transmission."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from math import remainder, tau
+from threading import Event
+
+from linkage_ros.cli.linkage_file import angle_text, open_linkage, value_text
+from linkage_ros.cli.tables import show, Table
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.four_bars import four_bars
+from linkage_ros.kinematics.groups import Driven, Dyad, Group
+from linkage_ros.kinematics.survey import (
+    conditionings,
+    Extreme,
+    Extremes,
+    transmission_angles,
+    Way,
+    worst_residual,
+)
+
+_PLACES = 4
+"""How many places of one extreme are named."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('file', help='the linkage file')
+
+
+def run(arguments: argparse.Namespace, _stop: Event) -> int:
+    """Check the linkage; a file with an error in it has been refused when this returns."""
+    closure = open_linkage(arguments.file)
+    for number, table in enumerate(tables(closure, arguments.file)):
+        if number:
+            print()
+        show(table)
+    return 0
+
+
+def tables(closure: Closure, title: str) -> Iterator[Table]:
+    """Yield what there is to say of a linkage."""
+    way = Way(closure) if len(closure.linkage.inputs) == 1 else None
+    yield Table(title, ('', ''), list(_facts(closure, way)))
+    yield Table(
+        'Solved in this order', ('>', 'group', 'links', 'how', 'assembly'), _groups(closure)
+    )
+    loops = [
+        (
+            str(bar.group + 1),
+            ', '.join(bar.links),
+            ', '.join(f'{length:.6g}' for length in bar.lengths),
+            f'{bar.kind.margin:+.4g}' if bar.kind.margin else '0',
+            bar.kind.code,
+            bar.kind.name,
+        )
+        for bar in four_bars(closure.structure)
+    ]
+    if loops:
+        yield Table(
+            'Four-bars: input, coupler, output and the frame that they are seen from',
+            ('>', 'links', 'lengths [m]', '>Grashof margin [m]', 'Barker', 'name'),
+            loops,
+        )
+    if way is not None:
+        angles = transmission_angles(way)
+        if angles:
+            rows = [_extremes(closure, i, ends, way.turning) for i, ends in angles.items()]
+            heads = ['>', 'links', '>least', 'at', '>greatest', 'at']
+            yield Table('Transmission angles over the range, acute', heads, rows)
+        ratios = conditionings(way)
+        if ratios:
+            rows = [_conditioning(closure, i, ends, way.turning) for i, ends in ratios.items()]
+            heads = ['>', 'links', '>least', 'at']
+            yield Table('Conditioning over the range, of what is iterated', heads, rows)
+
+
+def describe_group(closure: Closure, number: int) -> tuple[str, str, str, str]:
+    """Return kind, links, way of solution and assembly of a group."""
+    group: Group = closure.structure.groups[number]
+    if isinstance(group, Driven):
+        given = closure.linkage.inputs[group.index]
+        place = f'{"pin" if group.joint.kind == "R" else "slider"} {group.joint.name}'
+        return 'input', group.joint.link, f'{given.joint}, {place} on {group.joint.to}', ''
+    if isinstance(group, Dyad):
+        links = ', '.join(' + '.join(body) for body in group.bodies)
+        return f'{group.kind} dyad', links, 'closed form', _assembly(closure, group)
+    (equations,) = (
+        step.equations
+        for step, owner in zip(closure.steps, closure.step_groups, strict=True)
+        if owner == number and hasattr(step, 'equations')
+    )
+    return (
+        f'{len(group.links)} links',
+        ', '.join(group.links),
+        f"iterated: Newton's method, {equations} equations",
+        'as the pose of the file',
+    )
+
+
+def _facts(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
+    linkage, structure = closure.linkage, closure.structure
+    moving = len(structure.links) - 1
+    pins = sum(joint.kind == 'R' for joint in structure.joints)
+    sliders = len(structure.joints) - pins
+    blocks = moving + 1 - len(linkage.links)
+    beside = f' and {blocks} block(s) in slots' if blocks else ''
+    yield 'moving links', f'{len(linkage.links) - 1}{beside}'
+    named = [point for points in linkage.links.values() for point in points]
+    shared = any(named.count(point) > 2 for point in named)
+    twice = ' (one of three links counts twice)' if shared else ''
+    yield 'joints', f'{pins} pins{twice}, {sliders} sliders'
+    yield 'loops', str(len(structure.joints) - moving)
+    yield 'degrees of freedom', f'{structure.freedom}, as many as there are inputs'
+    for given in linkage.inputs:
+        driven = (
+            f'slide of {given.slider} [m]'
+            if given.slider
+            else f'angle of {given.child} to {given.parent}'
+        )
+        yield 'input', f'{given.joint}: {driven}'
+    yield from _reach(closure, way)
+    worst, at, count = worst_residual(closure)
+    names = [not given.slider for given in linkage.inputs]
+    place = ', '.join(value_text(value, turning) for value, turning in zip(at, names, strict=True))
+    yield 'worst residual', f'{worst:.1e} m, of {count} positions, at {place}'
+
+
+def _reach(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
+    if way is None:
+        yield 'range', 'no single one: it depends on every input'
+        return
+    for interval in way.ranges:
+        if not interval.whole:
+            low, high = (value_text(value, way.turning) for value in interval[:2])
+            yield 'range', f'{low} to {high}'
+        elif interval.highest > 1.5 * tau:
+            yield 'range', 'every angle; the motion repeats after two turns'
+        else:
+            yield 'range', 'every angle'
+    toggles = [end for one in way.ranges if not one.whole for end in one[:2]]
+    changes = [
+        value
+        for value in closure.critical_inputs
+        if not any(
+            abs(remainder(value - end, tau) if way.turning else value - end) < 1e-12
+            for end in toggles
+        )
+    ]
+    for name, places in (('toggles', toggles), ('change points', changes)):
+        said = ', '.join(value_text(value, way.turning) for value in places)
+        yield name, said or 'none'
+
+
+def _groups(closure: Closure) -> list[tuple[str, ...]]:
+    count = len(closure.structure.groups)
+    return [(str(number + 1), *describe_group(closure, number)) for number in range(count)]
+
+
+def _assembly(closure: Closure, dyad: Dyad) -> str:
+    first, second = dyad.outer
+    closing = dyad.inner.name
+    if dyad.kind == 'RRR':
+        side = closure.linkage.assembly[closing]
+        return f'pin {closing} {side} of {first.name}→{second.name}'
+    if dyad.kind == 'RPR':
+        side = closure.linkage.assembly[closing]
+        return f'slider {closing}: pin {second.name} {side} of {first.name}'
+    if dyad.kind == 'RRP':
+        side = closure.linkage.assembly[second.name]
+        return f'slider {second.name}: pin {closing} {side} of {first.name}'
+    return 'the only one'
+
+
+def _links(closure: Closure, number: int) -> str:
+    return describe_group(closure, number)[1]
+
+
+def _extremes(closure: Closure, number: int, found: Extremes, turning: bool) -> tuple[str, ...]:
+    lowest, highest = found
+    return (
+        str(number + 1),
+        _links(closure, number),
+        angle_text(lowest.value, 2),
+        _places(lowest, turning),
+        angle_text(highest.value, 2),
+        _places(highest, turning),
+    )
+
+
+def _conditioning(
+    closure: Closure, number: int, found: Extremes, turning: bool
+) -> tuple[str, ...]:
+    lowest = found.lowest
+    links = _links(closure, number)
+    return str(number + 1), links, f'{lowest.value:.4f}', _places(lowest, turning)
+
+
+def _places(extreme: Extreme, turning: bool) -> str:
+    if not extreme.at:
+        return 'everywhere'
+    said = [angle_text(at, 2) if turning else f'{at + 0.0:.6g} m' for at in extreme.at[:_PLACES]]
+    more = len(extreme.at) - _PLACES
+    return ', '.join(said) + (f' and {more} more' if more > 0 else '')

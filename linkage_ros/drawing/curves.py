@@ -1,0 +1,133 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What is drawn over the range of an input: joints, paths of points, travels of sliders."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan, pi, remainder, tau
+from typing import NamedTuple
+
+from linkage_ros.kinematics.ranges import InputRange
+from linkage_ros.kinematics.survey import samples, Way
+
+_SAME_PATH = 0.01
+"""How far a path may be from another, of its length, and be drawn as the same."""
+
+
+class Curve(NamedTuple):
+    """
+    A joint over the input, in [rad] or [m].
+
+    Angles are in (−π, π]; where one begins a new turn, a NaN lifts the pen between its two ends.
+    """
+
+    name: str
+    turning: bool
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+
+
+class Sweep(NamedTuple):
+    """
+    A linkage as its input goes through a range.
+
+    Attributes
+    ----------
+    joints
+        The published joints.
+    paths
+        For each traced point its path, in [m].
+    travels
+        Lowest and highest slide of each slider, in [m].
+
+    """
+
+    joints: tuple[Curve, ...]
+    paths: dict[str, tuple[complex, ...]]
+    travels: dict[str, tuple[float, float]]
+
+
+def sweep(way: Way, interval: InputRange) -> Sweep:
+    """Move a linkage through a range."""
+    closure = way.closure
+    linkage = closure.linkage
+    carriers = {
+        point: next(link for link, points in linkage.links.items() if point in points)
+        for point in linkage.traced
+    }
+    x: list[float] = []
+    values: list[tuple[float, ...]] = []
+    paths: dict[str, list[complex]] = {point: [] for point in carriers}
+    slides: dict[str, list[float]] = {name: [] for name in linkage.sliders}
+    for value in samples(interval):
+        position = way.position(value)
+        if not position.joints:
+            continue
+        x.append(value)
+        values.append(position.joints)
+        points = closure.points(position)
+        for point, path in paths.items():
+            path.append(points[carriers[point], point])
+        for name, slide in closure.slide_values(position).items():
+            slides[name].append(slide)
+    joints = []
+    for i, (name, turning) in enumerate(zip(linkage.joints, closure.turning, strict=True)):
+        y = [value[i] for value in values]
+        xs, ys = wrapped_curve(x, y) if turning else (x, y)
+        joints.append(Curve(name, turning, tuple(xs), tuple(ys)))
+    return Sweep(
+        tuple(joints),
+        {point: drawn_once(path) for point, path in paths.items()},
+        {name: (min(s), max(s)) for name, s in slides.items()},
+    )
+
+
+def wrapped_curve(x: Sequence[float], y: Sequence[float]) -> tuple[list[float], list[float]]:
+    """
+    Wrap an angle to (−π, π], and lift the pen where it begins a new turn.
+
+    The two ends at ±π are found along the straight line between the samples.
+    """
+    xs: list[float] = []
+    ys: list[float] = []
+    for place, angle in zip(x, y, strict=True):
+        rest = remainder(angle, tau)
+        if ys and abs(rest - ys[-1]) > pi:
+            edge = pi if ys[-1] > 0.0 else -pi
+            way = rest + 2.0 * edge - ys[-1]
+            part = (edge - ys[-1]) / way if way else 0.0
+            middle = xs[-1] + part * (place - xs[-1])
+            xs += [middle, middle, middle]
+            ys += [edge, nan, -edge]
+        xs.append(place)
+        ys.append(rest)
+    return xs, ys
+
+
+def drawn_once(path: Sequence[complex]) -> tuple[complex, ...]:
+    """Return a path, of one that comes back on itself only the way there: dashes would close."""
+    if len(path) < 3:
+        return tuple(path)
+    one = max(range(len(path)), key=lambda i: abs(path[i] - path[0]))
+    other = max(range(len(path)), key=lambda i: abs(path[i] - path[one]))
+    first, last = min(one, other), max(one, other) + 1
+    there = path[first:last]
+    near = _SAME_PATH * abs(path[one] - path[other])
+    back = (*path[:first], *path[last:])
+    if all(min(abs(place - known) for known in there) <= near for place in back[::4]):
+        return tuple(there)
+    return tuple(path)

@@ -1,0 +1,329 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A linkage in a pose as an engineer draws it: shapes in metres, in the frame of the ground.
+
+Nothing here knows what paints them. A shape has a role, from which follows how it looks, and the
+name of the part that it belongs to; the shapes come in the order in which they are painted, what
+lies on top last. Links are bars, or plates where they have three points that are not in line.
+"""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from collections.abc import Iterable, Mapping, Sequence
+from math import ceil, pi, tau
+from typing import Literal, NamedTuple
+
+from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.linkage import GROUND, Slider
+
+Role = Literal[
+    'link', 'input', 'plate', 'block', 'tube', 'rail', 'slot', 'ground', 'hatch', 'pin', 'ghost'
+]
+"""What a shape is; ``input`` is a link that is driven."""
+
+Travels = Mapping[str, tuple[float, float]]
+"""Lowest and highest slide of each slider in the drawing, in [m]."""
+
+_FLAT = 1e-6
+"""How far off their line, of its length, points may lie and be in line."""
+
+_ARC = pi / 8.0
+
+
+class Polygon(NamedTuple):
+    """A filled area."""
+
+    role: Role
+    name: str
+    corners: tuple[complex, ...]
+
+
+class Segment(NamedTuple):
+    """A straight line."""
+
+    role: Role
+    name: str
+    start: complex
+    end: complex
+
+
+class Circle(NamedTuple):
+    """A circle about a pin."""
+
+    role: Role
+    name: str
+    centre: complex
+    radius: float
+
+
+Shape = Polygon | Segment | Circle
+
+
+class _Pose(NamedTuple):
+    """A linkage in a pose, as all that is drawn here sees it."""
+
+    closure: Closure
+    points: dict[tuple[str, str], complex]
+    angles: dict[str, float]
+    slides: dict[str, float]
+    travels: Travels
+    size: float
+
+
+def shapes(closure: Closure, position: Position, size: float, travels: Travels) -> list[Shape]:
+    """
+    Draw a linkage.
+
+    Parameters
+    ----------
+    closure, position
+        The linkage, and a position that closes.
+    size
+        Half the width of a bar, in [m]; all symbols go by it.
+    travels
+        How far rails have to go.
+
+    """
+    pose = _Pose(
+        closure,
+        closure.points(position),
+        closure.link_angles(position),
+        closure.slide_values(position),
+        travels,
+        size,
+    )
+    linkage, structure = closure.linkage, closure.structure
+    cylinders = [name for name in linkage.sliders if _is_cylinder(pose, name)]
+    drawn: list[Shape] = []
+    for name, slider in linkage.sliders.items():
+        if slider.along == GROUND:
+            drawn += _ground_rail(pose, name, slider)
+    for place in _supports(pose):
+        drawn += _support(place, size)
+    driven = driven_links(closure)
+    links = [
+        _link(pose, link, 'input' if link in driven else 'link', cylinders)
+        for link in linkage.links
+        if link != GROUND
+    ]
+    # Plates hide least below the bars, and what is driven is to be seen.
+    for parts in sorted(links, key=_layer):
+        drawn += parts
+    for name, slider in linkage.sliders.items():
+        if name not in cylinders:
+            drawn.append(_block(pose, name, slider))
+    pins = {
+        point: place
+        for (_, point), place in pose.points.items()
+        if sum(point in points for points in structure.links.values()) > 1
+    }
+    drawn += [Circle('pin', point, place, 0.55 * size) for point, place in pins.items()]
+    return drawn
+
+
+def skeleton(closure: Closure, position: Position) -> list[Segment]:
+    """Return the links of a linkage as lines from point to point, for a pose in the background."""
+    points = closure.points(position)
+    blocks = closure.structure.blocks
+    drawn = []
+    for link, named in closure.linkage.links.items():
+        if link == GROUND:
+            continue
+        places = [points[link, point] for point in named]
+        for name, slider in closure.linkage.sliders.items():
+            if slider.along == link:
+                places.append(points[blocks[name], slider.point])
+        corners = hull(places)
+        ends = [*corners[1:], corners[0]] if len(corners) > 2 else corners[1:]
+        drawn += [Segment('ghost', link, *line) for line in zip(corners, ends, strict=False)]
+    return drawn
+
+
+def driven_links(closure: Closure) -> set[str]:
+    """Return the links that an input places against their parent."""
+    found = set()
+    for given in closure.linkage.inputs:
+        if given.slider:
+            found.add(closure.structure.blocks[given.slider])
+        elif given.child != GROUND:
+            found.add(given.child)
+        else:
+            found.add(given.parent)
+    return found
+
+
+def hull(points: Iterable[complex]) -> list[complex]:
+    """
+    Return the corners of the smallest convex area around points, counter-clockwise.
+
+    Of points in line, the two farthest; of one place, that one. (A. M. Andrew's chain.)
+    """
+    places = sorted(set(points), key=lambda p: (p.real, p.imag))
+    if len(places) < 3:
+        return places
+    slack = _FLAT * max(abs(p - places[0]) for p in places) ** 2
+
+    def chain(ordered: Iterable[complex]) -> list[complex]:
+        corners: list[complex] = []
+        for place in ordered:
+            while len(corners) > 1:
+                edge, onward = corners[-1] - corners[-2], place - corners[-2]
+                if edge.real * onward.imag - edge.imag * onward.real > slack:
+                    break
+                corners.pop()
+            corners.append(place)
+        return corners[:-1]
+
+    return chain(places) + chain(reversed(places))
+
+
+def rounded(corners: Sequence[complex], radius: float) -> tuple[complex, ...]:
+    """Return the outline at a distance around the corners of a convex area, in order."""
+    if len(corners) == 1:
+        steps = round(tau / _ARC)
+        return tuple(corners[0] + rect(radius, i * _ARC) for i in range(steps))
+    outline = []
+    for i, corner in enumerate(corners):
+        coming = phase(corner - corners[i - 1]) - 0.5 * pi
+        turn = (phase(corners[(i + 1) % len(corners)] - corner) - 0.5 * pi - coming) % tau
+        steps = max(1, ceil(turn / _ARC - 1e-9))
+        outline += [corner + rect(radius, coming + turn * j / steps) for j in range(steps + 1)]
+    return tuple(outline)
+
+
+def _layer(parts: Sequence[Shape]) -> int:
+    roles = {shape.role for shape in parts}
+    return 2 if 'input' in roles else 0 if 'plate' in roles else 1
+
+
+def _is_cylinder(pose: _Pose, name: str) -> bool:
+    """Return whether a slider is one of a rod in a tube: both links move, and turn together."""
+    slider = pose.closure.linkage.sliders[name]
+    lowest, _ = pose.travels[name]
+    return bool(slider.block) and slider.along != GROUND != slider.block and lowest > 0.0
+
+
+def _supports(pose: _Pose) -> list[complex]:
+    """Return the pins of the ground."""
+    links = pose.closure.structure.links
+    return [
+        pose.points[GROUND, point]
+        for point in links[GROUND]
+        if any(point in points for link, points in links.items() if link != GROUND)
+    ]
+
+
+def _support(pivot: complex, size: float) -> list[Shape]:
+    """Draw a pivot of the ground: a triangle that stands on hatched ground."""
+    foot, half = pivot - 2.6j * size, 1.7 * size
+    return [
+        Polygon('ground', GROUND, (pivot, foot - half, foot + half)),
+        *_hatch(foot - 1.4 * half, foot + 1.4 * half, size),
+    ]
+
+
+def _hatch(start: complex, end: complex, size: float) -> list[Shape]:
+    """Draw the surface of the ground, which lies to the right of start→end."""
+    along = (end - start) / abs(end - start)
+    count = max(3, round(abs(end - start) / (0.9 * size)))
+    stroke = along * complex(-0.7, -0.9) * size
+    ticks = [start + (end - start) * (i + 0.8) / count for i in range(count)]
+    return [
+        Segment('rail', GROUND, start, end),
+        *(Segment('hatch', GROUND, tick, tick + stroke) for tick in ticks),
+    ]
+
+
+def _line(pose: _Pose, slider: Slider) -> tuple[complex, complex]:
+    """Return where the line of a slider starts, and its direction."""
+    direction = complex(*slider.direction)
+    unit = direction / abs(direction) * rect(1.0, pose.angles[slider.along])
+    return pose.points[slider.along, slider.through], unit
+
+
+def _rail_ends(pose: _Pose, name: str, beyond: float) -> tuple[complex, complex]:
+    start, unit = _line(pose, pose.closure.linkage.sliders[name])
+    lowest, highest = pose.travels[name]
+    return start + unit * (lowest - beyond), start + unit * (highest + beyond)
+
+
+def _ground_rail(pose: _Pose, name: str, slider: Slider) -> list[Shape]:
+    """Draw a line of the ground: the surface that the block slides on, hatched below."""
+    size = pose.size
+    start, end = _rail_ends(pose, name, 3.0 * size)
+    _, unit = _line(pose, slider)
+    upright = abs(unit.real) <= _FLAT
+    if unit.real < -_FLAT or (upright and unit.imag > 0.0):
+        # The ground is to lie below, or left of what runs upright.
+        start, end, unit = end, start, -unit
+    below = -1j * unit * 1.5 * size
+    return _hatch(start + below, end + below, size)
+
+
+def _block(pose: _Pose, name: str, slider: Slider) -> Polygon:
+    centre = pose.points[pose.closure.structure.blocks[name], slider.point]
+    _, unit = _line(pose, slider)
+    driven = any(given.slider == name for given in pose.closure.linkage.inputs)
+    half, across = 2.2 * pose.size * unit, 1.5j * pose.size * unit
+    return Polygon(
+        'input' if driven else 'block',
+        name,
+        (
+            centre + half + across,
+            centre - half + across,
+            centre - half - across,
+            centre + half - across,
+        ),
+    )
+
+
+def _link(pose: _Pose, link: str, role: Role, cylinders: Sequence[str]) -> list[Shape]:
+    """Draw a link: its points, and as much of its rails as is used."""
+    linkage, size = pose.closure.linkage, pose.size
+    places = [pose.points[link, point] for point in linkage.links[link]]
+    drawn: list[Shape] = []
+    slots: list[Shape] = []
+    for name, slider in linkage.sliders.items():
+        if name in cylinders:
+            lowest, highest = pose.travels[name]
+            start, unit = _line(pose, slider)
+            if link == slider.along:
+                length = max(lowest - 2.0 * size, 0.5 * lowest)
+                across = 1j * unit * 1.7 * size
+                near, far = start - across, start + unit * length - across
+                tube = (near, far, far + 2.0 * across, near + 2.0 * across)
+                drawn.append(Polygon('tube', link, tube))
+            elif link == slider.block:
+                place = pose.points[link, slider.point]
+                inside = max(highest - lowest, 2.0 * size) + 2.0 * size
+                inside = min(inside, pose.slides[name] - 0.5 * size)
+                places.append(place - unit * inside)
+        elif link == slider.along:
+            ends = _rail_ends(pose, name, 2.6 * size)
+            if len(hull([*places, *ends])) < 3:
+                places += ends
+            else:
+                slots.append(Segment('slot', name, *_rail_ends(pose, name, 0.0)))
+                places += ends
+    corners = hull(places)
+    if len(corners) > 1:
+        thick = size if len(corners) == 2 else 0.9 * size
+        kind: Role = 'plate' if len(corners) > 2 and role == 'link' else role
+        thin = any(link == linkage.sliders[name].block for name in cylinders)
+        drawn.append(Polygon(kind, link, rounded(corners, 0.7 * size if thin else thick)))
+    return [*reversed(drawn), *slots]

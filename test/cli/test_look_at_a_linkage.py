@@ -1,0 +1,361 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``linkage check``, ``solve`` and ``draw``: what a user types and reads, on real files."""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+import csv
+import io
+import json
+from math import acos, degrees, pi, radians, remainder, tau
+import os
+from pathlib import Path
+import pty
+import subprocess
+import sys
+
+import pytest
+
+from .conftest import environment, Run
+
+LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
+FILES = sorted(LINKAGES.glob('*.yaml'))
+NAMES = [file.stem for file in FILES]
+
+FOUR_BAR = str(LINKAGES / 'four_bar.yaml')
+COMMANDS = ('check', 'solve', 'draw')
+
+
+def shipped(name: str) -> str:
+    return str(LINKAGES / f'{name}.yaml')
+
+
+# What `check` must say of each linkage, in words of its file's head and of its textbook.
+SAID = {
+    'andrews_squeezer': ['RRR dyad', 'every angle', 'loops               3'],
+    'class_3': ["Newton's method, 12 equations", 'crank_arm, platform, lower_arm, upper_arm'],
+    'double_rocker': ['double rocker', '36.870°', '101.537°', 'GRCR'],
+    'drag_link': ['double crank (drag link)', 'GCCC'],
+    'elliptic_trammel': ['RRP dyad', 'slide of driven_slot [m]', '0.12 m', 'ahead of X'],
+    'excavator_bucket': ['cylinder_tube + cylinder_rod', '0.682846 m', '1.32285 m'],
+    'five_bar': ['degrees of freedom  2', 'it depends on every input'],
+    'four_bar': ['crank-rocker', 'GCRR', 'toggles             none', 'pin B left of A→O4'],
+    'hoeken': ['crank-rocker', '23.07°'],
+    'inverted_slider_crank': ['RPR dyad', 'everywhere', 'pin C ahead of B'],
+    'jansen_leg': ['crank-rocker', '8.65°', 'loops               3'],
+    'klann_leg': ['connecting_arm, lower_rocker', 'pin hip left of knee→upper_axle'],
+    'parallelogram': ['parallelogram (change point)', 'S2X', '180.000° (3.14159 rad)'],
+    'peaucellier': ['82.819°', 'rhombus'],
+    'scotch_yoke': ['RPP dyad', 'the only one', '90.00°'],
+    'slider_crank': ['RRP dyad', '69.08°', '270.00°'],
+    'stephenson_3': ['drag_link, output_lever'],
+    'watt_1': ['crank-rocker', 'rocker, output_link, upper_link, coupler'],
+    'whitworth_quick_return': ['RPR dyad', 'RRP dyad'],
+    'windscreen_wiper': ['crank-rocker', 'passenger_wiper'],
+}
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_check_says_what_each_linkage_is(linkage: Run, name: str) -> None:
+    answer = linkage('check', shipped(name))
+    assert answer.returncode == 0, answer.stderr
+    for words in (*SAID[name], 'Solved in this order', 'worst residual', 'input'):
+        assert words in answer.stdout
+
+
+def edited(tmp_path: Path, old: str, new: str) -> str:
+    text = Path(FOUR_BAR).read_text('utf-8')
+    assert old in text
+    (tmp_path / 'edited.yaml').write_text(text.replace(old, new), 'utf-8')
+    return 'edited.yaml'
+
+
+@pytest.mark.parametrize(
+    ('new', 'said'),
+    [
+        ('  extra: {C: [0, 0], B: [0.1, 0]}\n', "'extra'|links.extra: is free"),
+        ('  extra: {O4: [0, 0], B: [0.1, 0]}\n', 'extra'),
+        ('  extra: {X: [0, 0], Y: [0.1, 0]}\n', 'links.extra: no chain of pins and sliders'),
+    ],
+)
+@pytest.mark.parametrize('command', COMMANDS)
+def test_a_link_too_free_or_held_too_well_is_named_in_a_line(
+    linkage: Run, tmp_path: Path, command: str, new: str, said: str
+) -> None:
+    file = edited(tmp_path, 'input: {', f'{new}input: {{')
+    answer = linkage(command, file)
+    assert answer.returncode == 2
+    assert answer.stdout == ''
+    assert answer.stderr.count('\n') == 1
+    assert answer.stderr.startswith(f'linkage {command}: edited.yaml:')
+    assert any(words in answer.stderr for words in said.split('|'))
+
+
+def test_check_on_a_terminal_draws_tables(tmp_path: Path) -> None:
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'linkage_ros.cli.main', 'check', FOUR_BAR],
+        cwd=tmp_path,
+        env=environment(tmp_path) | {'TERM': 'xterm-256color', 'COLUMNS': '160', 'LINES': '40'},
+        stdout=theirs,
+    )
+    os.close(theirs)
+    shown = b''
+    while True:
+        try:
+            part = os.read(ours, 65536)
+        except OSError:  # a pty's way to say that the other end is closed
+            break
+        shown += part
+    os.close(ours)
+    assert process.wait(30) == 0
+    assert '╭' in shown.decode()
+    # Units in brackets are no markup.
+    assert 'lengths [m]' in shown.decode()
+
+
+def by_hand(a: float, b: float, c: float, d: float, phi: float) -> tuple[float, float]:
+    """Return coupler and rocker joint of a four-bar on the left, by two circles."""
+    crank_pin = rect(a, phi)
+    across = d - crank_pin
+    s = abs(across)
+    along = (b * b - c * c + s * s) / (2.0 * s)
+    b_pin = crank_pin + across / s * complex(along, (b * b - along * along) ** 0.5)
+    return phase(b_pin - crank_pin) - phi, phase(b_pin - d)
+
+
+def test_solve_gives_full_precision_at_the_inputs_asked_for(linkage: Run) -> None:
+    answer = linkage('solve', FOUR_BAR, '--at', '40', '--at=-100.5', '--format', 'json')
+    assert answer.returncode == 0, answer.stderr
+    told = json.loads(answer.stdout)
+    assert told['units'] == {
+        'crank_joint': '°', 'gap': 'm', 'coupler_joint': '°', 'rocker_joint': '°',
+    }  # fmt: skip
+    assert [state['status'] for state in told['states']] == ['closed', 'closed']
+    for state, phi in zip(told['states'], (40.0, -100.5), strict=True):
+        assert state['crank_joint'] == phi
+        coupler, rocker = by_hand(0.04, 0.12, 0.08, 0.1, radians(phi))
+        for name, expected in (('coupler_joint', coupler), ('rocker_joint', rocker)):
+            assert abs(remainder(radians(state[name]) - expected, tau)) < 1e-14
+            assert -180.0 < state[name] <= 180.0
+
+
+def test_solve_reads_and_tells_radians(linkage: Run) -> None:
+    answer = linkage('solve', FOUR_BAR, '--radians', '--at', '1', '--format', 'csv')
+    (row,) = csv.DictReader(io.StringIO(answer.stdout))
+    coupler, rocker = by_hand(0.04, 0.12, 0.08, 0.1, 1.0)
+    assert row['crank_joint [rad]'] == '1.0'
+    assert float(row['coupler_joint [rad]']) == pytest.approx(coupler, abs=1e-14)
+    assert float(row['rocker_joint [rad]']) == pytest.approx(rocker, abs=1e-14)
+
+
+def test_a_table_says_that_it_is_in_degrees(linkage: Run) -> None:
+    head, row = linkage('solve', FOUR_BAR, '--at', '90').stdout.splitlines()
+    assert 'crank_joint [°]' in head
+    assert row.split()[0] == '90.000000'
+    assert 'status' in head
+    assert 'closed' in row
+
+
+def test_a_sweep_goes_over_the_whole_range_from_toggle_to_toggle(linkage: Run) -> None:
+    answer = linkage('solve', shipped('elliptic_trammel'), '--steps', '6', '--format', 'csv')
+    rows = list(csv.DictReader(io.StringIO(answer.stdout)))
+    assert len(rows) == 7
+    assert [row['status'] for row in rows] == ['toggle', *['closed'] * 5, 'toggle']
+    assert float(rows[0]['trammel_slide [m]']) == pytest.approx(-0.12, abs=1e-14)
+    for row in rows:
+        x, y = float(row['trammel_slide [m]']), float(row['cross_slide [m]'])
+        assert x * x + y * y == pytest.approx(0.0144, abs=1e-15)
+
+
+def test_a_sweep_can_be_bounded_and_told_where_it_is_open(linkage: Run) -> None:
+    answer = linkage(
+        *('solve', shipped('double_rocker'), '--from', '30', '--to', '60', '--steps', '3'),
+        *('--format', 'json'),
+    )
+    states = json.loads(answer.stdout)['states']
+    assert [state['left_rocker_joint'] for state in states] == pytest.approx([30, 40, 50, 60])
+    assert [state['status'] for state in states] == ['open', 'closed', 'closed', 'closed']
+    assert states[0]['gap'] > 0.0
+    assert states[0]['coupler_joint'] is None
+    assert states[1]['gap'] == 0.0
+
+
+def test_rates_and_accelerations_are_what_positions_do(linkage: Run) -> None:
+    """Against central differences of positions, of joints and of a traced point."""
+    step = 1e-3  # s; at 20 °/s and 5 °/s²
+    at = [f'{50.0 + 20.0 * t + 0.5 * 5.0 * t * t!r}' for t in (-step, 0.0, step)]
+    answer = linkage(
+        *('solve', shipped('jansen_leg'), '--at', at[0], '--at', at[1], '--at', at[2]),
+        *('--rate', '20', '--acceleration', '5', '--points', '--format', 'json'),
+    )
+    assert answer.returncode == 0, answer.stderr
+    before, now, after = json.loads(answer.stdout)['states']
+    names = [name.removesuffix(' rate') for name in now if name.endswith(' rate')]
+    assert {'leg_joint', 'foot.x', 'foot.y'} <= set(names)
+    for name in names:
+        rate = (after[name] - before[name]) / (2.0 * step)
+        change = (after[name] - 2.0 * now[name] + before[name]) / step**2
+        assert now[f'{name} rate'] == pytest.approx(rate, rel=1e-6, abs=1e-6)
+        assert now[f'{name} acceleration'] == pytest.approx(change, rel=1e-4, abs=1e-4)
+
+
+def test_several_inputs_come_with_commas(linkage: Run) -> None:
+    answer = linkage(
+        *('solve', shipped('five_bar'), '--at', '120,60', '--points', '--format', 'json')
+    )
+    (state,) = json.loads(answer.stdout)['states']
+    assert (state['left_crank_joint'], state['right_crank_joint']) == (120.0, 60.0)
+    assert state['P.x'] == pytest.approx(0.06, abs=1e-15)  # in the middle, by symmetry
+    # The elbows are 0.12 + 2·0.09·cos 60° apart.
+    height = 0.09 * 3.0**0.5 / 2.0 + (0.11**2 - 0.105**2) ** 0.5
+    assert state['P.y'] == pytest.approx(height, abs=1e-14)
+
+
+def test_an_answer_goes_into_a_file_of_the_kind_of_its_name(linkage: Run, tmp_path: Path) -> None:
+    for name, begins in (('a.csv', 'crank_joint [°],'), ('a.json', '{'), ('a.txt', 'crank')):
+        answer = linkage('solve', FOUR_BAR, '--at', '1', '-o', name)
+        assert answer.stdout == f'{name}\n'
+        assert (tmp_path / name).read_text('utf-8').startswith(begins)
+
+
+def test_rates_at_a_toggle_are_left_out(linkage: Run) -> None:
+    limit = degrees(acos(0.8))
+    answer = linkage(
+        *('solve', shipped('double_rocker'), '--at', repr(limit), '--rate', '1'),
+        *('--format', 'json'),
+    )
+    (state,) = json.loads(answer.stdout)['states']
+    if state['status'] == 'toggle':  # within the last floats of it
+        assert state['coupler_joint'] is not None
+        assert state['coupler_joint rate'] is None
+
+
+PNG = b'\x89PNG\r\n\x1a\n'
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_every_shipped_linkage_is_drawn(linkage: Run, tmp_path: Path, name: str) -> None:
+    answer = linkage('draw', shipped(name), '--names')
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout == f'{name}.png\n'
+    assert (tmp_path / f'{name}.png').read_bytes().startswith(PNG)
+
+
+def test_a_picture_is_the_same_each_time(linkage: Run, tmp_path: Path) -> None:
+    for kind in ('svg', 'png'):
+        drawn = []
+        for number in range(2):
+            file = tmp_path / f'{number}.{kind}'
+            assert linkage('draw', FOUR_BAR, '-o', str(file), '--at', '40').returncode == 0
+            drawn.append(file.read_bytes())
+        assert drawn[0] == drawn[1]
+
+
+def test_a_pose_and_what_lies_behind_it_can_be_named(linkage: Run, tmp_path: Path) -> None:
+    answer = linkage(
+        *('draw', FOUR_BAR, '--at', '40', '--at', '80', '--at=-20', '--names', '-o', 'x.svg')
+    )
+    assert answer.returncode == 0, answer.stderr
+    assert '<!-- four_bar, crank_joint 40° -->' in (tmp_path / 'x.svg').read_text('utf-8')
+
+
+def test_a_pose_that_does_not_close_says_where_it_does(linkage: Run) -> None:
+    answer = linkage('draw', shipped('double_rocker'), '--at', '10')
+    assert answer.returncode == 2
+    assert 'left_rocker_joint 10°: open' in answer.stderr
+    assert '36.8699 to 101.537°' in answer.stderr
+
+
+def test_without_matplotlib_a_line_says_what_to_install(tmp_path: Path) -> None:
+    code = (
+        'import sys; sys.modules["matplotlib"] = None\n'
+        'import importlib.util as u; find = u.find_spec\n'
+        'u.find_spec = lambda name, *a: None if name == "matplotlib" else find(name, *a)\n'
+        'from linkage_ros.cli.main import main\n'
+        f'sys.exit(main(["draw", {FOUR_BAR!r}]))\n'
+    )
+    answer = subprocess.run(
+        [sys.executable, '-c', code],
+        cwd=tmp_path,
+        env=environment(tmp_path),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert answer.returncode == 2
+    assert 'pip install linkage_ros[report]' in answer.stderr
+    assert 'Traceback' not in answer.stderr
+
+
+BAD = [
+    (['check'], 'file'),
+    (['check', 'missing.yaml'], 'missing.yaml: cannot be read'),
+    (['solve', FOUR_BAR, '--at', 'soon'], 'soon'),
+    (['solve', FOUR_BAR, '--at', 'nan'], 'nan'),
+    (['solve', FOUR_BAR, '--at', '1,2'], '2 value(s) for 1 input(s)'),
+    (['solve', shipped('five_bar'), '--at', '1'], 'LEFT_CRANK_JOINT,RIGHT_CRANK_JOINT'),
+    (['solve', shipped('five_bar')], '--sweep: there are 2 inputs'),
+    (['solve', FOUR_BAR, '--steps', '0'], '0 is no number of steps'),
+    (['solve', FOUR_BAR, '--steps', 'x'], 'x is no number of steps'),
+    (['solve', FOUR_BAR, '--from', '1,2'], '1,2 is no number'),
+    (['solve', FOUR_BAR, '--points'], 'the linkage traces none'),
+    (['solve', FOUR_BAR, '--degrees', '--radians'], 'not allowed with'),
+    (['solve', FOUR_BAR, '--format', 'xml'], 'xml'),
+    (['solve', FOUR_BAR, '--at', '1', '-o', 'no/such.csv'], 'no/such.csv: cannot be written'),
+    (['draw', FOUR_BAR, '-o', 'no/such.png'], 'no/such.png: cannot be written'),
+    (['draw', FOUR_BAR, '-o', 'picture.docx'], 'picture.docx: cannot be written'),
+]
+
+
+@pytest.mark.parametrize(
+    ('typed', 'named'), BAD, ids=[' '.join(Path(word).name for word in row[0]) for row in BAD]
+)
+def test_wrong_input_is_answered_in_a_line(linkage: Run, typed: list[str], named: str) -> None:
+    answer = linkage(*typed)
+    assert answer.returncode == 2
+    assert named in answer.stderr
+    assert 'Traceback' not in answer.stderr
+    assert answer.stdout == ''
+
+
+@pytest.mark.parametrize('command', COMMANDS)
+def test_every_command_explains_itself(linkage: Run, command: str) -> None:
+    answer = linkage(command, '--help')
+    assert answer.returncode == 0
+    assert answer.stdout.startswith(f'usage: linkage {command}')
+    assert f'\n  {command} ' in linkage('--help').stdout
+
+
+def test_solving_takes_neither_ros_nor_matplotlib(tmp_path: Path) -> None:
+    code = (
+        'import sys\nfrom linkage_ros.cli.main import main\n'
+        f'main(["solve", {FOUR_BAR!r}, "--at", "40"])\n'
+        'sys.exit(any(name in sys.modules for name in ("rclpy", "matplotlib", "numpy")))\n'
+    )
+    answer = subprocess.run(
+        [sys.executable, '-c', code], cwd=tmp_path, capture_output=True, timeout=60, check=False
+    )
+    assert answer.returncode == 0, answer.stderr
+
+
+def test_a_full_turn_of_a_parallelogram_is_solved_by_continuity(linkage: Run) -> None:
+    answer = linkage('solve', shipped('parallelogram'), '--steps', '8', '--format', 'json')
+    for state in json.loads(answer.stdout)['states']:
+        crank = radians(state['crank_joint'])
+        assert abs(remainder(radians(state['follower_joint']) - crank, tau)) < 1e-14 * pi

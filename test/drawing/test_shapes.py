@@ -1,0 +1,227 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Shapes in metres: what is drawn is where the closure says that it is."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import cos, isnan, nan, pi, sin, tau
+from pathlib import Path
+import random
+
+from hypothesis import given
+from hypothesis import strategies as st
+from linkage_ros.drawing.curves import drawn_once, sweep, wrapped_curve
+from linkage_ros.drawing.labels import Label, place_labels
+from linkage_ros.drawing.shapes import Circle, hull, Polygon, rounded, Segment, shapes, skeleton
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.survey import usual_inputs, Way
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import read_yaml
+import pytest
+
+LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
+FILES = sorted(LINKAGES.glob('*.yaml'))
+SIZE = 0.002
+
+coordinates = st.integers(-50, 50)
+places = st.builds(complex, coordinates, coordinates)
+
+
+def drawn(name: str) -> tuple[Closure, dict[tuple[str, str], complex], list[object]]:
+    closure = Closure(read_linkage(read_yaml(LINKAGES / f'{name}.yaml')[0]))
+    inputs = usual_inputs(closure)
+    way = Way(closure, inputs)
+    position = closure.position(*inputs)
+    interval = way.range_about(inputs[0])
+    assert interval is not None
+    found = shapes(closure, position, SIZE, sweep(way, interval).travels)
+    return closure, closure.points(position), list(found)
+
+
+def left_of(point: complex, start: complex, end: complex) -> float:
+    edge, onward = end - start, point - start
+    return edge.real * onward.imag - edge.imag * onward.real
+
+
+def contains(polygon: Polygon, point: complex) -> bool:
+    """Return whether a convex polygon, counter-clockwise, contains a point."""
+    corners = polygon.corners
+    edges = zip(corners, (*corners[1:], corners[0]), strict=True)
+    return all(left_of(point, start, end) >= -1e-12 for start, end in edges)
+
+
+@given(st.lists(places, min_size=1, max_size=12))
+def test_a_hull_is_convex_and_holds_all_points(points: list[complex]) -> None:
+    corners = hull(points)
+    assert set(corners) <= set(points)
+    if len(corners) < 3:
+        # All in line: the two farthest.
+        farthest = max((abs(p - q) for p in points for q in points), default=0.0)
+        assert abs(corners[-1] - corners[0]) == farthest
+        return
+    for i, corner in enumerate(corners):
+        following = corners[(i + 1) % len(corners)]
+        assert all(left_of(p, corner, following) >= -0.011 for p in points)
+
+
+@given(st.lists(places, min_size=1, max_size=8), st.floats(0.1, 3.0))
+def test_an_outline_lies_at_its_distance(points: list[complex], radius: float) -> None:
+    corners = hull(points)
+    for place in rounded(corners, radius):
+        assert min(abs(place - corner) for corner in corners) == pytest.approx(radius)
+
+
+@pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
+def test_every_pin_is_a_circle_at_its_place(file: Path) -> None:
+    closure, points, found = drawn(file.stem)
+    circles = {shape.name: shape.centre for shape in found if isinstance(shape, Circle)}
+    carriers: dict[str, int] = {}
+    for named in closure.linkage.links.values():
+        for point in named:
+            carriers[point] = carriers.get(point, 0) + 1
+    assert {point for point, count in carriers.items() if count > 1} <= set(circles)
+    for (_, point), place in points.items():
+        if point in circles:
+            assert abs(circles[point] - place) < 1e-12
+
+
+@pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
+def test_every_link_is_drawn_around_all_its_points(file: Path) -> None:
+    closure, points, found = drawn(file.stem)
+    for link, named in closure.linkage.links.items():
+        if link == GROUND:
+            continue
+        blocks = [s for s, slider in closure.linkage.sliders.items() if slider.block == link]
+        bodies = [s for s in found if isinstance(s, Polygon) and s.name in (link, *blocks)]
+        assert bodies
+        for point in named:
+            assert any(contains(body, points[link, point]) for body in bodies)
+
+
+def test_ground_pivots_stand_on_hatched_ground() -> None:
+    _, points, found = drawn('four_bar')
+    tips = [s.corners[0] for s in found if isinstance(s, Polygon) and s.role == 'ground']
+    assert tips == [points[GROUND, 'O2'], points[GROUND, 'O4']]
+    assert sum(isinstance(s, Segment) and s.role == 'hatch' for s in found) >= 6
+
+
+def test_driven_links_are_told_apart_and_lie_on_top() -> None:
+    _, _, found = drawn('four_bar')
+    links = [
+        s.name for s in found if isinstance(s, Polygon) and s.role in ('link', 'plate', 'input')
+    ]
+    assert links == ['coupler', 'rocker', 'crank']
+
+
+def test_three_points_make_a_plate_and_points_in_line_a_bar() -> None:
+    _, _, found = drawn('klann_leg')
+    assert {s.name: s.role for s in found if isinstance(s, Polygon)}['leg'] == 'plate'
+    _, _, found = drawn('hoeken')
+    assert {s.name: s.role for s in found if isinstance(s, Polygon)}['coupler'] == 'link'
+
+
+def test_a_cylinder_is_a_rod_in_a_tube_and_a_slider_is_a_block() -> None:
+    _, points, found = drawn('excavator_bucket')
+    tube = next(s for s in found if isinstance(s, Polygon) and s.role == 'tube')
+    rod = next(s for s in found if isinstance(s, Polygon) and s.name == 'cylinder_rod')
+    assert any(contains(tube, corner) for corner in rod.corners)
+    assert not contains(tube, points['cylinder_rod', 'C'])
+    _, points, found = drawn('slider_crank')
+    block = next(s for s in found if isinstance(s, Polygon) and s.role == 'block')
+    assert sum(block.corners) / 4 == pytest.approx(points['connecting_rod', 'B'])
+
+
+def test_ghosts_run_from_pin_to_pin() -> None:
+    closure, points, _ = drawn('four_bar')
+    position = closure.position(*usual_inputs(closure))
+    lines = {frozenset((line.start, line.end)) for line in skeleton(closure, position)}
+    assert frozenset((points['crank', 'O2'], points['crank', 'A'])) in lines
+    assert len(lines) == 5  # crank, rocker, and three sides of the coupler
+
+
+@given(st.lists(st.floats(-0.5, 0.5), min_size=1, max_size=60), st.floats(-20.0, 20.0))
+def test_a_wrapped_curve_never_jumps_but_over_a_gap(steps: list[float], start: float) -> None:
+    angles = [start]
+    for step in steps:
+        angles.append(angles[-1] + step)
+    xs, ys = wrapped_curve(range(len(angles)), angles)
+    assert len(xs) == len(ys)
+    assert xs == sorted(xs)
+    for before, after in pairwise(ys):
+        if isnan(before) or isnan(after):
+            # The pen is lifted at one edge and set down at the other.
+            assert abs(after if isnan(before) else before) == pi
+        else:
+            assert abs(after - before) <= 0.5 + 1e-9
+    # Each sample is there still, but for whole turns.
+    there = [y for x, y in zip(xs, ys, strict=True) if x == int(x) and not isnan(y)]
+    for angle in angles:
+        assert any(abs(cos(y) - cos(angle)) + abs(sin(y) - sin(angle)) < 1e-9 for y in there)
+
+
+def test_a_turn_crosses_the_edge_where_the_line_does() -> None:
+    xs, ys = wrapped_curve([0.0, 1.0], [pi - 0.1, pi + 0.3])
+    assert xs == [0.0, *[pytest.approx(0.25)] * 3, 1.0]
+    assert ys == [pi - 0.1, pi, pytest.approx(nan, nan_ok=True), -pi, pytest.approx(0.3 - pi)]
+
+
+def test_traced_points_of_a_peaucellier_cell_run_straight() -> None:
+    closure = Closure(read_linkage(read_yaml(LINKAGES / 'peaucellier.yaml')[0]))
+    way = Way(closure)
+    path = sweep(way, way.ranges[0]).paths['P']
+    assert len(path) > 700
+    assert all(abs(place.real - 0.13125) < 1e-14 for place in path)
+
+
+def test_a_path_there_and_back_is_drawn_once_and_a_loop_as_it_is() -> None:
+    turn = [tau * i / 720 for i in range(721)]
+    arc = [complex(cos(sin(t)), sin(sin(t))) for t in turn]  # as a rocker's end goes
+    there = drawn_once(arc)
+    assert len(there) == 361
+    assert {there[0], there[-1]} == {arc[180], arc[540]}
+    loop = [complex(cos(t), 0.1 * sin(t)) for t in turn]
+    assert drawn_once(loop) == tuple(loop)
+
+
+def test_labels_have_room_and_do_not_overlap() -> None:
+    rng = random.Random(3)
+    labels = [
+        Label((complex(rng.uniform(100, 500), rng.uniform(100, 300)),), 40.0, 10.0, 6.0)
+        for _ in range(25)
+    ]
+    placed = place_labels(labels, [], (0j, 600.0 + 400.0j))
+    for i, one in enumerate(placed):
+        for other in placed[:i]:
+            apart = one.centre - other.centre
+            assert abs(apart.real) >= 40.0 or abs(apart.imag) >= 10.0
+
+
+def test_a_label_keeps_off_what_is_drawn_and_on_the_paper() -> None:
+    line = [complex(x, 50.0) for x in range(0, 200, 3)]
+    (found,) = place_labels([Label((100.0 + 50.0j,), 30.0, 8.0, 4.0)], line, (0j, 200.0 + 100.0j))
+    assert abs(found.centre.imag - 50.0) >= 4.0
+    (corner,) = place_labels([Label((0j,), 30.0, 8.0, 4.0)], [], (0j, 200.0 + 100.0j))
+    assert corner.centre.real >= 15.0
+    assert corner.centre.imag >= 4.0
+
+
+def test_a_whole_turn_of_an_outline_is_one_turn() -> None:
+    outline = rounded([0j], 1.0)
+    assert len(outline) == 16
+    assert all(abs(place) == pytest.approx(1.0) for place in outline)
+    assert tau / len(outline) == pytest.approx(pi / 8.0)
