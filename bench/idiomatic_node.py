@@ -43,7 +43,7 @@ class IdiomaticNode(Node):
         super().__init__('idiomatic_node')
         linkage = load_scene(scene).linkage
         self.closure = Closure(linkage)
-        self.crank_name = linkage.input.joint
+        self.crank_name = linkage.inputs[0].joint
         self.names = list(linkage.joints)
         self.crank: tuple[Time, float, float] | None = None
         self.publisher = self.create_publisher(JointState, 'joint_states', 10)
@@ -68,7 +68,7 @@ class IdiomaticNode(Node):
         message.header.stamp = now.to_msg()
         message.name = self.names
         message.position = position.joints
-        message.velocity = self.closure.rates(position, rate)
+        message.velocity = self.closure.velocity(position, rate).joints
         self.publisher.publish(message)
 
 

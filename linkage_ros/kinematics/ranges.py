@@ -83,7 +83,7 @@ def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
             intervals = shifted if exact else intervals
         elif hasattr(step, 'diagonal') or not _harmless(step):
             exact = False
-    if not exact:
+    if intervals and not exact:
         start, end = intervals[0][0], intervals[-1][1]
         closes = _closes(closure)
         intervals = [part for low, high in intervals for part in search(closes, low, high)]
