@@ -28,16 +28,18 @@ from math import atan2, cos, sin, sqrt
 from linkage_ros.kinematics.diagonal import (
     CrankDiagonal,
     Diagonal,
-    Growth,
     ROUNDING,
     SMALLEST,
 )
-from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose, RRRRates, sums
+from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose, sums
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new
 
 _CLOSED = Status.CLOSED
+
+_Rates = tuple[float, float, float, float, float, float]
+"""q, φ̇, the cotangents of β and γ', and the rates of both links by φ."""
 
 
 class CrankRRRDyad(RRRDyad):
@@ -120,7 +122,7 @@ class CrankRRRDyad(RRRDyad):
         )
         return new(RRRPose, (_CLOSED, 0.0, first, second, cross, diagonal, more, less))
 
-    def rates(self, pose: RRRPose, _known: State, speeds: State) -> RRRRates:
+    def rates(self, pose: RRRPose, _known: State, speeds: State) -> _Rates:  # type: ignore[override]
         """Append the rates of both links."""
         i, j, along = self._moving
         _, _, _, _, cross, (square, _, _, _, _, near, far, _), more, less = pose
@@ -129,17 +131,17 @@ class CrankRRRDyad(RRRDyad):
         v = speeds[0]
         base = v[j]
         swing = v[i] - base
-        v += (base + swing * (q * cot_gamma - p), base + swing * (q * cot_beta - p))
-        return new(RRRRates, (new(Growth, (complex(q, -p), swing, base)), cot_beta, cot_gamma))
+        first, second = q * cot_gamma - p, q * cot_beta - p
+        v += (base + swing * first, base + swing * second)
+        return q, swing, cot_beta, cot_gamma, first, second
 
-    def accelerations(
-        self, pose: RRRPose, rates: RRRRates, _known: State, _speeds: State, changes: State
+    def accelerations(  # type: ignore[override]  # of its own rates
+        self, pose: RRRPose, rates: _Rates, _known: State, _speeds: State, changes: State
     ) -> None:
         """Append the accelerations of both links."""
         i, j, fold_bracket, stretch_bracket, lengths, difference = self._pulling
         _, _, _, _, cross, (square, _, fold, stretch, _, near, far, _), _, _ = pose
-        (unit, swing, _), cot_beta, cot_gamma = rates
-        q, turned = unit.real, unit.imag
+        q, swing, cot_beta, cot_gamma, first, second = rates
         bend = fold_bracket * (far / fold) * (far / fold)
         bend -= stretch_bracket * (near / stretch) * (near / stretch)
         bend = 0.25 * bend / square
@@ -148,6 +150,6 @@ class CrankRRRDyad(RRRDyad):
         base = a[j]
         pull, whirl = a[i] - base, swing * swing
         a += (
-            base + pull * (turned + q * cot_gamma) + whirl * (swirl + cot_gamma * bend),
-            base + pull * (turned + q * cot_beta) + whirl * (swirl + cot_beta * bend),
+            base + pull * first + whirl * (swirl + cot_gamma * bend),
+            base + pull * second + whirl * (swirl + cot_beta * bend),
         )
