@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from cmath import rect
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.groups import find_groups, Structure
@@ -34,6 +34,10 @@ from linkage_ros.kinematics.solution import Planner
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import Pose, State
 from linkage_ros.tuples import new
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.batch.solve import Batch, Solver
+    from numpy.typing import ArrayLike
 
 _CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
 
@@ -145,7 +149,8 @@ class Closure:
             for name, point in points.items()
         }
         self.steps = steps
-        self._more_steps = tuple(planner.steps[len(steps) :])
+        needed = len(steps)
+        self._more_steps = tuple(planner.steps[needed:])
         self._closing = tuple(step.close for step in steps)
         self._rating = tuple(step.rates for step in steps)
         self._accelerating = tuple(step.accelerations for step in steps)
@@ -220,6 +225,47 @@ class Closure:
         for accelerate, pose, rate in zip(self._accelerating, poses, rates, strict=True):
             accelerate(pose, rate, state, speeds, changes)
         return new(Acceleration, (self._joints(a), changes))
+
+    def solve(
+        self,
+        *inputs: ArrayLike,
+        rates: Any = None,
+        accelerations: Any = None,
+        derivatives: int = 2,
+        out: Batch | None = None,
+    ) -> Batch:
+        """
+        Solve many states at once, as `position`, `velocity` and `acceleration` solve one.
+
+        Memory does not grow with the states beyond the results. Links that only iteration solves
+        are iterated state by state, no faster than one at a time.
+
+        Parameters
+        ----------
+        *inputs
+            For each driven joint an array of its values, in [rad] or [m]. A state with one that is
+            not finite is indeterminate.
+        rates, accelerations
+            Of the driven joints: for each a number, or an array of as many as there are states; of
+            a single one without a list. They are 1 if not given, for a single one, and 0.
+        derivatives
+            What is worked out: positions (0), velocities too (1), and accelerations (2).
+        out
+            Where the results go, and what is returned, if given: arrays of the right shape.
+
+        Raises
+        ------
+        ValueError
+            Where the arrays do not fit each other, the linkage or ``out``.
+
+        """
+        return self._solver.solve(inputs, rates, accelerations, derivatives, out)
+
+    @cached_property
+    def _solver(self) -> Solver:
+        from linkage_ros.kinematics.batch.solve import Solver  # local import: needs numpy
+
+        return Solver(self.steps, self._terms, self._factors or [1.0] * len(self.linkage.inputs))
 
     def points(self, position: Position) -> dict[tuple[str, str], complex]:
         """Return every point of every link, by link and name, in the ground's frame, in [m]."""

@@ -173,7 +173,8 @@ class Iteration:
 
     def close(self, known: State) -> IteratedPose:
         """Append the angles of the bodies, the slides, and the places of the bodies."""
-        inputs = known[0][1 : 1 + len(self._inputs)]
+        end = 1 + len(self._inputs)
+        inputs = known[0][1:end]
         start, value = self._nearest(inputs)
         solved = None
         if start is not None:

@@ -91,8 +91,24 @@ def starting_pose(
     known_places, known_angles = place_known(inputs)
     given = {name: complex(x, y) / scale for name, (x, y) in linkage.pose.points.items()}
     given |= known_places
-    rails = {blocks[name]: slider for name, slider in linkage.sliders.items()}
     angles = dict(known_angles)
+
+    def by_slider(link: str) -> float | None:
+        """Return the angle that a slider gives a link, by its other link or by its direction."""
+        for name, slider in linkage.sliders.items():
+            block, rail = blocks[name], slider.along
+            ends = slider.through, slider.point
+            if link not in (block, rail):
+                continue
+            turn = slider.angle if link == block else 0.0
+            if all(end in given for end in ends) and given[ends[0]] != given[ends[1]]:
+                along = given[ends[1]] - given[ends[0]]
+                return phase(along / complex(*slider.direction)) + turn
+            if link == block:
+                return angle_of(rail) + turn
+            if block in angles:
+                return angles[block] - slider.angle
+        return None
 
     def angle_of(link: str) -> float:
         if link not in angles:
@@ -101,14 +117,15 @@ def starting_pose(
             if apart:
                 there = given[apart[0]] - given[known[0]]
                 angles[link] = phase(there / (points[link][apart[0]] - points[link][known[0]]))
-            elif link in rails and known:
-                angles[link] = angle_of(rails[link].along) + rails[link].angle
             else:
-                raise DefinitionError(
-                    'pose.points',
-                    f'does not say where {link!r} lies',
-                    f'give two of its points: {", ".join(points[link])}',
-                )
+                found = by_slider(link)
+                if found is None:
+                    raise DefinitionError(
+                        'pose.points',
+                        f'does not say where {link!r} lies',
+                        f'give two of its points: {", ".join(points[link])}',
+                    )
+                angles[link] = found
         return angles[link]
 
     places = []

@@ -77,8 +77,10 @@ class Newton:
         ]
 
     def _named(self, unknown: list[Any]) -> dict[str, tuple[Any, ...]]:
-        links = {n: tuple(unknown[3 * i : 3 * i + 3]) for i, n in enumerate(self._links)}
-        rest = unknown[3 * len(self._links) :]
+        places = [*zip(unknown[0::3], unknown[1::3], unknown[2::3], strict=False)]
+        links = dict(zip(self._links, places, strict=False))
+        end = 3 * len(self._links)
+        rest = unknown[end:]
         return {**links, **{name: (rest[i],) for i, name in enumerate(self._sliders)}}
 
     def _equations(self, phi: Any, unknown: list[Any]) -> tuple[list[Any], list[list[Any]]]:

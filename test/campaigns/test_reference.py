@@ -32,6 +32,7 @@ from campaigns.accuracy.run import make
 from mpmath import mp, mpf
 import pytest
 
+from .newton import DIGITS, Newton
 from ..kinematics import reference as elsewhere  # noqa: TID252
 from ..kinematics.samples import (  # noqa: TID252
     FOUR_BARS,
@@ -39,7 +40,6 @@ from ..kinematics.samples import (  # noqa: TID252
     inverted_slider_cranks,
     SLIDER_CRANKS,
 )
-from .newton import DIGITS, Newton
 
 
 def as_mpf(ball: Any) -> mpf:

@@ -113,7 +113,7 @@ def test_the_input_turns_fully_where_its_letter_is_c(
         assert ranges[0].whole == (kind.code[1] == 'C')
     elif kind.code.startswith('R'):
         assert not any(interval.whole for interval in ranges)
-        assert max(high - low for low, high, _ in ranges) < 2.0 * pi < inf
+        assert max(high - low for low, high, *_ in ranges) < 2.0 * pi < inf
 
 
 def test_a_four_bar_of_a_file_is_found_with_its_lengths() -> None:

@@ -89,10 +89,10 @@ def test_ranges_of_random_four_bars_end_where_they_fold_and_stretch() -> None:
 def check_ranges(lengths: tuple[float, float, float, float], folds: bool, stretches: bool) -> None:
     """Compare the ranges with the reference's limit angles."""
     ranges = Closure(four_bar_linkage(lengths, 'left')).input_ranges
-    for low, high, _ in ranges:
+    for low, high, *_ in ranges:
         if not folds and not stretches:
             assert (low, high) == (-pi, pi)
-    ends = [abs(end) for low, high, _ in ranges for end in (low, high)]
+    ends = [abs(end) for low, high, *_ in ranges for end in (low, high)]
     if folds:
         angle, condition = end_of_range(*lengths, 'fold')
         # Behind the far side of the ground a range goes on, up to the same angle beyond.
@@ -113,7 +113,7 @@ def test_a_loop_closes_inside_its_ranges_and_nowhere_else(name: str) -> None:
     closure = Closure(four_bar_linkage(lengths, 'right'))
     for i in range(1, 400):
         phi = -pi + i * pi / 200 + 1e-4
-        inside = any(low <= phi + turn <= high for low, high, _ in closure.input_ranges
+        inside = any(low <= phi + turn <= high for low, high, *_ in closure.input_ranges
                      for turn in (0.0, 2 * pi))  # fmt: skip
         status = closure.position(phi).status
         assert (status is not Status.OPEN) == inside
@@ -134,7 +134,7 @@ def test_a_rod_s_range_ends_where_it_cannot_reach_its_swivel(
     lengths: tuple[float, float, float], whole: bool
 ) -> None:
     closure = Closure(inverted_slider_crank_linkage(lengths, 'ahead'))
-    ((low, high, _),) = closure.input_ranges
+    ((low, high, *_),) = closure.input_ranges
     if whole:
         assert (low, high) == (-pi, pi)
         return
@@ -152,7 +152,7 @@ def test_ranges_are_of_the_input_joint_and_turn_with_its_frame(angle: float) -> 
     lengths, _, _ = FOUR_BARS['both']
     plain = Closure(four_bar_linkage(lengths, 'left')).input_ranges
     turned = Closure(four_bar_linkage(lengths, 'left', {'crank': (0.1, 0.2, angle)})).input_ranges
-    for (low, high, _), (turned_low, turned_high, _) in zip(plain, turned, strict=True):
+    for (low, high, *_), (turned_low, turned_high, *_) in zip(plain, turned, strict=True):
         assert (turned_low, turned_high) == pytest.approx((low - angle, high - angle), abs=1e-14)
 
 

@@ -65,7 +65,7 @@ def test_a_single_change_point_needs_two_turns() -> None:
 
 def test_a_limited_range_lies_about_its_middle() -> None:
     """Its limit follows from one triangle: O, B and a point that is 0.075 m from B."""
-    ((low, high, _),) = Way(shipped('peaucellier')).ranges
+    ((low, high, *_),) = Way(shipped('peaucellier')).ranges
     # The arms close where |OB| = 0.125 − 0.05, and |OB| = 2·0.05·cos(φ/2).
     limit = 2.0 * acos(0.75)
     assert low == pytest.approx(-limit, abs=1e-14)
@@ -95,7 +95,7 @@ def test_the_other_inputs_are_held_along_a_way() -> None:
     """The elbows of the five-bar are 0.22 m apart at the ends of the left crank's way."""
     closure = shipped('five_bar')
     way = Way(closure, (radians(60.0), radians(60.0)))
-    ((low, high, _),) = way.ranges
+    ((low, high, *_),) = way.ranges
     b = complex(0.12 + 0.09 * cos(radians(60.0)), 0.09 * sin(radians(60.0)))
     for end in (low, high):
         a = complex(0.09 * cos(end), 0.09 * sin(end))

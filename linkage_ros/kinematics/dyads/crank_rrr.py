@@ -122,7 +122,9 @@ class CrankRRRDyad(RRRDyad):
         )
         return new(RRRPose, (_CLOSED, 0.0, first, second, cross, diagonal, more, less))
 
-    def rates(self, pose: RRRPose, _known: State, speeds: State) -> _Rates:  # type: ignore[override]
+    def rates(  # type: ignore[override]  # more of them
+        self, pose: RRRPose, _known: State, speeds: State
+    ) -> _Rates:
         """Append the rates of both links."""
         i, j, along = self._moving
         _, _, _, _, cross, (square, _, _, _, _, near, far, _), more, less = pose
