@@ -67,6 +67,8 @@ class Pipeline:
     ----------
     scene
         The scene.
+    closure
+        Its linkage, where that is at hand: it remembers nothing, and serves every reset.
 
     Raises
     ------
@@ -79,8 +81,8 @@ class Pipeline:
 
     __slots__ = ('_drive', '_path', '_reader', 'closure')
 
-    def __init__(self, scene: Scene) -> None:
-        self.closure = Closure(scene.linkage)
+    def __init__(self, scene: Scene, closure: Closure | None = None) -> None:
+        self.closure = closure or Closure(scene.linkage)
         self._reader = JointStateReader([driven.joint for driven in scene.linkage.inputs])
         called_for = {*scene.effects, *(n for name in scene.effects for n in NEEDS.get(name, ()))}
         effects = {name: import_module(EFFECTS[name]) for name in EFFECTS if name in called_for}

@@ -31,6 +31,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros import pacing
 from linkage_ros.ros.bag_topics import bag_topic
@@ -223,8 +224,11 @@ class LinkageNode(LifecycleNode):
 
     def _build_loop(self, scene: Scene) -> TickLoop:
         shared = self.crank_topic == self._joint_states.topic_name
+        closure = Closure(scene.linkage)
+        # Found before the first tick, which would wait for it: iterated links are followed there.
+        _ = closure.critical_inputs
         return TickLoop(
-            partial(Pipeline, scene),
+            partial(Pipeline, scene, closure),
             partial(self._crank.handle.take_message, JointState, True),
             self._joint_states.handle.publish_raw,
             JointStateWriter(list(scene.linkage.joints)).names if shared else b'',
