@@ -293,3 +293,40 @@ def test_a_rejected_message_leaves_the_next_ticks_as_they_were():
     for message, reason in bad:
         assert disturbed.offer(message, BEGIN) is reason
         assert disturbed.tick(BEGIN) == clean.tick(BEGIN)
+
+
+GALLERY = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
+
+
+@pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
+def test_a_linkage_of_the_gallery_moves_as_its_rates_and_accelerations_say(file):
+    scene = pipeline(b'effects: {velocity: {}, acceleration: {}}', file.read_bytes())
+    closure = scene.closure
+    inputs = closure.linkage.inputs
+    if len(inputs) == 1:
+        interval = max(closure.input_ranges, key=lambda r: r.highest - r.lowest)
+        span = interval.highest - interval.lowest
+        begin, rate = interval.lowest + 0.4 * span, 0.1 * span
+    else:
+        begin, rate = 1.5, 0.1
+    writer = JointStateWriter([driven.joint for driven in inputs])
+    assert scene.offer(
+        writer.write(BEGIN, [begin] * len(inputs), [rate] * len(inputs)), BEGIN
+    ) is None  # fmt: skip
+    # The newest sample is carried forward for 0.1 s, at a constant rate.
+    step = 1e-3
+    motions = [scene.tick(BEGIN + i * MS) for i in range(100)]
+    states = [read(tick.message) for tick in motions]
+    assert all(len(state.position) == len(closure.linkage.joints) for state in states)
+    for before, state, after in zip(states, states[1:], states[2:], strict=False):
+        slope = (after.position - before.position) / (2 * step)
+        assert state.velocity == pytest.approx(slope, rel=1e-4, abs=1e-4)
+    trajectories = [
+        STORE.deserialize_cdr(tick.trajectory, 'trajectory_msgs/msg/JointTrajectory').points[0]
+        for tick in motions
+    ]
+    for before, point, after in zip(
+        trajectories, trajectories[1:], trajectories[2:], strict=False
+    ):
+        slope = (after.velocities - before.velocities) / (2 * step)
+        assert point.accelerations == pytest.approx(slope, rel=1e-4, abs=1e-4)
