@@ -103,9 +103,9 @@ def describe_group(closure: Closure, number: int) -> tuple[str, str, str, str]:
         links = ', '.join(' + '.join(body) for body in group.bodies)
         return f'{group.kind} dyad', links, 'closed form', _assembly(closure, group)
     (equations,) = (
-        step.equations
+        step.equation_count
         for step, owner in zip(closure.steps, closure.step_groups, strict=True)
-        if owner == number and hasattr(step, 'equations')
+        if owner == number and hasattr(step, 'equation_count')
     )
     return (
         f'{len(group.links)} links',

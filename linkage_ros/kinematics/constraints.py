@@ -22,16 +22,16 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.groups import Joint
-from linkage_ros.kinematics.iteration import (
+from linkage_ros.kinematics.equations import (
     Constraint,
     End,
     Facing,
-    Iteration,
     Meeting,
     OnLine,
     Parallel,
 )
+from linkage_ros.kinematics.groups import Joint
+from linkage_ros.kinematics.iteration import Iteration
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.starting_pose import starting_pose
 from linkage_ros.kinematics.status import Status

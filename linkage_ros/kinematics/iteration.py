@@ -31,19 +31,24 @@ gets too small, the assembly ends there: the linkage is at its limit.
 
 from __future__ import annotations
 
-from cmath import rect
 from collections.abc import Sequence
 from math import ceil, inf, remainder, tau
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
+from linkage_ros.kinematics.equations import (
+    along,
+    Array,
+    Constraint,
+    derivative,
+    equations,
+    line_motion,
+    OnLine,
+)
 from linkage_ros.kinematics.starting_pose import StartingPose
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State, Step
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.floating[Any]]
 
 _KNOTS = 256
 _SMALLEST_STEP = 2.0**-20
@@ -55,50 +60,6 @@ _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 
 _SINGULAR = 1e-11
 """Smallest singular value of the Jacobian, of the largest, below which no rate is told."""
-
-
-class End(NamedTuple):
-    """A point: of the body ``body`` at ``arm`` from its own point, or the pin ``pin``."""
-
-    body: int
-    arm: complex
-    pin: int = -1
-
-
-class Facing(NamedTuple):
-    """A direction: the angle of ``body``, or a coordinate, plus a constant, in [rad]."""
-
-    body: int
-    coordinate: int
-    direction: float
-
-
-class Meeting(NamedTuple):
-    """Two points meet."""
-
-    one: End
-    other: End
-
-
-class Parallel(NamedTuple):
-    """One link is at an angle to another: constant, or the input ``turn``, where that is not 0."""
-
-    one: Facing
-    other: Facing
-    angle: float
-    turn: int = 0
-
-
-class OnLine(NamedTuple):
-    """A point is on a line through another; with a ``slide``, an input, it is that far along."""
-
-    point: End
-    through: End
-    line: Facing
-    slide: int = 0
-
-
-Constraint = Meeting | Parallel | OnLine
 
 
 class IteratedPose(NamedTuple):
@@ -167,7 +128,7 @@ class Iteration:
         self._period = (spacing, not sliding[0] and len(sliding) == 1)
 
     @property
-    def equations(self) -> int:
+    def equation_count(self) -> int:
         """How many equations are solved at once."""
         return len(self._start)
 
@@ -186,7 +147,7 @@ class Iteration:
         x.extend(unknowns[0::3].tolist())
         pins.extend((unknowns[1::3] + 1j * unknowns[2::3]).tolist())
         for slide in self._slides:
-            x.append(_along(slide, known, unknowns).real)
+            x.append(along(slide, known, unknowns).real)
         pose = IteratedPose(Status.CLOSED, 0.0, unknowns, jacobian)
         singular = self.conditioning(pose) <= _SINGULAR
         return pose._replace(status=Status.TOGGLE) if singular else pose
@@ -194,11 +155,11 @@ class Iteration:
     def rates(self, pose: IteratedPose, known: State, speeds: State) -> Array:
         """Append the rates of what `close` has appended."""
         still = np.zeros_like(pose.unknowns)
-        drift = self._derivative(pose.unknowns, known, speeds, still, None, still)
+        drift = derivative(self._constraints, pose.unknowns, known, speeds, still, None, still)
         rates = np.linalg.solve(pose.jacobian, -drift)
         self._append(speeds, rates)
         for slide in self._slides:
-            motion = _line_motion(slide, pose.unknowns, known, speeds, rates, None, still)
+            motion = line_motion(slide, pose.unknowns, known, speeds, rates, None, still)
             speeds[0].append(motion[1].real)
         return rates
 
@@ -207,11 +168,11 @@ class Iteration:
     ) -> None:
         """Append the accelerations of what `close` has appended."""
         still = np.zeros_like(rates)
-        drift = self._derivative(pose.unknowns, known, speeds, rates, changes, still)
+        drift = derivative(self._constraints, pose.unknowns, known, speeds, rates, changes, still)
         solved = np.linalg.solve(pose.jacobian, -drift)
         self._append(changes, solved)
         for slide in self._slides:
-            motion = _line_motion(slide, pose.unknowns, known, speeds, rates, changes, solved)
+            motion = line_motion(slide, pose.unknowns, known, speeds, rates, changes, solved)
             changes[0].append(motion[2].real)
 
     def conditioning(self, pose: IteratedPose) -> float:
@@ -325,7 +286,7 @@ class Iteration:
         unknowns, last = start, inf
         size = 1.0 + float(np.abs(start).max())
         for _ in range(30):
-            errors, jacobian = self._equations(unknowns, known)
+            errors, jacobian = equations(self._constraints, unknowns, known)
             try:
                 step = np.linalg.solve(jacobian, -errors)
             except np.linalg.LinAlgError:
@@ -341,176 +302,12 @@ class Iteration:
 
     def _open(self, known: State, start: Array | None) -> IteratedPose:
         unknowns = self._start if start is None else start
-        errors, jacobian = self._equations(unknowns, known)
+        errors, jacobian = equations(self._constraints, unknowns, known)
         for _ in range(20):  # downhill, to tell how near the links come
             step = np.linalg.lstsq(jacobian, -errors, rcond=1e-6)[0]
             step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
-            trial, slope = self._equations(unknowns + step, known)
+            trial, slope = equations(self._constraints, unknowns + step, known)
             if np.abs(trial).max() >= np.abs(errors).max():
                 break
             unknowns, errors, jacobian = unknowns + step, trial, slope
         return IteratedPose(Status.OPEN, float(np.abs(errors).max()), unknowns, jacobian)
-
-    def _equations(self, unknowns: Array, known: State) -> tuple[Array, Array]:
-        """Return what the constraints are off by, and their derivatives by the unknowns."""
-        n = len(unknowns)
-        errors, rows = [], []
-        x = known[0]
-        values = unknowns.tolist()
-        for constraint in self._constraints:
-            if isinstance(constraint, Meeting):
-                (one, turn), (other, back) = (_place(e, values, known) for e in constraint)
-                errors += [one.real - other.real, one.imag - other.imag]
-                across, along = [0.0] * n, [0.0] * n
-                for end, arm, sign in (
-                    (constraint.one, turn, 1.0),
-                    (constraint.other, back, -1.0),
-                ):
-                    if end.body >= 0:
-                        k = 3 * end.body
-                        across[k] -= sign * arm.imag
-                        across[k + 1] += sign
-                        along[k] += sign * arm.real
-                        along[k + 2] += sign
-                rows += [across, along]
-            elif isinstance(constraint, Parallel):
-                turned = x[constraint.turn] if constraint.turn else 0.0
-                angle = _angle(constraint.one, values, x) - _angle(constraint.other, values, x)
-                errors.append(remainder(angle - constraint.angle - turned, tau))
-                row = [0.0] * n
-                for facing, sign in ((constraint.one, 1.0), (constraint.other, -1.0)):
-                    if facing.body >= 0:
-                        row[3 * facing.body] += sign
-                rows.append(row)
-            else:
-                error, row = _line_equation(constraint, values, known, n)
-                errors.append(error)
-                rows.append(row)
-        return np.array(errors), np.array(rows)
-
-    def _derivative(
-        self,
-        unknowns: Array,
-        known: State,
-        speeds: State,
-        rates: Array,
-        changes: State | None,
-        accelerations: Array,
-    ) -> Array:
-        """Return the first derivative of the constraints; the second, where changes are given."""
-        order = 1 if changes is None else 2
-        found: list[float] = []
-        for constraint in self._constraints:
-            if isinstance(constraint, Meeting):
-                one, other = (
-                    _point_motion(e, unknowns, known, speeds, rates, changes, accelerations)[order]
-                    for e in constraint
-                )
-                found += [one.real - other.real, one.imag - other.imag]
-            elif isinstance(constraint, Parallel):
-                state = speeds if changes is None else changes
-                values = rates if changes is None else accelerations
-                one, other = (_turn(f, values, state) for f in (constraint.one, constraint.other))
-                driven = state[0][constraint.turn] if constraint.turn else 0.0
-                found.append(one - other - driven)
-            else:
-                moved = _line_motion(
-                    constraint, unknowns, known, speeds, rates, changes, accelerations
-                )[order]
-                if constraint.slide:
-                    state = speeds if changes is None else changes
-                    found.append(moved.real - state[0][constraint.slide])
-                else:
-                    found.append(moved.imag)
-        return np.array(found)
-
-
-def _angle(facing: Facing, unknowns: Sequence[float], x: Sequence[float]) -> float:
-    base = unknowns[3 * facing.body] if facing.body >= 0 else x[facing.coordinate]
-    return float(base + facing.direction)
-
-
-def _turn(facing: Facing, values: Any, state: State) -> float:
-    return float(values[3 * facing.body] if facing.body >= 0 else state[0][facing.coordinate])
-
-
-def _place(end: End, unknowns: Sequence[float], known: State) -> tuple[complex, complex]:
-    """Return a point, and its arm as it lies now."""
-    if end.body < 0:
-        return known[1][end.pin], 0j
-    k = 3 * end.body
-    arm = end.arm * rect(1.0, unknowns[k])
-    return complex(unknowns[k + 1], unknowns[k + 2]) + arm, arm
-
-
-def _along(line: OnLine, known: State, unknowns: Any) -> complex:
-    """Return a point in the frame of the line that it is to be on."""
-    point, through = (_place(e, unknowns, known)[0] for e in (line.point, line.through))
-    return (point - through) * rect(1.0, -_angle(line.line, unknowns, known[0]))
-
-
-def _line_equation(
-    line: OnLine, unknowns: Sequence[float], known: State, n: int
-) -> tuple[float, list[float]]:
-    back = rect(1.0, -_angle(line.line, unknowns, known[0]))
-    place = _along(line, known, unknowns)
-    columns: dict[int, complex] = {}
-    for end, sign in ((line.point, 1.0), (line.through, -1.0)):
-        if end.body >= 0:
-            k = 3 * end.body
-            arm = _place(end, unknowns, known)[1]
-            for column, slope in ((k, 1j * arm), (k + 1, 1.0 + 0j), (k + 2, 1j)):
-                columns[column] = columns.get(column, 0j) + sign * slope * back
-    if line.line.body >= 0:
-        k = 3 * line.line.body
-        columns[k] = columns.get(k, 0j) - 1j * place
-    row = [0.0] * n
-    for column, slope in columns.items():
-        row[column] = slope.real if line.slide else slope.imag
-    error = place.real - known[0][line.slide] if line.slide else place.imag
-    return error, row
-
-
-def _point_motion(
-    end: End,
-    unknowns: Array,
-    known: State,
-    speeds: State,
-    rates: Array,
-    changes: State | None,
-    accelerations: Array,
-) -> tuple[complex, complex, complex]:
-    """Return place, velocity and acceleration of a point."""
-    if end.body < 0:
-        pull = changes[1][end.pin] if changes is not None else 0j
-        return known[1][end.pin], speeds[1][end.pin], pull
-    k = 3 * end.body
-    place, arm = _place(end, unknowns.tolist(), known)
-    turn = float(rates[k])
-    velocity = complex(rates[k + 1], rates[k + 2]) + complex(0.0, turn) * arm
-    pull = complex(accelerations[k + 1], accelerations[k + 2])
-    return place, velocity, pull + complex(-turn * turn, float(accelerations[k])) * arm
-
-
-def _line_motion(
-    line: OnLine,
-    unknowns: Array,
-    known: State,
-    speeds: State,
-    rates: Array,
-    changes: State | None,
-    accelerations: Array,
-) -> tuple[complex, complex, complex]:
-    """Return place, velocity and acceleration of a point in the frame of its line."""
-    point, through = (
-        _point_motion(e, unknowns, known, speeds, rates, changes, accelerations)
-        for e in (line.point, line.through)
-    )
-    back = rect(1.0, -_angle(line.line, unknowns.tolist(), known[0]))
-    turn = _turn(line.line, rates, speeds)
-    change = _turn(line.line, accelerations, changes) if changes is not None else 0.0
-    place = (point[0] - through[0]) * back
-    velocity = (point[1] - through[1]) * back - complex(0.0, turn) * place
-    pull = (point[2] - through[2]) * back
-    pull -= complex(0.0, 2.0 * turn) * velocity + complex(-turn * turn, change) * place
-    return place, velocity, pull

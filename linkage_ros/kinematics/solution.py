@@ -13,18 +13,12 @@
 # limitations under the License.
 
 
-"""
-From the groups of a linkage to the steps that solve it, in numbers.
-
-Everything is in the unit of ``scale`` metres: a power of two near the longest length, so that
-scaling rounds nothing.
-"""
+"""From the groups of a linkage to the steps that solve it, in numbers."""
 
 from __future__ import annotations
 
 from cmath import phase, rect
-from collections.abc import Iterable, Mapping
-from math import frexp, hypot, inf, ldexp
+from math import inf
 
 from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.diagonal import (
@@ -41,12 +35,12 @@ from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad, swivel_diagonal
 from linkage_ros.kinematics.dyads.rrp import RRPDyad
 from linkage_ros.kinematics.dyads.rrr import crank_diagonal, RRRDyad
-from linkage_ros.kinematics.groups import Driven, Dyad, Iterated, Joint, Structure
+from linkage_ros.kinematics.groups import Driven, Dyad, Iterated, Structure
+from linkage_ros.kinematics.known_links import KnownLinks
 from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
-from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Point
-from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
+from linkage_ros.kinematics.linkage import Input, Linkage
+from linkage_ros.kinematics.places import Turned
 from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
-from linkage_ros.kinematics.step import Step
 
 _SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
 _SIDES['RPR'] = _SIDES['RRP']
@@ -56,7 +50,7 @@ _LEVEL = Angle(0, 0.0, 1 + 0j)
 """What a direction in the frame of the ground is measured from."""
 
 
-class Planner:
+class Planner(KnownLinks):
     """
     Makes the steps of a linkage, group after group.
 
@@ -67,42 +61,14 @@ class Planner:
     structure
         Its groups.
 
-    Attributes
-    ----------
-    scale
-        Metres in the unit of the lengths.
-    steps
-        In order; ``step_groups`` tells for each the number of its group.
-    angles, slides
-        Of links and sliders, in the coordinates.
-    points
-        Of every link, in its own frame and in the unit of the lengths.
-
     """
 
     def __init__(self, linkage: Linkage, structure: Structure) -> None:
-        self._linkage = linkage
-        self.blocks = structure.blocks
+        super().__init__(linkage, structure)
         self._joints = structure.joints
-        self.scale = _scale(structure.links.values())
-        self.points = {
-            link: {
-                name: complex(x / self.scale, y / self.scale) for name, (x, y) in points.items()
-            }
-            for link, points in structure.links.items()
-        }
-        self.steps: list[Step] = []
-        self.step_groups: list[int] = []
-        self.angles = {GROUND: Angle(0, 0.0, 1 + 0j)}
-        self.slides: dict[str, Slide] = {}
-        self._held: dict[str, Held] = {}
-        self._coordinates = 1 + len(linkage.inputs)
-        self._pins: dict[tuple[str, complex], int] = {}
-        self._pin_count = 0
-        self._group = 0
         self._assembly = dict(linkage.assembly)
         self._keys: list[str] = []
-        for self._group, group in enumerate(structure.groups):
+        for self.group, group in enumerate(structure.groups):
             if isinstance(group, Driven):
                 self._drive(group)
             elif isinstance(group, Dyad):
@@ -116,49 +82,6 @@ class Planner:
                 f'name {", ".join(map(repr, self._keys))}' if self._keys else 'leave it out',
             )
 
-    def place(self, link: str, point: complex) -> int:
-        """Return the index of a pin, with the steps that place it, for a known link's point."""
-        index = self._pins.get((link, point))
-        if index is not None:
-            return index
-        if link == GROUND:
-            self._add(FixedPoint(point))
-        else:
-            held = self._held[link]
-            if held.point == point:
-                index = self._place_held(held)
-                self._pins[link, point] = index
-                return index
-            base = self.place(link, held.point)
-            arm, angle = point - held.point, self.angles[link]
-            self._add(PointOnLink(base, self._pin_count, angle.coordinate, angle.unit * arm))
-        return self._new_pin(link, point)
-
-    def _place_held(self, held: Held) -> int:
-        if held.pin >= 0:
-            return held.pin
-        base = self.place(held.link, held.at)
-        if held.slide is None:
-            return base
-        angle, slide = self.angles[held.link], held.slide
-        unit = angle.unit * (slide.sign * held.direction)
-        self._add(PointOnRail(base, angle.coordinate, slide.coordinate, unit))
-        self._pin_count += 1
-        return self._pin_count - 1
-
-    def _new_pin(self, link: str, point: complex) -> int:
-        self._pins[link, point] = self._pin_count
-        self._pin_count += 1
-        return self._pin_count - 1
-
-    def _add(self, step: Step) -> None:
-        self.steps.append(step)
-        self.step_groups.append(self._group)
-
-    def _new_coordinates(self, count: int) -> int:
-        self._coordinates += count
-        return self._coordinates - count
-
     def _drive(self, driven: Driven) -> None:
         joint, index = driven.joint, 1 + driven.index
         angle = self.angles[joint.to]
@@ -166,18 +89,18 @@ class Planner:
             sign = 1.0 if self._linkage.inputs[driven.index].child == joint.link else -1.0
             coordinate = index
             if angle.coordinate or sign < 0.0:
-                self._add(Turned(angle.coordinate, index, sign))
-                coordinate = self._new_coordinates(1)
+                self.add(Turned(angle.coordinate, index, sign))
+                coordinate = self.new_coordinates(1)
             self.angles[joint.link] = Angle(coordinate, angle.constant, angle.unit)
-            self._held[joint.link] = Held(
+            self.held[joint.link] = Held(
                 self.points[joint.link][joint.name],
                 joint.to,
                 self.points[joint.to][joint.name],
             )
             return
-        point = self._point_of(joint.name, joint.link)
-        line = self._line(joint.name, joint.to, point)
-        self._ride(joint.link, point, joint.to, line, Slide(index, line.sign))
+        point = self.point_of(joint.name, joint.link)
+        line = self.line(joint.name, joint.to, point)
+        self.ride(joint.link, point, joint.to, line, Slide(index, line.sign))
         self.slides[joint.name] = Slide(index, 1.0)
 
     def _close(self, dyad: Dyad) -> None:
@@ -197,25 +120,25 @@ class Planner:
         first, second = dyad.outer
         closing = dyad.inner.name
         sign = self._sign(dyad.kind, closing, f'the side of {first.name}→{second.name}')
-        one_arm = self._arm(one, first.name, closing)
-        other_arm = self._arm(other, second.name, closing)
+        one_arm = self.arm(one, first.name, closing)
+        other_arm = self.arm(other, second.name, closing)
         b, c = abs(one_arm), abs(other_arm)
         diagonal: AnyDiagonal
         hinge = self._hinge(first.name, second.name)
         if hinge is None:
-            ends = self._place_pin(first.name), self._place_pin(second.name)
+            ends = self.place_pin(first.name), self.place_pin(second.name)
             diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c)), _LEVEL
         else:
             a, d, arms, offset, base = hinge
             diagonal = crank_diagonal(a, b, c, d, arms, offset, self._driven_only(arms))
         written_out = type(diagonal) is CrankDiagonal and CrankRRRDyad.fits(diagonal)
         kind = CrankRRRDyad if written_out else RRRDyad
-        self._add(kind(diagonal, b, c, sign))  # type: ignore[arg-type]  # as just asked
-        k = self._new_coordinates(2)
+        self.add(kind(diagonal, b, c, sign))  # type: ignore[arg-type]  # as just asked
+        k = self.new_coordinates(2)
         self.angles[one] = _facing(k, base, one_arm)
         self.angles[other] = _facing(k + 1, base, other_arm)
-        self._pin_to(one, first)
-        self._pin_to(other, second)
+        self.pin_to(one, first)
+        self.pin_to(other, second)
 
     def _rpr(self, dyad: Dyad) -> None:
         (rail,), (block,) = dyad.bodies
@@ -223,7 +146,7 @@ class Planner:
         name = dyad.inner.name
         sign = self._sign(dyad.kind, name, f'where {second.name} lies from {first.name}')
         start = self.points[rail][first.name]
-        line = self._line(name, rail, self.points[block][second.name])
+        line = self.line(name, rail, self.points[block][second.name])
         foot = (line.start - start) * line.direction.conjugate()
         offset = foot.imag
         if abs(offset) <= 4.0 * UNIT_ROUNDOFF * (abs(line.start) + abs(start)):
@@ -231,55 +154,55 @@ class Planner:
         diagonal: AnyDiagonal
         hinge = self._hinge(first.name, second.name)
         if hinge is None:
-            ends = self._place_pin(first.name), self._place_pin(second.name)
+            ends = self.place_pin(first.name), self.place_pin(second.name)
             diagonal, base = FreeDiagonal(ends, (abs(offset), inf)), _LEVEL
         else:
             a, d, arms, angle, base = hinge
             diagonal = swivel_diagonal(a, d, offset, arms, angle, self._driven_only(arms))
-        self._add(RPRDyad(diagonal, offset, sign))
-        k = self._new_coordinates(2)
+        self.add(RPRDyad(diagonal, offset, sign))
+        k = self.new_coordinates(2)
         self.angles[rail] = _facing(k, base, line.direction)
         self.angles[block] = self.angles[rail].plus(line.angle)
         self.slides[name] = Slide(k + 1, 1.0, -foot.real)
-        self._pin_to(rail, first)
-        self._pin_to(block, second)
+        self.pin_to(rail, first)
+        self.pin_to(block, second)
 
     def _rrp(self, dyad: Dyad) -> None:
         (link,), (block,) = dyad.bodies
         first, second = dyad.outer
         closing, name = dyad.inner.name, second.name
         sign = self._sign(dyad.kind, name, f'where {closing} lies from {first.name}')
-        arm = self._arm(link, first.name, closing)
+        arm = self.arm(link, first.name, closing)
         point = self.points[block][closing]
-        line = self._line(name, second.to, point)
+        line = self.line(name, second.to, point)
         base = self.angles[second.to].along(line.direction)
-        self._add(RRPDyad(self._rail(first.name, second.to, line, abs(arm)), sign))
-        k = self._new_coordinates(2)
+        self.add(RRPDyad(self._rail(first.name, second.to, line, abs(arm)), sign))
+        k = self.new_coordinates(2)
         self.angles[link] = _facing(k, base, arm)
-        self._pin_to(link, first)
-        self._ride(block, point, second.to, line, Slide(k + 1, 1.0))
+        self.pin_to(link, first)
+        self.ride(block, point, second.to, line, Slide(k + 1, 1.0))
         self.slides[name] = Slide(k + 1, line.sign)
 
     def _prp(self, dyad: Dyad) -> None:
         starts, arms, units = [], [], []
-        k = self._coordinates
+        k = self.coordinate_count
         for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
             point = self.points[body][dyad.inner.name]
-            line = self._line(outer.name, outer.to, point)
+            line = self.line(outer.name, outer.to, point)
             starts.append(self.place(outer.to, line.start))
             arms.append(self.angles[outer.to].coordinate)
             units.append(self.angles[outer.to].unit * line.direction)
-            self._ride(body, point, outer.to, line, Slide(k + i, 1.0))
+            self.ride(body, point, outer.to, line, Slide(k + i, 1.0))
             self.slides[outer.name] = Slide(k + i, line.sign)
-        self._add(PRPDyad((starts[0], starts[1]), (arms[0], arms[1]), (units[0], units[1])))
-        self._new_coordinates(2)
+        self.add(PRPDyad((starts[0], starts[1]), (arms[0], arms[1]), (units[0], units[1])))
+        self.new_coordinates(2)
 
     def _rpp(self, dyad: Dyad) -> None:
         (link,), (carrier,) = dyad.bodies
         first, second = dyad.outer
-        point = self._point_of(second.name, carrier)
-        outer = self._line(second.name, second.to, point)
-        inner = self._line(dyad.inner.name, carrier, self.points[link][first.name])
+        point = self.point_of(second.name, carrier)
+        outer = self.line(second.name, second.to, point)
+        inner = self.line(dyad.inner.name, carrier, self.points[link][first.name])
         turn = rect(1.0, outer.angle) * outer.direction.conjugate()
         unit = turn * inner.direction
         if abs(unit.imag) <= ROUNDING:
@@ -289,13 +212,13 @@ class Planner:
                 'give the two sliders different directions',
             )
         constant = (inner.start - point) * turn
-        self._add(RPPDyad(self._rail(first.name, second.to, outer, inf), constant, unit))
-        k = self._new_coordinates(2)
-        self._ride(carrier, point, second.to, outer, Slide(k + 1, 1.0))
+        self.add(RPPDyad(self._rail(first.name, second.to, outer, inf), constant, unit))
+        k = self.new_coordinates(2)
+        self.ride(carrier, point, second.to, outer, Slide(k + 1, 1.0))
         self.slides[second.name] = Slide(k + 1, outer.sign)
         self.slides[dyad.inner.name] = Slide(k, inner.sign)
         self.angles[link] = self.angles[carrier].plus(inner.angle)
-        self._pin_to(link, first)
+        self.pin_to(link, first)
 
     def _driven_rrr(self, dyad: Dyad) -> None:
         closing = dyad.inner.name
@@ -309,56 +232,27 @@ class Planner:
             )
             for outer, end in zip(dyad.outer, (dyad.inner.link, dyad.inner.to), strict=True)
         ]
-        ends = self._place_pin(first.name), self._place_pin(second.name)
-        self._add(DrivenRRRDyad(ends, (sides[0], sides[1]), sign))
-        k = self._new_coordinates(2)
+        ends = self.place_pin(first.name), self.place_pin(second.name)
+        self.add(DrivenRRRDyad(ends, (sides[0], sides[1]), sign))
+        k = self.new_coordinates(2)
         for i, outer in enumerate(dyad.outer):
             self.angles[outer.link] = Angle(k + i, 0.0, 1 + 0j)
-            self._pin_to(outer.link, outer)
+            self.pin_to(outer.link, outer)
 
     def _iterate(self, group: Iterated) -> None:
         from linkage_ros.kinematics.constraints import Constraints  # local import: it loads numpy
 
         constraints = Constraints(self._linkage, self._joints, group.links, self)
         slides = constraints.slides
-        self._add(constraints.iteration(tuple(self.steps)))
-        k = self._new_coordinates(len(group.links) + len(slides))
+        self.add(constraints.iteration(tuple(self.steps)))
+        k = self.new_coordinates(len(group.links) + len(slides))
         for i, link in enumerate(group.links):
             self.angles[link] = Angle(k + i, 0.0, 1 + 0j)
             point = next(iter(self.points[link].values()))
-            self._held[link] = Held(point, link, pin=self._pin_count + i)
-        self._pin_count += len(group.links)
+            self.held[link] = Held(point, link, pin=self.pin_count + i)
+        self.pin_count += len(group.links)
         for i, name in enumerate(slides):
             self.slides[name] = Slide(k + len(group.links) + i, 1.0)
-
-    def _pin_to(self, link: str, joint: Joint) -> None:
-        """Hold a link by a pin that is known."""
-        self._held[link] = Held(
-            self.points[link][joint.name], joint.to, self.points[joint.to][joint.name]
-        )
-
-    def _ride(self, link: str, point: complex, on: str, line: Line, slide: Slide) -> None:
-        """Hold a link by a slider, without turning."""
-        self.angles[link] = self.angles[on].plus(line.angle)
-        self._held[link] = Held(point, on, line.start, slide, line.direction)
-
-    def _point_of(self, slider: str, link: str) -> complex:
-        """Return the point by which a link takes part in a slider."""
-        given = self._linkage.sliders[slider]
-        return self.points[link][given.through if link == given.along else given.point]
-
-    def _line(self, name: str, on: str, point: complex) -> Line:
-        """Return the way of a point of the one link of a slider as the other link sees it."""
-        slider = self._linkage.sliders[name]
-        through = self.points[slider.along][slider.through]
-        sliding = self.points[self.blocks[name]][slider.point]
-        direction = complex(*slider.direction)
-        direction /= abs(direction)
-        if on == slider.along:
-            start = through + rect(1.0, slider.angle) * (point - sliding)
-            return Line(start, direction, slider.angle, 1.0)
-        start = sliding + rect(1.0, -slider.angle) * (point - through)
-        return Line(start, direction * rect(1.0, -slider.angle), -slider.angle, -1.0)
 
     def _carries(self, start: str, end: str) -> tuple[Carry, ...]:
         """Return the way from one link of a body to another, through its driven joints."""
@@ -379,25 +273,13 @@ class Planner:
 
     def _carry(self, index: int, given: Input, inner: str, outer: str) -> Carry:
         if given.slider:
-            point = self._point_of(given.slider, inner)
-            line = self._line(given.slider, outer, point)
+            point = self.point_of(given.slider, inner)
+            line = self.line(given.slider, outer, point)
             self.slides[given.slider] = Slide(index, 1.0)
             return Carry(line.start, point, line.angle, -1, index, line.sign, line.direction)
         (pin,) = set(self.points[inner]) & set(self.points[outer])
         sign = 1.0 if given.child == inner else -1.0
         return Carry(self.points[outer][pin], self.points[inner][pin], 0.0, index, -1, sign, 0j)
-
-    def _arm(self, link: str, start: str, end: str) -> complex:
-        """Return the vector from one point of a link to another."""
-        return self.points[link][end] - self.points[link][start]
-
-    def _carriers(self, point: str) -> list[str]:
-        """Return the known links that carry a point, the ground first."""
-        return [link for link in self.angles if point in self.points[link]]
-
-    def _place_pin(self, point: str) -> int:
-        link = self._carriers(point)[0]
-        return self.place(link, self.points[link][point])
 
     def _hinge(
         self, first: str, second: str
@@ -407,37 +289,30 @@ class Planner:
 
         The base is what a direction that a `CrankDiagonal` gives is measured from.
         """
-        for other in self._carriers(second):
-            for one in self._carriers(first):
-                pivot = self._common(one, other, (first, second))
+        for other in self.carriers(second):
+            for one in self.carriers(first):
+                pivot = self.common(one, other, (first, second))
                 if pivot:
-                    a, d = self._arm(one, pivot, first), self._arm(other, pivot, second)
+                    a, d = self.arm(one, pivot, first), self.arm(other, pivot, second)
                     angle, base = self.angles[one].along(a), self.angles[other].along(d)
                     offset = phase(angle.unit * base.unit.conjugate())
                     arms = angle.coordinate, base.coordinate
                     return abs(a), abs(d), arms, offset, base
         return None
 
-    def _common(self, one: str, other: str, apart: tuple[str, ...]) -> str | None:
-        """Return the pin of two links, if they have one that is none of the given points."""
-        if one == other:
-            return None
-        shared = set(self.points[one]) & set(self.points[other]) - set(apart)
-        return min(shared, default=None)
-
     def _rail(self, pin: str, on: str, line: Line, length: float) -> Rail:
         """Return a line on a known link as it sees a known pin."""
         base = self.angles[on].along(line.direction)
-        for link in self._carriers(pin):
-            pivot = self._common(link, on, (pin,))
+        for link in self.carriers(pin):
+            pivot = self.common(link, on, (pin,))
             if pivot:
                 angle = self.angles[link]
-                arm = self._arm(link, pivot, pin) * angle.unit * base.unit.conjugate()
+                arm = self.arm(link, pivot, pin) * angle.unit * base.unit.conjugate()
                 place = (self.points[on][pivot] - line.start) * line.direction.conjugate()
                 arms = angle.coordinate, base.coordinate
                 kind = CrankRail if self._driven_only(arms) else UnsignedRail
                 return kind(arm, place, length, arms)
-        ends = self.place(on, line.start), self._place_pin(pin)
+        ends = self.place(on, line.start), self.place_pin(pin)
         return FreeRail(ends, length, base.coordinate, base.unit)
 
     def _driven_only(self, arms: tuple[int, int]) -> bool:
@@ -467,13 +342,3 @@ def _facing(coordinate: int, base: Angle, vector: complex) -> Angle:
     """Return the angle of a link of which a vector stands at a coordinate, from a base."""
     unit = base.unit * (vector / abs(vector)).conjugate()
     return Angle(coordinate, base.constant - phase(vector), unit)
-
-
-def _scale(links: Iterable[Mapping[str, Point]]) -> float:
-    """Return the power of two next to the longest distance on a link."""
-    longest = 0.0
-    for points in links:
-        places = list(points.values())
-        for x, y in places:
-            longest = max(longest, hypot(x - places[0][0], y - places[0][1]))
-    return ldexp(1.0, frexp(longest)[1]) if longest else 1.0

@@ -1,0 +1,183 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The links that are known so far, where they lie, and the steps that place their points.
+
+Everything is in the unit of ``scale`` metres: a power of two near the longest length, so that
+scaling rounds nothing. A point is placed by a step of its own, and only when it is asked for.
+"""
+
+from __future__ import annotations
+
+from cmath import rect
+from collections.abc import Iterable, Mapping
+from math import frexp, hypot, ldexp
+
+from linkage_ros.kinematics.groups import Joint, Structure
+from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
+from linkage_ros.kinematics.linkage import GROUND, Linkage, Point
+from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail
+from linkage_ros.kinematics.step import Step
+
+
+class KnownLinks:
+    """
+    What is known of a linkage; at first the ground.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    structure
+        Its links and sliders.
+
+    Attributes
+    ----------
+    scale
+        Metres in the unit of the lengths.
+    points
+        Of every link, in its own frame and in the unit of the lengths.
+    blocks
+        For each slider the link that slides.
+    steps
+        In order; ``step_groups`` tells for each the number of its group, which is ``group`` now.
+    angles, slides
+        Of known links and sliders, in the coordinates.
+    held
+        Where each known link but the ground is held.
+
+    """
+
+    def __init__(self, linkage: Linkage, structure: Structure) -> None:
+        self._linkage = linkage
+        self.blocks = structure.blocks
+        self.scale = _scale(structure.links.values())
+        self.points = {
+            link: {
+                name: complex(x / self.scale, y / self.scale) for name, (x, y) in points.items()
+            }
+            for link, points in structure.links.items()
+        }
+        self.steps: list[Step] = []
+        self.step_groups: list[int] = []
+        self.angles = {GROUND: Angle(0, 0.0, 1 + 0j)}
+        self.slides: dict[str, Slide] = {}
+        self.held: dict[str, Held] = {}
+        self.group = 0
+        self.coordinate_count = 1 + len(linkage.inputs)
+        self.pin_count = 0
+        self._pins: dict[tuple[str, complex], int] = {}
+
+    def place(self, link: str, point: complex) -> int:
+        """Return the index of a pin, with the steps that place it, for a known link's point."""
+        index = self._pins.get((link, point))
+        if index is not None:
+            return index
+        if link == GROUND:
+            self.add(FixedPoint(point))
+        else:
+            held = self.held[link]
+            if held.point == point:
+                index = self._place_held(held)
+                self._pins[link, point] = index
+                return index
+            base = self.place(link, held.point)
+            arm, angle = point - held.point, self.angles[link]
+            self.add(PointOnLink(base, self.pin_count, angle.coordinate, angle.unit * arm))
+        return self._new_pin(link, point)
+
+    def _place_held(self, held: Held) -> int:
+        if held.pin >= 0:
+            return held.pin
+        base = self.place(held.link, held.at)
+        if held.slide is None:
+            return base
+        angle, slide = self.angles[held.link], held.slide
+        unit = angle.unit * (slide.sign * held.direction)
+        self.add(PointOnRail(base, angle.coordinate, slide.coordinate, unit))
+        self.pin_count += 1
+        return self.pin_count - 1
+
+    def _new_pin(self, link: str, point: complex) -> int:
+        self._pins[link, point] = self.pin_count
+        self.pin_count += 1
+        return self.pin_count - 1
+
+    def add(self, step: Step) -> None:
+        self.steps.append(step)
+        self.step_groups.append(self.group)
+
+    def new_coordinates(self, count: int) -> int:
+        self.coordinate_count += count
+        return self.coordinate_count - count
+
+    def pin_to(self, link: str, joint: Joint) -> None:
+        """Hold a link by a pin that is known."""
+        self.held[link] = Held(
+            self.points[link][joint.name], joint.to, self.points[joint.to][joint.name]
+        )
+
+    def ride(self, link: str, point: complex, on: str, line: Line, slide: Slide) -> None:
+        """Hold a link by a slider, without turning."""
+        self.angles[link] = self.angles[on].plus(line.angle)
+        self.held[link] = Held(point, on, line.start, slide, line.direction)
+
+    def point_of(self, slider: str, link: str) -> complex:
+        """Return the point by which a link takes part in a slider."""
+        given = self._linkage.sliders[slider]
+        return self.points[link][given.through if link == given.along else given.point]
+
+    def line(self, name: str, on: str, point: complex) -> Line:
+        """Return the way of a point of the one link of a slider as the other link sees it."""
+        slider = self._linkage.sliders[name]
+        through = self.points[slider.along][slider.through]
+        sliding = self.points[self.blocks[name]][slider.point]
+        direction = complex(*slider.direction)
+        direction /= abs(direction)
+        if on == slider.along:
+            start = through + rect(1.0, slider.angle) * (point - sliding)
+            return Line(start, direction, slider.angle, 1.0)
+        start = sliding + rect(1.0, -slider.angle) * (point - through)
+        return Line(start, direction * rect(1.0, -slider.angle), -slider.angle, -1.0)
+
+    def arm(self, link: str, start: str, end: str) -> complex:
+        """Return the vector from one point of a link to another."""
+        return self.points[link][end] - self.points[link][start]
+
+    def carriers(self, point: str) -> list[str]:
+        """Return the known links that carry a point, the ground first."""
+        return [link for link in self.angles if point in self.points[link]]
+
+    def place_pin(self, point: str) -> int:
+        link = self.carriers(point)[0]
+        return self.place(link, self.points[link][point])
+
+    def common(self, one: str, other: str, apart: tuple[str, ...]) -> str | None:
+        """Return the pin of two links, if they have one that is none of the given points."""
+        if one == other:
+            return None
+        shared = set(self.points[one]) & set(self.points[other]) - set(apart)
+        return min(shared, default=None)
+
+
+def _scale(links: Iterable[Mapping[str, Point]]) -> float:
+    """Return the power of two next to the longest distance on a link."""
+    longest = 0.0
+    for points in links:
+        places = list(points.values())
+        for x, y in places:
+            longest = max(longest, hypot(x - places[0][0], y - places[0][1]))
+    return ldexp(1.0, frexp(longest)[1]) if longest else 1.0

@@ -1,0 +1,479 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Any linkage is solved for many states at once as it is for one: the same statuses and values."""
+
+from __future__ import annotations
+
+from math import inf, nan, pi
+import re
+import tracemalloc
+from typing import Any
+import warnings
+
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.batch.arrays import BLOCK, CODES
+from linkage_ros.kinematics.batch.solve import Batch
+from linkage_ros.kinematics.batch.steps import _KINDS, _PARTS
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.kinematics.status import Status
+import numpy as np
+from numpy.typing import NDArray
+import pytest
+
+from .linkages import four_bar_linkage, Frame, inverted_slider_crank_linkage, placed, PLAIN
+from .test_gallery import closure_of, EXPECTED, KINDS
+
+STATUSES = tuple(Status)
+CLOSED, TOGGLED, OPEN, INDETERMINATE = (CODES[status] for status in Status)
+
+Array = NDArray[np.float64]
+Inputs = tuple[tuple[float, float], ...]
+"""For each input from where to where it is tried."""
+
+GROUND = {'O': (0.0, 0.0), 'E': (0.9, 0.1)}
+CRANKS = {'one': {'O': (0.0, 0.0), 'A': (0.4, 0.0)}, 'two': {'E': (0.0, 0.0), 'D': (0.3, 0.0)}}
+DRIVEN = (Input('j1', 'ground', 'one'), Input('j2', 'ground', 'two'))
+TWO_TURNS: Inputs = ((-4.0, 4.0), (-4.0, 4.0))
+
+
+def slider_crank_linkage(
+    a: float, b: float, offset: float, side: Any, frames: dict[str, Frame] | None = None
+) -> Linkage:
+    """Return a slider-crank: crank a, rod b, the line at an offset from the crankshaft."""
+    frames = frames or {}
+    turn = frames.get('ground', PLAIN)[2]
+    plain = {
+        'ground': {'O': (0.0, 0.0), 'G': (0.0, offset)},
+        'crank': {'O': (0.0, 0.0), 'A': (a, 0.0)},
+        'rod': {'A': (0.0, 0.0), 'B': (b, 0.0)},
+    }
+    direction = complex(np.exp(1j * turn))
+    return Linkage(
+        links={name: placed(frames.get(name, PLAIN), points) for name, points in plain.items()},
+        inputs=(Input('crank_joint', 'ground', 'crank'),),
+        assembly={'line': side},
+        joints={'rod_joint': RevoluteJoint('crank', 'rod'), 'slide': SlideJoint('line')},
+        sliders={'line': Slider('B', 'ground', 'G', (direction.real, direction.imag))},
+    )
+
+
+# What the gallery does not have: diagonals and rails between links that share no pin, two lines
+# that cross, a link that a motor on another one turns, a motor within a dyad, change points that
+# are not passed.
+OTHERS: dict[str, tuple[Linkage, Inputs]] = {
+    'rod in a swivel on two cranks': (
+        Linkage(
+            links={'ground': GROUND, **CRANKS, 'rod': {'A': (0.0, 0.0), 'T': (0.0, 0.05)}},
+            inputs=DRIVEN,
+            assembly={'swivel': 'ahead'},
+            joints={'rod': RevoluteJoint('two', 'rod'), 'slide': SlideJoint('swivel')},
+            sliders={'swivel': Slider('D', 'rod', 'T', (1.0, 0.2))},
+        ),
+        TWO_TURNS,
+    ),
+    'yoke on two cranks': (
+        Linkage(
+            links={'ground': GROUND, **CRANKS, 'yoke': {'U': (0.1, 0.0)}},
+            inputs=DRIVEN,
+            assembly={},
+            joints={'stroke': SlideJoint('way'), 'slot': SlideJoint('slot')},
+            sliders={
+                'slot': Slider('A', 'yoke', 'U', (0.3, 1.0)),
+                'way': Slider('U', 'two', 'D', (1.0, 0.5), 'yoke', 0.3),
+            },
+        ),
+        TWO_TURNS,
+    ),
+    'pin in two slots': (
+        Linkage(
+            links={'ground': GROUND, **CRANKS, 'b1': {'P': (0.0, 0.0)}, 'b2': {'P': (0.1, 0.0)}},
+            inputs=DRIVEN,
+            assembly={},
+            joints={'first': SlideJoint('s1'), 'second': SlideJoint('s2')},
+            sliders={
+                's1': Slider('P', 'one', 'A', (1.0, 0.5), 'b1'),
+                's2': Slider('P', 'two', 'D', (0.0, 1.0), 'b2', 0.2),
+            },
+        ),
+        TWO_TURNS,
+    ),
+    'arm on an arm': (
+        Linkage(
+            links={
+                'ground': GROUND,
+                'one': CRANKS['one'],
+                'arm': {'A': (0.0, 0.0), 'T': (0.1, 0.3)},
+                'rod': {'T': (0.0, 0.0), 'B': (0.5, 0.0)},
+                'rocker': {'E': (0.0, 0.0), 'B': (0.45, 0.1)},
+            },
+            inputs=(DRIVEN[0], Input('elbow', 'arm', 'one')),
+            assembly={'B': 'left'},
+            joints={'rod': RevoluteJoint('arm', 'rod'), 'rocker': RevoluteJoint('one', 'rocker')},
+            sliders={},
+        ),
+        TWO_TURNS,
+    ),
+    'motor within a dyad': (
+        Linkage(
+            links={
+                'ground': GROUND,
+                'one': {'O': (0.0, 0.0), 'M': (0.5, 0.1)},
+                'two': {'M': (0.1, 0.0), 'B': (0.5, 0.0)},
+                'rocker': {'E': (0.0, 0.0), 'B': (0.7, 0.0)},
+            },
+            inputs=(Input('elbow', 'one', 'two'),),
+            assembly={'B': 'left'},
+            joints={'one': RevoluteJoint('ground', 'one'), 'rod': RevoluteJoint('rocker', 'two')},
+            sliders={},
+        ),
+        ((-4.0, 4.0),),
+    ),
+    'change points on a rocker': (
+        Linkage(
+            links={
+                'ground': {'O': (0.0, 0.0), 'D': (1.0, 0.0), 'E': (1.1, 0.0)},
+                'crank': {'O': (0.0, 0.0), 'A': (0.4, 0.0)},
+                'coupler': {'A': (0.0, 0.0), 'B': (1.2, 0.0)},
+                'rocker': {'D': (0.0, 0.0), 'B': (0.8, 0.0), 'C': (-0.3, 0.0)},
+                'rod': {'C': (0.0, 0.0), 'F': (0.2, 0.0)},
+                'arm': {'E': (0.0, 0.0), 'F': (0.4, 0.0)},
+            },
+            inputs=(Input('crank_joint', 'ground', 'crank'),),
+            assembly={'B': 'left', 'F': 'left'},
+            joints={'rod': RevoluteJoint('rocker', 'rod'), 'arm': RevoluteJoint('ground', 'arm')},
+            sliders={},
+        ),
+        ((-4.0, 4.0),),
+    ),
+    'rod as long as the ground, on a rocker': (
+        Linkage(
+            links={
+                'ground': {'O': (0.0, 0.0), 'D': (1.0, 0.0), 'E': (1.3, 0.0)},
+                'crank': {'O': (0.0, 0.0), 'A': (0.4, 0.0)},
+                'coupler': {'A': (0.0, 0.0), 'B': (1.2, 0.0)},
+                'rocker': {'D': (0.0, 0.0), 'B': (0.8, 0.0), 'C': (0.2, 0.0)},
+                'rod': {'C': (0.0, 0.0), 'T': (0.0, 0.1)},
+            },
+            inputs=(Input('crank_joint', 'ground', 'crank'),),
+            assembly={'B': 'left', 'swivel': 'behind'},
+            joints={'rod': RevoluteJoint('rocker', 'rod'), 'slide': SlideJoint('swivel')},
+            sliders={'swivel': Slider('E', 'rod', 'T', (1.0, 0.0))},
+        ),
+        ((-4.0, 4.0),),
+    ),
+    'coupler and rocker short beside crank and ground': (
+        four_bar_linkage((40.0, 3.0, 2.5, 41.0), 'left'),
+        ((-0.2, 0.2),),
+    ),
+    'parallelogram on the right': (
+        four_bar_linkage((0.04, 0.12, 0.04, 0.12), 'right'),
+        ((-9.0, 9.0),),
+    ),
+    'rod through the crankshaft': (
+        inverted_slider_crank_linkage((0.2, 0.2, 0.0), 'ahead'),
+        ((-9.0, 9.0),),
+    ),
+    'rod as long as the crank': (
+        slider_crank_linkage(0.2, 0.2, 0.0, 'ahead'),
+        ((-9.0, 9.0),),
+    ),
+}
+
+
+LIMITS = ((4e-15, 1), (4e-15, 2), (2e-14, 2))
+"""
+What positions, velocities and accelerations may differ by, and with which power of 1/conditioning.
+
+As a part of themselves, or of 1 where smaller.
+"""
+
+
+def case_of(name: str) -> tuple[Closure, Inputs]:
+    """Return a linkage, and inputs that go a fifth beyond its range."""
+    if name in OTHERS:
+        linkage, inputs = OTHERS[name]
+        return Closure(linkage), inputs
+    low, high = (np.atleast_1d(end) for end in EXPECTED[f'{name}.yaml']['range'])
+    beyond = 0.2 * (high - low)
+    return closure_of(name), tuple(zip(low - beyond, high + beyond, strict=True))
+
+
+def samples(inputs: Inputs, count: int) -> list[Array]:
+    rng = np.random.default_rng(count)
+    return [rng.uniform(low, high, count) for low, high in inputs]
+
+
+def check(closure: Closure, inputs: list[Array]) -> set[Status]:
+    """Hold every state against the scalar closure; return the statuses that were met."""
+    rates, pulls = [1.3, 0.7][: len(inputs)], [0.3, -0.4][: len(inputs)]
+    batch = closure.solve(*inputs, rates=rates, accelerations=pulls)
+    for i, state in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
+        position = closure.position(*state)
+        code = CODES[position.status]
+        found = [array[:, i] for array in batch[1:] if array is not None]
+        if batch.status[i] != code:
+            # Which float next to a limit is the last that closes, or toggles, may differ.
+            assert INDETERMINATE not in (batch.status[i], code), state
+            assert batch.status[i] in {
+                CODES[closure.position(*(x + side * (1.0 + abs(x)) for x in state)).status]
+                for side in (-1e-14, -1e-15, 1e-15, 1e-14)
+            }, state
+            continue
+        ends = (TOGGLED, CLOSED, CLOSED)
+        assert [bool(np.isnan(row).any()) for row in found] == [code > end for end in ends], state
+        assert [bool(np.isnan(row).all()) for row in found] == [code > end for end in ends], state
+        if code != CLOSED:
+            continue
+        velocity = closure.velocity(position, *rates)
+        acceleration = closure.acceleration(position, velocity, *pulls)
+        near = closure.nearness(position).conditioning
+        for one, other, (limit, power) in zip(
+            found, (position.joints, velocity.joints, acceleration.joints), LIMITS, strict=True
+        ):
+            size = limit / near**power * max(1.0, *map(abs, other))
+            assert np.abs(one - other).max() <= size, state
+    return {STATUSES[code] for code in set(batch.status.tolist())}
+
+
+@pytest.mark.parametrize('name', [*KINDS, *OTHERS])
+def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name: str) -> None:
+    closure, inputs = case_of(name)
+    met = check(closure, samples(inputs, 500))
+    assert Status.CLOSED in met
+    (interval, *_) = closure.input_ranges or (None,)
+    if interval is not None and not interval.whole and name != 'class_3':
+        assert Status.OPEN in met
+
+
+def test_every_kind_of_step_is_tested() -> None:
+    steps = [step for name in (*KINDS, *OTHERS) for step in case_of(name)[0].steps]
+    assert {type(step) for step in steps} == set(_KINDS)
+    parts = [getattr(step, name, None) for step in steps for name in ('diagonal', '_rail')]
+    assert {type(part) for part in parts if part is not None} == set(_PARTS)
+
+
+length = st.floats(0.05, 5.0)
+crank_angles = st.lists(st.floats(-20.0, 20.0), min_size=1, max_size=12)
+odd = st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-pi, pi))
+
+
+@st.composite
+def linkages(draw: Any) -> Linkage:
+    """Draw a four-bar, a slider-crank or an inverted one, in odd frames."""
+    names = ('ground', 'crank', 'coupler', 'rocker', 'rod')
+    frames = {name: draw(odd) for name in names} if draw(st.booleans()) else None
+    a, b, c = draw(length), draw(length), draw(length)
+    kind = draw(st.sampled_from(('four-bar', 'slider-crank', 'inverted slider-crank')))
+    if kind == 'four-bar':
+        side = draw(st.sampled_from(('left', 'right')))
+        return four_bar_linkage((a, b, c, draw(length)), side, frames)
+    side = draw(st.sampled_from(('ahead', 'behind')))
+    offset = draw(st.sampled_from((0.0, 0.3 * c, -0.3 * c)))
+    if kind == 'slider-crank':
+        return slider_crank_linkage(a, b, offset, side, frames)
+    return inverted_slider_crank_linkage((a, b, offset), side, frames, along=0.1)
+
+
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(linkages(), crank_angles)
+def test_any_linkage_of_one_loop_is_solved_as_state_by_state(
+    linkage: Linkage, angles: list[float]
+) -> None:
+    try:
+        closure = Closure(linkage)
+    except DefinitionError:
+        assume(False)
+    check(closure, [np.array(angles)])
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'elliptic_trammel', 'five_bar'])
+def test_how_the_states_are_cut_into_blocks_changes_nothing(name: str) -> None:
+    closure, limits = case_of(name)
+    inputs = samples(limits, 2 * BLOCK + 77)
+    rates = [1.3] * len(inputs)
+    whole = closure.solve(*inputs, rates=rates)
+    for part in (slice(0, 1), slice(BLOCK - 3, BLOCK + 4), slice(5, None)):
+        found = closure.solve(*(values[part] for values in inputs), rates=rates)
+        for one, other in zip(found, whole, strict=True):
+            # A vector's last elements may be worked out by other instructions.
+            np.testing.assert_allclose(one, other[..., part], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'five_bar', 'class_3', 'excavator_bucket'])
+def test_no_state_at_all_is_solved_too(name: str) -> None:
+    closure, limits = case_of(name)
+    joints = len(closure.linkage.joints)
+    batch = closure.solve(*samples(limits, 0), rates=[1.0] * len(limits))
+    assert batch.status.shape == (0,)
+    assert all(array.shape == (joints, 0) for array in batch[1:])
+
+
+def test_rates_are_numbers_or_arrays_and_1_if_not_given() -> None:
+    closure, _ = case_of('four_bar')
+    phi = np.linspace(0.0, 6.0, 40)
+    rates, pulls = np.linspace(-2.0, 3.0, 40), np.linspace(4.0, -1.0, 40)
+    one = closure.solve(phi)
+    assert one.status.dtype == np.uint8
+    assert not one.status.any()
+    for given_rates in (2.0, [2.0], (np.full(40, 2.0),), np.full((1, 40), 2.0)):
+        two = closure.solve(phi, rates=given_rates)
+        np.testing.assert_array_equal(two.positions, one.positions)
+        np.testing.assert_allclose(two.velocities, 2.0 * one.velocities, rtol=1e-14)
+        np.testing.assert_allclose(two.accelerations, 4.0 * one.accelerations, rtol=1e-13)
+    varied = closure.solve(phi, rates=rates, accelerations=pulls)
+    np.testing.assert_allclose(varied.velocities, rates * one.velocities, rtol=1e-13, atol=1e-14)
+    expected = rates**2 * one.accelerations + pulls * one.velocities
+    np.testing.assert_allclose(varied.accelerations, expected, rtol=1e-12, atol=1e-13)
+
+
+def test_an_input_may_be_one_number_for_all_states() -> None:
+    closure, _ = case_of('five_bar')
+    phi = np.linspace(1.0, 2.0, 30)
+    one = closure.solve(phi, 0.5, rates=(1.0, 0.0))
+    other = closure.solve(phi, np.full(30, 0.5), rates=(np.ones(30), 0.0), accelerations=(0, 0))
+    for mine, theirs in zip(one, other, strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+
+
+def test_what_is_not_asked_for_is_none_and_the_rest_is_the_same() -> None:
+    for name in ('four_bar', 'whitworth_quick_return', 'class_3'):
+        closure, limits = case_of(name)
+        inputs = samples(limits, 50)
+        whole = closure.solve(*inputs)
+        for derivatives in (0, 1):
+            batch = closure.solve(*inputs, derivatives=derivatives)
+            assert [array is None for array in batch[2:]] == [derivatives < 1, True]
+            for one, other in zip(batch, whole, strict=True):
+                if one is not None:
+                    np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'slider_crank'])
+def test_results_go_where_they_are_wanted(name: str) -> None:
+    closure, limits = case_of(name)
+    inputs = samples(limits, 100)
+    expected = closure.solve(*inputs)
+    table = np.full((100, 7), 777.0)
+    out = Batch(np.empty(100, np.uint8), table[:, :2].T, table[:, 2:4].T, table[:, 4:6].T)
+    batch = closure.solve(*inputs, out=out)
+    assert all(one is other for one, other in zip(batch, out, strict=True))
+    for one, other in zip(batch, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert (table[:, 6] == 777.0).all()
+    # Rows that nothing is asked of are left alone, and missing ones are made.
+    table.fill(777.0)
+    part = closure.solve(*inputs, derivatives=1, out=out._replace(velocities=None))
+    assert part.positions is out.positions
+    assert part.accelerations is None
+    np.testing.assert_array_equal(part.velocities, expected.velocities)
+    assert (table[:, 2:] == 777.0).all()
+
+
+def test_a_state_that_is_no_number_is_indeterminate_and_alone_in_that() -> None:
+    for name in ('four_bar', 'slider_crank', 'class_3', 'jansen_leg', 'excavator_bucket'):
+        closure, ((low, high),) = case_of(name)
+        values = np.array([0.5 * (low + high), nan, inf, -inf, 0.5 * (low + high)])
+        batch = closure.solve(values)
+        assert batch.status.tolist() == [CLOSED, *[INDETERMINATE] * 3, CLOSED]
+        for array in batch[1:]:
+            assert np.isnan(array).tolist() == [[False, True, True, True, False]] * len(array)
+
+
+def test_a_toggle_has_a_position_and_no_rate() -> None:
+    # Stretched: the bar of the trammel lies in the driven slot.
+    closure, _ = case_of('elliptic_trammel')
+    batch = closure.solve(np.array([0.12, 0.1, 0.13]))
+    assert batch.status.tolist() == [TOGGLED, CLOSED, OPEN]
+    for array, lost in zip(batch[1:], ([0, 0, 1], [1, 0, 1], [1, 0, 1]), strict=True):
+        assert np.isnan(array).tolist() == [list(map(bool, lost))] * 2
+    position = closure.position(0.12)
+    assert batch.positions[:, 0].tolist() == pytest.approx(position.joints, abs=1e-15)
+
+
+@pytest.mark.parametrize('exponent', [-900, -300, 3, 900])
+def test_the_unit_of_the_lengths_changes_no_bit(exponent: int) -> None:
+    unit = 2.0**exponent
+    phi = np.linspace(-3.0, 3.0, 50)
+    for lengths in ((0.04, 0.12, 0.08, 0.1), (4.0, 2.0, 4.5, 5.0), (0.04, 0.12, 0.04, 0.12)):
+        one, other = (
+            Closure(four_bar_linkage(tuple(x * scale for x in lengths), 'left')).solve(phi)
+            for scale in (1.0, unit)
+        )
+        for array, same in zip(one, other, strict=True):
+            np.testing.assert_array_equal(array, same)
+
+
+@pytest.mark.parametrize('name', [*KINDS, *OTHERS])
+def test_nothing_makes_numpy_warn(name: str) -> None:
+    closure, limits = case_of(name)
+    angles = np.array([0.0, -0.0, pi, 1e-310, -1e5, nan, inf, limits[0][0], limits[0][1]])
+    with warnings.catch_warnings(), np.errstate(all='warn'):
+        warnings.simplefilter('error')
+        closure.solve(*[angles] * len(limits), rates=[1.0] * len(limits))
+
+
+@pytest.mark.parametrize(
+    ('name', 'inputs', 'more', 'text'),
+    [
+        ('four_bar', 2, {}, 'inputs: 2 given, 1 joints are driven'),
+        ('five_bar', 1, {}, 'rates: give one for each of the 2 driven joints'),
+        ('five_bar', 2, {'rates': 1.0}, 'rates: 1 given, 2 joints are driven'),
+        ('four_bar', 1, {'rates': [1.0, 2.0]}, 'rates: shapes (2,) do not broadcast to (5,)'),
+        ('four_bar', 1, {'accelerations': np.ones(4)},
+         'accelerations: shapes (4,) do not broadcast to (5,)'),
+        ('four_bar', 1, {'derivatives': 3}, 'derivatives: 3 is none of 0, 1, 2'),
+        ('four_bar', 1, {'out': Batch(np.empty(5), np.empty((2, 5)))},
+         'out.status: is float64 (5,), not uint8 (5,)'),
+        ('four_bar', 1, {'out': Batch(np.empty(5, np.uint8), np.empty((5, 2)))},
+         'out.positions: is float64 (5, 2), not float64 (2, 5)'),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_said_in_one_line(
+    name: str, inputs: int, more: dict[str, Any], text: str
+) -> None:
+    with pytest.raises(ValueError, match=f'^{re.escape(text)}$'):
+        case_of(name)[0].solve(*[np.ones(5)] * inputs, **more)
+
+
+@pytest.mark.parametrize(
+    ('arrays', 'text'),
+    [
+        ((np.ones(3), np.ones(4)), 'inputs: shapes (3,), (4,) do not broadcast to one (N,)'),
+        ((1.0, 2.0), 'inputs: shapes (), () do not broadcast to one (N,)'),
+        ((np.ones((2, 3)), 1.0), 'inputs: shapes (2, 3), () do not broadcast to one (N,)'),
+    ],
+)
+def test_inputs_are_arrays_of_one_length(arrays: Any, text: str) -> None:
+    with pytest.raises(ValueError, match=f'^{re.escape(text)}$'):
+        case_of('five_bar')[0].solve(*arrays, rates=(1.0, 1.0))
+
+
+def test_memory_does_not_grow_with_the_states() -> None:
+    for name in ('four_bar', 'klann_leg', 'slider_crank'):
+        closure, limits = case_of(name)
+        peaks = []
+        for blocks in (2, 20):
+            inputs = samples(limits, blocks * BLOCK)
+            out = closure.solve(*inputs)
+            tracemalloc.start()
+            closure.solve(*inputs, out=out)
+            peaks.append(tracemalloc.get_traced_memory()[1])
+            tracemalloc.stop()
+        # Of 18 blocks more, an array of each would be 1.2 MB.
+        assert peaks[1] < peaks[0] + 100_000
