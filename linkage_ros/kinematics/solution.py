@@ -203,16 +203,18 @@ class Planner(KnownLinks):
         point = self.point_of(second.name, carrier)
         outer = self.line(second.name, second.to, point)
         inner = self.line(dyad.inner.name, carrier, self.points[link][first.name])
-        turn = rect(1.0, outer.angle) * outer.direction.conjugate()
-        unit = turn * inner.direction
-        if abs(unit.imag) <= ROUNDING:
+        turn = rect(1.0, outer.angle)
+        direction = turn * inner.direction
+        if abs((direction * outer.direction.conjugate()).imag) <= ROUNDING:
             raise DefinitionError(
                 f'sliders.{dyad.inner.name}.direction',
                 f'is parallel to that of {second.name!r}',
                 'give the two sliders different directions',
             )
         constant = (inner.start - point) * turn
-        self.add(RPPDyad(self._rail(first.name, second.to, outer, inf), constant, unit))
+        level = Line(outer.start, 1 + 0j, 0.0, 1.0)
+        rail = self._rail(first.name, second.to, level, inf)
+        self.add(RPPDyad(rail, constant, direction, outer.direction))
         k = self.new_coordinates(2)
         self.ride(carrier, point, second.to, outer, Slide(k + 1, 1.0))
         self.slides[second.name] = Slide(k + 1, outer.sign)

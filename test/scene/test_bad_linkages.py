@@ -68,11 +68,11 @@ LINKAGES = {
     ),
     'point of three': (
         WRITTEN_OUT.replace(b'[0.040, 0]', b'[0.040, 0, 0]'),
-        ':4: links.crank.A: [0.04, 0, 0] is not a point; write two finite numbers: [x, y]',
+        ':6: links.crank.A: [0.04, 0, 0] is not a point; write two finite numbers: [x, y]',
     ),
     'point far away': (
         WRITTEN_OUT.replace(b'[0.040, 0]', b'[1e300, 0]'),
-        ':4: links.crank.A: [1e+300, 0] is out of bounds; write numbers of at most 1e+09',
+        ':6: links.crank.A: [1e+300, 0] is out of bounds; write numbers of at most 1e+09',
     ),
     'link without length': (
         WRITTEN_OUT.replace(b'[0.040, 0]', b'[0, 0]'),
@@ -80,39 +80,39 @@ LINKAGES = {
     ),
     'no ground': (
         WRITTEN_OUT.replace(b'ground:', b'base:'),
-        ":2: links: no link is named 'ground'",
+        ":4: links: no link is named 'ground'",
     ),
     'no pin': (
         WRITTEN_OUT.replace(b'rocker: {O4', b'rocker: {O5'),
-        ':6: links.rocker: is free: its pins and sliders do not hold it',
+        ':8: links.rocker: is free: its pins and sliders do not hold it',
     ),
     'crank that is no link': (
         WRITTEN_OUT.replace(b'child: crank}', b'child: krank}'),
-        ":7: input.child: 'krank' is not a link; name one of coupler, crank, ground, rocker",
+        ":9: input.child: 'krank' is not a link; name one of coupler, crank, ground, rocker",
     ),
     'no side': (
         WRITTEN_OUT.replace(b'B: left', b''),
-        ":8: assembly: 'B' is missing; write B: left",
+        ":10: assembly: 'B' is missing; write B: left",
     ),
     'joint of no link': (
         WRITTEN_OUT.replace(b'child: coupler}', b'child: copler}'),
-        ":10: joints.coupler_joint.child: 'copler' is not a link; name one of coupler, crank, gr",
+        ":12: joints.coupler_joint.child: 'copler' is not a link; name one of coupler, crank, gr",
     ),
     'the input published': (
         WRITTEN_OUT.replace(b'rocker_joint', b'crank_joint'),
-        ':11: joints.crank_joint: is the input joint; publish the dependent joints',
+        ':13: joints.crank_joint: is the input joint; publish the dependent joints',
     ),
     'joint of no text': (
         WRITTEN_OUT.replace(b'crank_joint', b'"\\udc00"'),
-        ":7: input.joint: '\\udc00' is not a text; write a name",
+        ":9: input.joint: '\\udc00' is not a text; write a name",
     ),
     'nothing to publish': (
         WRITTEN_OUT[: WRITTEN_OUT.index(b'joints:')] + b'joints: {}',
-        ':9: joints: publishes nothing; name a joint',
+        ':11: joints: publishes nothing; name a joint',
     ),
     'slide of no slider': (
         WRITTEN_OUT.replace(b'{parent: crank, child: coupler}', b'{slider: rod}'),
-        ":10: joints.coupler_joint.slider: 'rod' is not a slider; this linkage has none",
+        ":12: joints.coupler_joint.slider: 'rod' is not a slider; this linkage has none",
     ),
 }
 

@@ -99,13 +99,13 @@ class PRPDyad:
         units = rect(1.0, x[i]) * one, rect(1.0, x[j]) * other
         # The angle between the lines first: two directions would cancel where they are parallel.
         across = rect(1.0, x[j] - x[i]) * self._across
-        between = (end - start) * units[0].conjugate()
+        between = end - start
         if abs(across.imag) <= ROUNDING:
-            gap = abs(between.imag)
+            gap = abs(_cross(units[0], between))
             far = gap > ROUNDING * (abs(start) + abs(end))
             status = Status.OPEN if far else Status.INDETERMINATE
             return PRPPose(status, gap if far else 0.0, 0.0, 0.0, across, units)
-        first, second = _slides(between, across, known)
+        first, second = _slides(between, units, across.imag, known)
         return new(PRPPose, (Status.CLOSED, 0.0, first, second, across, units))
 
     def rates(self, pose: PRPPose, _known: State, speeds: State) -> tuple[float, float]:
@@ -115,7 +115,7 @@ class PRPDyad:
         start, end = (velocities[k] for k in self._starts)
         carried = end + complex(0.0, v[j] * pose.second) * other
         carried -= start + complex(0.0, v[i] * pose.first) * one
-        return _slides(carried * one.conjugate(), pose.across, speeds)
+        return _slides(carried, pose.units, pose.across.imag, speeds)
 
     def accelerations(
         self,
@@ -131,7 +131,7 @@ class PRPDyad:
         start, end = (pulls[k] for k in self._starts)
         carried = end + _carried(pose.second, rates[1], v[j], a[j]) * other
         carried -= start + _carried(pose.first, rates[0], v[i], a[i]) * one
-        _slides(carried * one.conjugate(), pose.across, changes)
+        _slides(carried, pose.units, pose.across.imag, changes)
 
     def transmission_angle(self, pose: PRPPose) -> float:
         """Return the angle between the two lines, in [0, π/2], in [rad]."""
@@ -143,10 +143,15 @@ def _carried(slide: float, rate: float, turn: float, change: float) -> complex:
     return complex(-turn * turn * slide, change * slide + 2.0 * turn * rate)
 
 
-def _slides(between: complex, across: complex, state: State) -> tuple[float, float]:
-    """Resolve a vector in the frame of the first line along both, and append its parts."""
-    second = -between.imag / across.imag
-    first = between.real - between.imag * (across.real / across.imag)
+def _slides(
+    between: complex, units: tuple[complex, complex], sine: float, state: State
+) -> tuple[float, float]:
+    """Resolve a vector along both lines, and append its parts."""
+    first, second = _cross(between, units[1]) / sine, _cross(between, units[0]) / sine
     state[0].append(first)
     state[0].append(second)
     return first, second
+
+
+def _cross(one: complex, other: complex) -> float:
+    return one.real * other.imag - one.imag * other.real

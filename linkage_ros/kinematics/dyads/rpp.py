@@ -16,10 +16,11 @@
 """
 RPP: a link pinned at A slides along a second one, which slides on a known line; the Scotch yoke.
 
-Both links keep their angles to the rail, so the second rail has a constant angle α to the first.
-In the frame of the first, with A at z = x + i·y and κ a constant::
+Both links keep their angles to the one that carries the known line. In its frame, with A at z, the
+directions v̂ and û of the second line and of the known one, κ a constant, and × for the z component
+of the cross product::
 
-    z = κ + s2 + s1·e^{iα}        s1 = Im(z − κ)/sin α        s2 = Re(z − κ) − s1·cos α
+    z = κ + s2·û + s1·v̂        s1 = (z − κ) × û/(v̂ × û)        s2 = (z − κ) × v̂/(û × v̂)
 
 s2 is the slide along the known line, s1 that of the pinned link along the second. The same holds
 of the rates and of the accelerations. There is one solution at every state, and no toggle.
@@ -27,7 +28,7 @@ of the rates and of the accelerations. There is one solution at every state, and
 
 from __future__ import annotations
 
-from math import atan2
+from math import asin
 from typing import NamedTuple
 
 from linkage_ros.kinematics.rail import Rail, Sight
@@ -47,7 +48,7 @@ class RPPPose(NamedTuple):
     first, second
         s1 and s2, in the unit of the lengths.
     sight
-        A in the frame of the rail.
+        A in the frame of the link that carries the known line.
 
     """
 
@@ -65,24 +66,27 @@ class RPPDyad:
     Parameters
     ----------
     rail
-        The known line.
+        The start of the known line, along the x axis of the link that carries it.
     constant
         κ, in the unit of the lengths.
-    unit
-        e^{iα}, not real.
+    inner, outer
+        v̂ and û, not parallel.
 
     """
 
-    __slots__ = ('_constants', '_rail')
+    __slots__ = ('_across', '_constant', '_inner', '_outer', '_rail')
 
-    def __init__(self, rail: Rail, constant: complex, unit: complex) -> None:
+    def __init__(self, rail: Rail, constant: complex, inner: complex, outer: complex) -> None:
         self._rail = rail
-        self._constants = (constant, unit.imag, unit.real)
+        self._constant = constant
+        self._inner = inner
+        self._outer = outer
+        self._across = _cross(inner, outer)
 
     def close(self, known: State) -> RPPPose:
         """Append both slides."""
         sight = self._rail.at(known)
-        first, second = self._slides(sight.place - self._constants[0], known)
+        first, second = self._slides(sight.place - self._constant, known)
         return new(RPPPose, (Status.CLOSED, 0.0, first, second, sight))
 
     def rates(self, pose: RPPPose, known: State, speeds: State) -> tuple[complex, float]:
@@ -105,14 +109,16 @@ class RPPDyad:
 
     def transmission_angle(self, _pose: RPPPose) -> float:
         """Return the angle between the two lines, in [0, π/2], in [rad]."""
-        _, sine, cosine = self._constants
-        return atan2(abs(sine), abs(cosine))
+        return asin(min(abs(self._across), 1.0))
 
     def _slides(self, place: complex, state: State) -> tuple[float, float]:
         """Resolve a vector along both lines, and append its parts."""
-        _, sine, cosine = self._constants
-        first = place.imag / sine
-        second = place.real - first * cosine
+        first = _cross(place, self._outer) / self._across
+        second = -_cross(place, self._inner) / self._across
         state[0].append(first)
         state[0].append(second)
         return first, second
+
+
+def _cross(one: complex, other: complex) -> float:
+    return one.real * other.imag - one.imag * other.real
