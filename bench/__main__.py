@@ -25,6 +25,7 @@ import sys
 from tempfile import TemporaryDirectory
 import time
 
+from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
 from bench.machine import describe_machine
 from bench.processes import BenchError, Graph
@@ -38,18 +39,22 @@ _TICKS = TickPlan(rounds=5, warm_up=0.7, window=1.7)
 _TICKS_QUICK = TickPlan(rounds=1, warm_up=0.2, window=0.6)
 _LATENCY = LatencyPlan(rate=1000.0, size=500, parts=12)
 _LATENCY_QUICK = LatencyPlan(rate=1000.0, size=200, parts=3)
+_SPEED = SpeedPlan(rounds=11, states=5000, batch=1_000_000)
+_SPEED_QUICK = SpeedPlan(rounds=3, states=1000, batch=100_000)
 
 
 def main() -> int:
     """Measure what the command line asks for and return the exit code."""
     parser = argparse.ArgumentParser('python -m bench', description=__doc__)
     parser.add_argument('--quick', action='store_true', help='less than half a minute, rougher')
-    parser.add_argument('--only', choices='abc', help='only one of the comparisons')
+    parser.add_argument(
+        '--only', choices=('a', 'b', 'c', 'kinematics'), help='only one of the comparisons'
+    )
     parser.add_argument(
         '--runs', type=Path, default=Path('runs'), help='where the tables are kept'
     )
     arguments = parser.parse_args()
-    wanted = arguments.only or 'abc'
+    wanted = '' if arguments.only == 'kinematics' else arguments.only or 'abc'
     started = time.monotonic()
     begin = datetime.now().astimezone()
     tables = [Table('machine', ('', ''), [*describe_machine(), ('begun', f'{begin:%F %T}')])]
@@ -61,8 +66,11 @@ def main() -> int:
             if 'c' in wanted:
                 plan = _LATENCY_QUICK if arguments.quick else _LATENCY
                 tables.append(measure_latency(graph, folder, plan))
-            if wanted != 'c':
+            if wanted not in ('', 'c'):
                 tables += _ticks(graph, folder, wanted, arguments.quick)
+            if arguments.only in (None, 'kinematics'):
+                say('kinematics: linkages solved with acceleration')
+                tables.append(measure_speed(folder, _SPEED_QUICK if arguments.quick else _SPEED))
     except BenchError as error:
         print(f'bench: {error}', file=sys.stderr)
         return 1

@@ -17,7 +17,8 @@
 
 from __future__ import annotations
 
-from math import inf, nan, pi
+from dataclasses import replace
+from math import inf, nan, pi, tau
 import re
 import tracemalloc
 from typing import Any
@@ -29,7 +30,7 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.batch.arrays import BLOCK, CODES
 from linkage_ros.kinematics.batch.solve import Batch
 from linkage_ros.kinematics.batch.steps import _KINDS, _PARTS
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -198,9 +199,9 @@ OTHERS: dict[str, tuple[Linkage, Inputs]] = {
 
 LIMITS = ((4e-15, 1), (4e-15, 2), (2e-14, 2))
 """
-What positions, velocities and accelerations may differ by, and with which power of 1/conditioning.
+What positions, velocities and accelerations may differ by, and the power of 1/conditioning in it.
 
-As a part of themselves, or of 1 where smaller.
+As a part of themselves, or of 1 where smaller, and of what they change by as the inputs do.
 """
 
 
@@ -219,8 +220,12 @@ def samples(inputs: Inputs, count: int) -> list[Array]:
     return [rng.uniform(low, high, count) for low, high in inputs]
 
 
-def check(closure: Closure, inputs: list[Array]) -> set[Status]:
-    """Hold every state against the scalar closure; return the statuses that were met."""
+def check(closure: Closure, inputs: list[Array], slenderness: float = 1.0) -> set[Status]:
+    """
+    Hold every state against the scalar closure; return the statuses that were met.
+
+    The slenderness is how much longer a link is than another, at which its roundings are seen.
+    """
     rates, pulls = [1.3, 0.7][: len(inputs)], [0.3, -0.4][: len(inputs)]
     batch = closure.solve(*inputs, rates=rates, accelerations=pulls)
     for i, state in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
@@ -229,26 +234,54 @@ def check(closure: Closure, inputs: list[Array]) -> set[Status]:
         found = [array[:, i] for array in batch[1:] if array is not None]
         if batch.status[i] != code:
             # Which float next to a limit is the last that closes, or toggles, may differ.
-            assert INDETERMINATE not in (batch.status[i], code), state
-            assert batch.status[i] in {
-                CODES[closure.position(*(x + side * (1.0 + abs(x)) for x in state)).status]
-                for side in (-1e-14, -1e-15, 1e-15, 1e-14)
-            }, state
+            near_by = {CODES[other.status] for other in neighbours(closure, state)}
+            assert batch.status[i] in near_by, state
             continue
         ends = (TOGGLED, CLOSED, CLOSED)
         assert [bool(np.isnan(row).any()) for row in found] == [code > end for end in ends], state
         assert [bool(np.isnan(row).all()) for row in found] == [code > end for end in ends], state
         if code != CLOSED:
             continue
-        velocity = closure.velocity(position, *rates)
-        acceleration = closure.acceleration(position, velocity, *pulls)
-        near = closure.nearness(position).conditioning
-        for one, other, (limit, power) in zip(
-            found, (position.joints, velocity.joints, acceleration.joints), LIMITS, strict=True
-        ):
-            size = limit / near**power * max(1.0, *map(abs, other))
+        turns = np.round((found[0] - position.joints) / tau) * closure.turning
+        if turns.any():
+            # Which float is the last before an angle jumps by a turn may differ likewise.
+            jumps = np.ptp([other.joints for other in neighbours(closure, state)], axis=0)
+            assert (jumps[turns != 0.0] > 6.0).all(), state
+            found[0] = found[0] - turns * tau
+        values = motion(closure, position, rates, pulls)
+        near = max(closure.nearness(position).conditioning, 1e-100) / slenderness
+        step = [1e-7 * (1.0 + abs(x)) for x in state]
+        beside = [
+            closure.position(*(x + side * h for x, h in zip(state, step, strict=True)))
+            for side in (-1.0, 1.0)
+        ]
+        slopes = [np.zeros(len(found[0]))] * 3
+        if all(other.status is Status.CLOSED for other in beside):
+            ends_of = zip(*(motion(closure, p, rates, pulls) for p in beside), strict=True)
+            slopes = [np.abs(end - begin) / 2e-7 for begin, end in ends_of]
+            # Between the two an angle may jump by a turn.
+            slopes[0] = np.minimum(slopes[0], np.abs(tau / 2e-7 - slopes[0]))
+        for one, other, slope, (limit, power) in zip(found, values, slopes, LIMITS, strict=True):
+            size = (np.maximum(1.0, np.abs(other).max()) / near**power + slope.max()) * limit
             assert np.abs(one - other).max() <= size, state
     return {STATUSES[code] for code in set(batch.status.tolist())}
+
+
+def motion(
+    closure: Closure, position: Position, rates: list[float], pulls: list[float]
+) -> list[Array]:
+    """Return values, rates and accelerations of the joints at a closed position."""
+    velocity = closure.velocity(position, *rates)
+    acceleration = closure.acceleration(position, velocity, *pulls)
+    return [np.array(found.joints) for found in (position, velocity, acceleration)]
+
+
+def neighbours(closure: Closure, state: tuple[float, ...]) -> list[Position]:
+    """Return positions within rounding of a state."""
+    return [
+        closure.position(*(x + side * (1.0 + abs(x)) for x in state))
+        for side in (-1e-14, -1e-15, 1e-15, 1e-14)
+    ]
 
 
 @pytest.mark.parametrize('name', [*KINDS, *OTHERS])
@@ -274,32 +307,34 @@ odd = st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-pi, pi))
 
 
 @st.composite
-def linkages(draw: Any) -> Linkage:
-    """Draw a four-bar, a slider-crank or an inverted one, in odd frames."""
+def linkages(draw: Any) -> tuple[Linkage, float]:
+    """Draw a four-bar, a slider-crank or an inverted one, in odd frames, and its slenderness."""
     names = ('ground', 'crank', 'coupler', 'rocker', 'rod')
     frames = {name: draw(odd) for name in names} if draw(st.booleans()) else None
-    a, b, c = draw(length), draw(length), draw(length)
+    lengths = a, b, c, d = draw(length), draw(length), draw(length), draw(length)
+    slenderness = max(lengths) / min(lengths)
     kind = draw(st.sampled_from(('four-bar', 'slider-crank', 'inverted slider-crank')))
     if kind == 'four-bar':
         side = draw(st.sampled_from(('left', 'right')))
-        return four_bar_linkage((a, b, c, draw(length)), side, frames)
+        return four_bar_linkage(lengths, side, frames), slenderness
     side = draw(st.sampled_from(('ahead', 'behind')))
     offset = draw(st.sampled_from((0.0, 0.3 * c, -0.3 * c)))
     if kind == 'slider-crank':
-        return slider_crank_linkage(a, b, offset, side, frames)
-    return inverted_slider_crank_linkage((a, b, offset), side, frames, along=0.1)
+        return slider_crank_linkage(a, b, offset, side, frames), slenderness
+    return inverted_slider_crank_linkage((a, d, offset), side, frames, along=0.1), slenderness
 
 
 @settings(derandomize=True, deadline=None, max_examples=300)
 @given(linkages(), crank_angles)
 def test_any_linkage_of_one_loop_is_solved_as_state_by_state(
-    linkage: Linkage, angles: list[float]
+    drawn: tuple[Linkage, float], angles: list[float]
 ) -> None:
+    linkage, slenderness = drawn
     try:
         closure = Closure(linkage)
     except DefinitionError:
         assume(False)
-    check(closure, [np.array(angles)])
+    check(closure, [np.array(angles)], slenderness)
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'elliptic_trammel', 'five_bar'])
@@ -404,6 +439,20 @@ def test_a_toggle_has_a_position_and_no_rate() -> None:
         assert np.isnan(array).tolist() == [list(map(bool, lost))] * 2
     position = closure.position(0.12)
     assert batch.positions[:, 0].tolist() == pytest.approx(position.joints, abs=1e-15)
+
+
+def test_lines_that_are_parallel_do_not_cross_or_lie_on_each_other() -> None:
+    linkage, _ = OTHERS['pin in two slots']
+    sliders = {
+        's1': Slider('P', 'one', 'A', (1.0, 0.0), 'b1'),
+        's2': Slider('P', 'two', 'D', (2.0, 0.0), 'b2'),
+    }
+    links = {**linkage.links, 'ground': {'O': (0.0, 0.0), 'E': (0.9, 0.0)}}
+    closure = Closure(replace(linkage, links=links, sliders=sliders))
+    one, two = np.array([0.0, 0.3, pi, 0.3]), np.array([0.0, 0.3, pi, 0.2])
+    batch = closure.solve(one, two, rates=(1.0, 1.0))
+    assert batch.status.tolist() == [INDETERMINATE, OPEN, INDETERMINATE, CLOSED]
+    assert check(closure, [one, two]) == {Status.INDETERMINATE, Status.OPEN, Status.CLOSED}
 
 
 @pytest.mark.parametrize('exponent', [-900, -300, 3, 900])

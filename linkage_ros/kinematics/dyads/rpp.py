@@ -16,9 +16,9 @@
 """
 RPP: a link pinned at A slides along a second one, which slides on a known line; the Scotch yoke.
 
-Both links keep their angles to the one that carries the known line. In its frame, with A at z, the
-directions v̂ and û of the second line and of the known one, κ a constant, and × for the z component
-of the cross product::
+Both links keep their angles to the one that carries the known line. In its frame, with A at z,
+the directions v̂ and û of the second line and of the known one, κ a constant, and × for the z
+component of the cross product::
 
     z = κ + s2·û + s1·v̂        s1 = (z − κ) × û/(v̂ × û)        s2 = (z − κ) × v̂/(û × v̂)
 

@@ -1,0 +1,223 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""How fast linkages are solved with acceleration: one state at a time, and a million at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import tau
+from pathlib import Path
+import time
+
+from bench.kinematics_compiled import compiled, compiler
+from bench.kinematics_pylinkage import AVAILABLE, HAS_NUMBA, stepping
+from bench.kinematics_straight import straight_line
+from bench.processes import BenchError, ROOT
+from bench.report import say, Table
+from bench.spread import ratios, spread
+from linkage_ros.kinematics.batch.solve import Batch
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.diagonal import margin
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import read_yaml
+import numpy as np
+from numpy.typing import ArrayLike
+
+LENGTHS = (0.04, 0.12, 0.08, 0.1)
+"""Crank, coupler, rocker and ground of config/linkages/four_bar.yaml."""
+
+RATE, ACCELERATION = 3.0, 0.5
+
+_AGREEMENT = 1e-9
+"""What results of two contenders may differ by; else they did not do the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedPlan:
+    """
+    How much is measured.
+
+    Attributes
+    ----------
+    rounds
+        How often each is measured, in turn.
+    states
+        States that are solved one at a time, in a round.
+    batch
+        States of a batch.
+
+    """
+
+    rounds: int
+    states: int
+    batch: int
+
+
+def measure_speed(folder: Path, plan: SpeedPlan) -> Table:
+    """
+    Measure all and return the table.
+
+    Parameters
+    ----------
+    folder
+        Where what is compiled goes.
+    plan
+        How much is measured.
+
+    """
+    table = Table(
+        f'linkages solved with acceleration, one run, in turn; batch of {plan.batch:,} states',
+        ('', 'first', 'second', 'ratio', 'target'),
+    )
+    _one_at_a_time(plan, table)
+    _batches(folder, plan, table)
+    return table
+
+
+def _one_at_a_time(plan: SpeedPlan, table: Table) -> None:
+    four_bar, leg = (_closure(name) for name in ('four_bar', 'jansen_leg'))
+    line = straight_line(*LENGTHS, 1.0)
+    angles = [tau * i / plan.states for i in range(plan.states)]
+    for angle in angles[:: plan.states // 10]:
+        for one, other in zip(
+            _solve(four_bar, angle), line(angle, RATE, ACCELERATION), strict=True
+        ):
+            _agree('straight line', one, other)
+
+    def straight() -> None:
+        for angle in angles:
+            line(angle, RATE, ACCELERATION)
+
+    contenders: dict[str, Callable[[], object]] = {
+        'straight line': straight,
+        'four-bar': lambda: _walk(four_bar, angles),
+        'Jansen leg': lambda: _walk(leg, angles),
+    }
+    if AVAILABLE:
+        contenders['pylinkage'], _ = stepping(*LENGTHS, plan.states, RATE, ACCELERATION)
+    else:
+        say('  pylinkage is not installed: left out')
+    times = {
+        name: [1e6 * seconds / plan.states for seconds in found]
+        for name, found in _in_turn(contenders, plan.rounds).items()
+    }
+    for first, second, target in (
+        ('four-bar', 'straight line', '≤ 2'),
+        ('pylinkage', 'four-bar', '≥ 6'),
+        ('Jansen leg', 'four-bar', '≤ 6'),
+    ):
+        if first in times:
+            _compare(table, 'µs a state', first, second, times, target)
+
+
+def _batches(folder: Path, plan: SpeedPlan, table: Table) -> None:
+    four_bar = _closure('four_bar')
+    phi = np.linspace(0.0, tau, plan.batch)
+    ours, theirs = (tuple(np.empty((3, 2, plan.batch))) for _ in range(2))
+    out = Batch(np.empty(plan.batch, np.uint8), *ours)
+
+    def solve_all() -> Batch:
+        return four_bar.solve(phi, rates=RATE, accelerations=ACCELERATION, out=out)
+
+    contenders: dict[str, Callable[[], object]] = {'numpy': solve_all}
+    counts = {'numpy': plan.batch, 'C': plan.batch, 'pylinkage': plan.batch}
+    if compiler():
+        a, b, c, d = LENGTHS
+        margins = margin(d, -a, -b, c), margin(b, c, -a, -d)
+        solve = compiled(folder, (*LENGTHS, *margins, 1.0, 0.0))
+        if solve(phi, RATE, ACCELERATION, *theirs) or solve_all().status.any():
+            raise BenchError('batch: not all states are closed')
+        for one, other in zip(ours, theirs, strict=True):
+            _agree('C', one, other)
+        contenders['C'] = lambda: solve(phi, RATE, ACCELERATION, *theirs)
+    else:
+        say('  no C compiler (cc): left out')
+    if AVAILABLE:
+        if not HAS_NUMBA:
+            say('  pylinkage has no numba: a hundredth of the batch')
+            counts['pylinkage'] = plan.batch // 100
+        _, contenders['pylinkage'] = stepping(*LENGTHS, counts['pylinkage'], RATE, ACCELERATION)
+    speeds = {
+        name: [counts[name] / seconds / 1e6 for seconds in found]
+        for name, found in _in_turn(contenders, plan.rounds).items()
+    }
+    for second, target in (('C', '≥ 0.5'), ('pylinkage', '≥ 6')):
+        if second in speeds:
+            _compare(table, 'Mstates/s', 'numpy', second, speeds, target)
+
+
+def _closure(name: str) -> Closure:
+    content, _ = read_yaml(ROOT / 'config' / 'linkages' / f'{name}.yaml')
+    return Closure(read_linkage(content))
+
+
+def _solve(closure: Closure, angle: float) -> tuple[tuple[float, ...], ...]:
+    position = closure.position(angle)
+    velocity = closure.velocity(position, RATE)
+    acceleration = closure.acceleration(position, velocity, ACCELERATION)
+    return position.joints, velocity.joints, acceleration.joints
+
+
+def _walk(closure: Closure, angles: Sequence[float]) -> None:
+    solve_position, solve_velocity = closure.position, closure.velocity
+    solve_acceleration = closure.acceleration
+    for angle in angles:
+        position = solve_position(angle)
+        velocity = solve_velocity(position, RATE)
+        solve_acceleration(position, velocity, ACCELERATION)
+
+
+def _in_turn(
+    contenders: Mapping[str, Callable[[], object]], rounds: int
+) -> dict[str, list[float]]:
+    """Return for each how long it took, in [s], round by round."""
+    found: dict[str, list[float]] = {name: [] for name in contenders}
+    for run in contenders.values():
+        run()
+    for number in range(rounds):
+        # There and back again, so that a drift of the machine favours no one.
+        for name in found if number % 2 == 0 else reversed(found):
+            begun = time.perf_counter()
+            contenders[name]()
+            found[name].append(time.perf_counter() - begun)
+    say('  ' + ', '.join(f'{name} {min(times):.3g} s' for name, times in found.items()))
+    return found
+
+
+def _agree(name: str, one: ArrayLike, other: ArrayLike) -> None:
+    difference = float(np.max(np.abs(np.remainder(np.subtract(one, other) + 1.0, tau) - 1.0)))
+    if not difference < _AGREEMENT:
+        raise BenchError(f'{name}: differs by {difference:.2g}')
+
+
+def _compare(
+    table: Table,
+    what: str,
+    first: str,
+    second: str,
+    found: Mapping[str, Sequence[float]],
+    target: str,
+) -> None:
+    table.rows.append(
+        (
+            f'{what}: {first} / {second}',
+            spread(found[first], 2),
+            spread(found[second], 2),
+            spread(ratios(found[first], found[second]), 2),
+            target,
+        )
+    )

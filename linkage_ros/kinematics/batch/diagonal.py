@@ -1,0 +1,170 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The diagonal of a dyad over arrays.
+
+The rates and accelerations of a `FreeDiagonal` take arrays as they are.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+from linkage_ros.kinematics.batch.arrays import (
+    Array,
+    Complex,
+    joined,
+    phases,
+    reaches,
+    roots_of,
+    sine_cosine,
+    States,
+)
+from linkage_ros.kinematics.diagonal import (
+    CrankDiagonal,
+    Diagonal,
+    FreeDiagonal,
+    Growth,
+    GrowthChange,
+    SMALLEST,
+    UnsignedDiagonal,
+)
+from linkage_ros.tuples import new
+import numpy as np
+
+
+class CrankDiagonalArrays(CrankDiagonal):
+    """The diagonal between two links that are pinned together."""
+
+    __slots__ = ()
+
+    def at(self, known: States) -> Diagonal:
+        """Return the diagonals."""
+        x = known[0]
+        a, difference, root, fold, stretch, short_pair, whole = self._constants
+        first, second, offset = self.arms
+        base = x[second]
+        half = 0.5 * (x[first] - base)
+        half_sine, half_cosine = half_angle(half, offset, self.half_turn, stretch == 0.0)
+        near, far = root * half_sine, root * half_cosine
+        excess = near * near
+        square = difference * difference + excess
+        lower, upper = self.limits
+        met = square < SMALLEST
+        direction = base + np.arctan2(
+            -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
+        )
+        root_fold, missing = reaches(fold, near)
+        gap = missing / (np.sqrt(square) + lower)
+        root_stretch: Any = inf
+        if upper != inf:
+            if short_pair:
+                root_stretch, missing = roots_of(whole - excess, abs(whole) + excess)
+            else:
+                root_stretch, missing = reaches(stretch, far)
+            gap = np.where(gap > 0.0, gap, missing / (np.sqrt(square) + upper))
+        gap = np.where(met, lower, gap)
+        square = np.where(met, 0.0, square)
+        return new(Diagonal, (square, direction, root_fold, root_stretch, gap, near, far, excess))
+
+    def rates(self, diagonal: Diagonal, _known: States, speeds: States) -> Growth:
+        """Return how they grow and turn."""
+        v = speeds[0]
+        first, second, _ = self.arms
+        square, _, _, _, _, near, far, _ = diagonal
+        a, difference = self._constants[:2]
+        p = (a * difference - 0.5 * near * near) / square
+        q = 0.5 * near * far / square
+        base = v[second]
+        return new(Growth, (joined(q, -p), v[first] - base, base))
+
+    def accelerations(
+        self,
+        diagonal: Diagonal,
+        growth: Growth,
+        _known: States,
+        _speeds: States,
+        changes: States,
+    ) -> GrowthChange:
+        """Return the derivative of `rates`."""
+        a = changes[0]
+        first, second, _ = self.arms
+        q, p = growth.unit.real, -growth.unit.imag
+        square, _, fold, stretch, _, near, far, _ = diagonal
+        (short, long), (fold_bracket, stretch_bracket) = self.sides, self.brackets
+        turn = joined(p + (p - q) * (p + q), q * ((long - short) * (long + short) / square))
+        bend = 0.0
+        if fold_bracket:
+            bend = fold_bracket * (far / fold) * (far / fold)
+        if self.limits[1] == inf:
+            bend = bend - near * near
+        elif stretch_bracket:
+            bend = bend - stretch_bracket * (near / stretch) * (near / stretch)
+        return new(GrowthChange, (turn, a[first] - a[second], a[second], 0.25 * bend / square))
+
+
+class UnsignedDiagonalArrays(UnsignedDiagonal, CrankDiagonalArrays):
+    """A `CrankDiagonal` whose angle is known but for whole turns."""
+
+    __slots__ = ()
+
+
+class FreeDiagonalArrays(FreeDiagonal):
+    """The diagonal between two pins, from their coordinates."""
+
+    __slots__ = ()
+
+    def at(self, known: States) -> Diagonal:
+        """Return the diagonals."""
+        pins = known[1]
+        first, second = self._ends
+        start, end = pins[first], pins[second]
+        return free_diagonals(end - start, np.abs(start) + np.abs(end), *self._limits)
+
+
+def half_angle(
+    half: Array, offset: float, half_turn: tuple[float, float], exactly: bool
+) -> tuple[Array, Array]:
+    """Return sine and cosine, turned by half the offset; the cosine may be asked for exactly."""
+    if exactly:
+        sines, cosines = np.sin(half), np.cos(half)
+    else:
+        sines, cosines, spare = np.empty((3, *half.shape))
+        sine_cosine(half, sines, cosines, spare, 1.0)
+        np.add(sines, sines, out=sines)
+    if offset:
+        sine, cosine = half_turn
+        return sines * cosine + cosines * sine, cosines * cosine - sines * sine
+    return sines, cosines
+
+
+def free_diagonals(
+    vector: Complex, size: Array, lower: Array | float, upper: Array | float
+) -> Diagonal:
+    """Return the diagonals of vectors whose ends have coordinates of a size."""
+    s = np.abs(vector)
+    square = s * s
+    met = square < SMALLEST
+    root_fold, missing = roots_of((s - lower) * (s + lower), (size + lower) * (s + lower))
+    gap = missing / (s + lower)
+    root_stretch: Any = inf
+    if not (isinstance(upper, float) and upper == inf):
+        root_stretch, missing = roots_of((upper - s) * (upper + s), (size + upper) * (upper + s))
+        gap = np.where(gap > 0.0, gap, missing / (upper + s))
+    gap = np.where(met, lower, gap)
+    square = np.where(met, 0.0, square)
+    return new(Diagonal, (square, phases(vector), root_fold, root_stretch, gap, 0.0, 0.0, square))

@@ -1,0 +1,160 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A pin seen from a rail, over arrays."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+from linkage_ros.kinematics.batch.arrays import (
+    Array,
+    joined,
+    reaches,
+    roots_of,
+    States,
+    turned,
+)
+from linkage_ros.kinematics.rail import CrankRail, FreeRail, Sight, UnsignedRail
+from linkage_ros.tuples import new
+import numpy as np
+
+
+class CrankRailArrays(CrankRail):
+    """A rail on a link to which the link of A is pinned."""
+
+    __slots__ = ()
+
+    def at(self, known: States) -> Sight:
+        """Return the pins in the frame of the rail."""
+        a, pivot, below, above, root, changes_over = self._constants
+        first, second = self._arms
+        x, link = known[0], self._link
+        base = x[second]
+        swing = x[first] - base
+        arm = turned(swing) * self._arm
+        place = pivot + arm
+        if link == inf:
+            return new(Sight, (place, inf, inf, 0.0, base, arm))
+        eta = turned(-0.5 * swing) * self._half_turn
+        sine, cosine = eta.imag, eta.real
+        root_below, gap = self._roots(below, root * sine, -place.imag)
+        root_above, missing = self._roots(above, root * cosine, place.imag)
+        if changes_over:
+            arm = joined(2.0 * a * sine * cosine, arm.imag)
+        gap = np.where(gap > 0.0, gap, missing)
+        return new(Sight, (place, root_below, root_above, gap, base, arm))
+
+    def _roots(self, bracket: float, part: Array, side: Array) -> tuple[Any, Any]:
+        """Return the roots of the link's length less what it has to reach, and the gaps."""
+        if bracket == 0.0:
+            return reaches(bracket, part)
+        link, square = self._link, part * part
+        total, size = link + side, link + np.abs(side)
+        shorter = abs(bracket) + square < size
+        return roots_of(
+            np.where(shorter, bracket + square, total),
+            np.where(shorter, abs(bracket) + square, size),
+        )
+
+    def rates(self, sight: Sight, _known: States, speeds: States) -> tuple[Any, Any]:
+        """Return the pins' velocity in the frame of the rail, and the rate of the frame."""
+        first, second = self._arms
+        v = speeds[0]
+        swing, arm = v[first] - v[second], sight.arm
+        return joined(-swing * arm.imag, swing * arm.real), v[second]
+
+    def accelerations(
+        self, sight: Sight, _rates: Any, _known: States, speeds: States, changes: States
+    ) -> tuple[Any, Any]:
+        """Return the pins' acceleration in the frame of the rail, and that of the frame."""
+        first, second = self._arms
+        v, a = speeds[0], changes[0]
+        swing = v[first] - v[second]
+        return joined(-swing * swing, a[first] - a[second]) * sight.arm, a[second]
+
+    def across(
+        self,
+        sight: Sight,
+        _pull: Any,
+        along: Any,
+        link_rate: Any,
+        speeds: States,
+        changes: States,
+    ) -> Any:
+        """Return ÿ + y·λ̇²."""
+        first, second = self._arms
+        v, changed = speeds[0], changes[0]
+        a, pivot, below, above = self._constants[:4]
+        link, e = self._link, pivot.imag
+        y: Any = sight.place.imag
+        swing = v[first] - v[second]
+        left = y > 0.0
+        square = np.where(left, sight.below, sight.above)
+        square = square * square
+        term = e * square * square
+        other = y * np.where(left, below * (a + link - e), above * (a + link + e))
+        parts = -swing * swing * sight.arm.imag, y * link_rate * link_rate
+        square = (swing / along) ** 2
+        closed_form = (np.abs(term) + np.abs(other)) * square < abs(parts[0]) + abs(parts[1])
+        rest = np.where(closed_form, (term - other) * square, parts[0] + parts[1])
+        return (changed[first] - changed[second]) * sight.arm.real + rest
+
+
+class UnsignedRailArrays(UnsignedRail, CrankRailArrays):
+    """A `CrankRail` whose angle is known but for whole turns."""
+
+    __slots__ = ()
+
+
+class FreeRailArrays(FreeRail):
+    """A rail and a pin, from their coordinates."""
+
+    __slots__ = ()
+
+    def at(self, known: States) -> Sight:
+        """Return the pins in the frame of the rail."""
+        x, pins = known
+        base = x[self._arm]
+        start, end = (pins[i] for i in self._ends)
+        place = (end - start) * (turned(-base) * self._back)
+        link = self._link
+        if link == inf:
+            return new(Sight, (place, inf, inf, 0.0, base, 0j))
+        size = np.abs(start) + np.abs(end) + link
+        below, gap = roots_of(link - place.imag, size)
+        above, missing = roots_of(link + place.imag, size)
+        return new(Sight, (place, below, above, np.where(gap > 0.0, gap, missing), base, 0j))
+
+    def rates(self, sight: Sight, _known: States, speeds: States) -> tuple[Any, Any]:
+        """Return the pins' velocity in the frame of the rail, and the rate of the frame."""
+        v, velocities = speeds
+        start, end = (velocities[i] for i in self._ends)
+        turn = v[self._arm]
+        back = turned(-sight.base) * self._back
+        return (end - start) * back - joined(0.0, turn) * sight.place, turn
+
+    def accelerations(
+        self, sight: Sight, rates: Any, _known: States, _speeds: States, changes: States
+    ) -> tuple[Any, Any]:
+        """Return the pins' acceleration in the frame of the rail, and that of the frame."""
+        a, pulls = changes
+        start, end = (pulls[i] for i in self._ends)
+        velocity, turn = rates
+        change = a[self._arm]
+        back = turned(-sight.base) * self._back
+        apparent = joined(0.0, 2.0 * turn) * velocity + joined(-turn * turn, change) * sight.place
+        return (end - start) * back - apparent, change
