@@ -41,9 +41,8 @@ position is off by √δ and κ is 1/(2·√δ), which makes 32 of it.
 
 EXTREME = 'near an extreme it is a small difference of terms that κ, a sum of slopes, leaves out'
 CHAIN = 'κ of the inputs does not count the rounding of what a dyad hands to the next one'
-TIED = (
-    'κ lets the lengths change together, so that it is small where the crank pin passes D closely'
-)
+TIED = 'κ lets the lengths change together: it is small where the crank pin passes D closely'
+
 
 EXCEPTIONS: dict[tuple[str, str], tuple[float, str]] = {
     ('RRR', 'velocity'): (13, EXTREME),
