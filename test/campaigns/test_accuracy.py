@@ -90,8 +90,13 @@ EXCEPTIONS: dict[tuple[str, str], tuple[float, str]] = {
     ('chain whose pins meet', 'velocity'): (4.7, CHAIN),
     ('chain whose pins meet', 'acceleration'): (2.8e02, CHAIN),
     ('chain at a toggle', AT_TOGGLE): (33.0, CHAIN),
+    ('wound crank', 'velocity'): (4.9, EXTREME),
 }
-"""For a family and quantity the worst that eleven million cases reached, rounded up, and why."""
+"""
+For a family and quantity the worst of the campaign's eleven million cases, rounded up, and why.
+
+Of the wound crank the sample below holds a worse one than the campaign, which met 3.6.
+"""
 
 
 @pytest.fixture(scope='module')
