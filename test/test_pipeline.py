@@ -31,6 +31,8 @@ from linkage_ros.scene.load import parse_scene
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
+from .ros.loops import FIVE_BAR
+
 STORE = get_typestore(Stores.ROS2_JAZZY)
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
@@ -228,21 +230,7 @@ def test_acceleration_needs_the_cranks_rate():
     assert held.offer(CRANK.write(BEGIN, [1.0], []), BEGIN) is Rejection.NO_RATE
 
 
-TWO_CRANKS = b"""
-links:
-  ground: {O1: [0, 0], O2: [0.1, 0]}
-  left: {O1: [0, 0], A: [0.04, 0]}
-  right: {O2: [0, 0], C: [0.05, 0]}
-  upper: {A: [0, 0], B: [0.12, 0]}
-  lower: {C: [0, 0], B: [0.11, 0]}
-input:
-  - {joint: left_crank, parent: ground, child: left}
-  - {joint: right_crank, parent: ground, child: right}
-assembly: {B: left}
-joints:
-  upper_joint: {parent: ground, child: upper}
-  lower_joint: {parent: ground, child: lower}
-"""
+TWO_CRANKS = FIVE_BAR.encode()
 
 
 def test_two_inputs_come_out_of_one_message_in_any_order():

@@ -83,6 +83,11 @@ def root_of(total: float, size: float) -> tuple[float, float]:
     return 0.0, (0.0 if total >= -rounding else -total)
 
 
+def cross(one: complex, other: complex) -> float:
+    """Return the z component of the cross product of two vectors."""
+    return one.real * other.imag - one.imag * other.real
+
+
 def folded(angle: float) -> float:
     """Return the acute angle between two lines, of an angle between them, in [rad]."""
     return abs(remainder(angle, pi))
@@ -290,7 +295,7 @@ class CrankDiagonal:
         p = (a * difference - 0.5 * near * near) / square
         q = 0.5 * near * far / square
         base = v[second]
-        return new(Growth, (complex(q, -p), v[first] - base, base))
+        return new(Growth, (q - 1j * p, v[first] - base, base))
 
     def accelerations(
         self, diagonal: Diagonal, growth: Growth, _known: State, _speeds: State, changes: State
@@ -311,11 +316,11 @@ class CrankDiagonal:
         q, p = growth.unit.real, -growth.unit.imag
         square, _, fold, stretch, _, near, far, _ = diagonal
         (short, long), (fold_bracket, stretch_bracket) = self.sides, self.brackets
-        turn = complex(p + (p - q) * (p + q), q * ((long - short) * (long + short) / square))
+        turn = p + (p - q) * (p + q) + 1j * (q * ((long - short) * (long + short) / square))
         bend = 0.0
         if fold_bracket:
             bend = fold_bracket * (far / fold) * (far / fold)
-        if stretch == inf:
+        if self.limits[1] == inf:
             bend -= near * near
         elif stretch_bracket:
             bend -= stretch_bracket * (near / stretch) * (near / stretch)

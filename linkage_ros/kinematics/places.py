@@ -17,9 +17,7 @@
 
 from __future__ import annotations
 
-from cmath import rect
-
-from linkage_ros.kinematics.step import PLACED, Pose, State
+from linkage_ros.kinematics.step import facing, PLACED, Pose, State
 
 
 class FixedPoint:
@@ -71,6 +69,8 @@ class PointOnLink:
 
     __slots__ = ('_arm', '_pin', '_point', '_vector')
 
+    _facing = staticmethod(facing)
+
     def __init__(self, pin: int, point: int, arm: int, vector: complex) -> None:
         self._pin = pin
         self._point = point
@@ -80,14 +80,14 @@ class PointOnLink:
     def close(self, known: State) -> Pose:
         """Append the point."""
         x, pins = known
-        pins.append(pins[self._pin] + rect(1.0, x[self._arm]) * self._vector)
+        pins.append(pins[self._pin] + self._facing(x[self._arm]) * self._vector)
         return PLACED
 
     def rates(self, _pose: Pose, known: State, speeds: State) -> None:
         """Append its velocity."""
         pins, (v, velocities) = known[1], speeds
         arm = pins[self._point] - pins[self._pin]
-        velocities.append(velocities[self._pin] + complex(0.0, v[self._arm]) * arm)
+        velocities.append(velocities[self._pin] + 1j * v[self._arm] * arm)
 
     def accelerations(
         self, _pose: Pose, _rates: None, known: State, speeds: State, changes: State
@@ -95,7 +95,7 @@ class PointOnLink:
         """Append its acceleration."""
         pins, turn, (a, pulls) = known[1], speeds[0][self._arm], changes
         arm = pins[self._point] - pins[self._pin]
-        pulls.append(pulls[self._pin] + complex(-turn * turn, a[self._arm]) * arm)
+        pulls.append(pulls[self._pin] + (1j * a[self._arm] - turn * turn) * arm)
 
 
 class PointOnRail:
@@ -117,6 +117,8 @@ class PointOnRail:
 
     __slots__ = ('_arm', '_pin', '_slide', '_unit')
 
+    _facing = staticmethod(facing)
+
     def __init__(self, pin: int, arm: int, slide: int, unit: complex) -> None:
         self._pin = pin
         self._arm = arm
@@ -126,15 +128,15 @@ class PointOnRail:
     def close(self, known: State) -> Pose:
         """Append the point."""
         x, pins = known
-        unit = rect(1.0, x[self._arm]) * self._unit
+        unit = self._facing(x[self._arm]) * self._unit
         pins.append(pins[self._pin] + x[self._slide] * unit)
         return PLACED
 
     def rates(self, _pose: Pose, known: State, speeds: State) -> None:
         """Append its velocity."""
         x, (v, velocities) = known[0], speeds
-        unit = rect(1.0, x[self._arm]) * self._unit
-        moved = complex(v[self._slide], v[self._arm] * x[self._slide])
+        unit = self._facing(x[self._arm]) * self._unit
+        moved = v[self._slide] + 1j * (v[self._arm] * x[self._slide])
         velocities.append(velocities[self._pin] + moved * unit)
 
     def accelerations(
@@ -142,12 +144,10 @@ class PointOnRail:
     ) -> None:
         """Append its acceleration."""
         x, v, (a, pulls) = known[0], speeds[0], changes
-        unit = rect(1.0, x[self._arm]) * self._unit
+        unit = self._facing(x[self._arm]) * self._unit
         slide, turn = x[self._slide], v[self._arm]
-        moved = complex(
-            a[self._slide] - turn * turn * slide,
-            a[self._arm] * slide + 2.0 * turn * v[self._slide],
-        )
+        across = a[self._arm] * slide + 2.0 * turn * v[self._slide]
+        moved = a[self._slide] - turn * turn * slide + 1j * across
         pulls.append(pulls[self._pin] + moved * unit)
 
 

@@ -29,7 +29,7 @@ from math import inf, pi, sqrt
 from typing import NamedTuple, Protocol
 
 from linkage_ros.kinematics.diagonal import margin, reach, root_of
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import facing, State
 from linkage_ros.tuples import new
 
 
@@ -168,7 +168,7 @@ class CrankRail:
         first, second = self._arms
         v = speeds[0]
         swing, arm = v[first] - v[second], sight.arm
-        return complex(-swing * arm.imag, swing * arm.real), v[second]
+        return 1j * (swing * arm.real) - swing * arm.imag, v[second]
 
     def accelerations(
         self,
@@ -182,7 +182,7 @@ class CrankRail:
         first, second = self._arms
         v, a = speeds[0], changes[0]
         swing = v[first] - v[second]
-        return complex(-swing * swing, a[first] - a[second]) * sight.arm, a[second]
+        return (1j * (a[first] - a[second]) - swing * swing) * sight.arm, a[second]
 
     def across(
         self,
@@ -252,6 +252,8 @@ class FreeRail:
 
     __slots__ = ('_arm', '_back', '_ends', '_link')
 
+    _facing = staticmethod(facing)
+
     def __init__(self, ends: tuple[int, int], link: float, arm: int, unit: complex) -> None:
         self._ends = ends
         self._link = link
@@ -263,7 +265,7 @@ class FreeRail:
         x, pins = known
         base = x[self._arm]
         start, end = (pins[i] for i in self._ends)
-        place = (end - start) * (rect(1.0, -base) * self._back)
+        place = (end - start) * (self._facing(-base) * self._back)
         link = self._link
         if link == inf:
             return new(Sight, (place, inf, inf, 0.0, base, 0j))
@@ -279,8 +281,8 @@ class FreeRail:
         v, velocities = speeds
         start, end = (velocities[i] for i in self._ends)
         turn = v[self._arm]
-        back = rect(1.0, -sight.base) * self._back
-        return (end - start) * back - complex(0.0, turn) * sight.place, turn
+        back = self._facing(-sight.base) * self._back
+        return (end - start) * back - 1j * turn * sight.place, turn
 
     def accelerations(
         self,
@@ -295,7 +297,7 @@ class FreeRail:
         start, end = (pulls[i] for i in self._ends)
         velocity, turn = rates
         change = a[self._arm]
-        back = rect(1.0, -sight.base) * self._back
+        back = self._facing(-sight.base) * self._back
         # Coriolis, Euler and centrifugal terms of a frame that turns.
         apparent = (
             complex(0.0, 2.0 * turn) * velocity + complex(-turn * turn, change) * sight.place

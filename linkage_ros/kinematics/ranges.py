@@ -27,12 +27,16 @@ from math import acos, asin, inf, pi, sqrt, tau
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.diagonal import CrankDiagonal
+from linkage_ros.kinematics.dyads.rpp import RPPDyad
+from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure
 
 _SAMPLES = 720
+
+_CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, Turned)
 
 
 class InputRange(NamedTuple):
@@ -81,7 +85,7 @@ def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
             # The first dyad sets the frame; further ones on the same crank are cut out below.
             exact = exact and intervals == [(-pi, pi)]
             intervals = shifted if exact else intervals
-        elif hasattr(step, 'diagonal') or not _harmless(step):
+        elif not isinstance(step, _CLOSE_EVERYWHERE):
             exact = False
     if intervals and not exact:
         start, end = intervals[0][0], intervals[-1][1]
@@ -98,11 +102,6 @@ def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
 def describe(ranges: tuple[InputRange, ...]) -> str:
     """Return ranges as a user reads them."""
     return ' or '.join(map(str, ranges)) or 'no single range: it depends on every input'
-
-
-def _harmless(step: object) -> bool:
-    """Return whether a step closes everywhere."""
-    return type(step).__name__ in ('FixedPoint', 'PointOnLink', 'PointOnRail', 'Turned', 'RPPDyad')
 
 
 def _crank_intervals(diagonal: CrankDiagonal) -> list[tuple[float, float]]:

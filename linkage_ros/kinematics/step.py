@@ -24,6 +24,9 @@ the inputs follow, then what the steps append. Lengths are in the unit of the cl
 
 from __future__ import annotations
 
+from cmath import rect
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.kinematics.status import Status
@@ -48,6 +51,9 @@ class State(NamedTuple):
 
 Pose = tuple[Any, ...]
 """What a step found: its status and its gap first, then what its own rates start from."""
+
+facing: Callable[[Any], Any] = partial(rect, 1.0)
+"""Returns e^{iθ}; the steps that solve arrays have one of their own in its place."""
 
 PLACED: Pose = (Status.CLOSED, 0.0)
 """The pose of a step that cannot fail."""

@@ -21,6 +21,7 @@ from collections.abc import Callable
 from importlib.util import find_spec
 import os
 from pathlib import Path
+import pty
 import subprocess
 import sys
 
@@ -46,6 +47,30 @@ def environment(folder: Path) -> dict[str, str]:
         'ROS_LOG_DIR': str(folder),
         'RCUTILS_COLORIZED_OUTPUT': '0',
     }
+
+
+def on_terminal(folder: Path, *arguments: str, columns: int = 120) -> str:
+    """Return what ``linkage`` shows on a terminal, where it ends well."""
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'linkage_ros.cli.main', *arguments],
+        cwd=folder,
+        env=environment(folder)
+        | {'TERM': 'xterm-256color', 'COLUMNS': str(columns), 'LINES': '40'},
+        stdout=theirs,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(theirs)
+    shown = b''
+    while True:
+        try:
+            part = os.read(ours, 65536)
+        except OSError:  # a pty's way to say that the other end is closed
+            break
+        shown += part
+    os.close(ours)
+    assert process.wait(30) == 0
+    return shown.decode()
 
 
 @pytest.fixture

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-import pty
 import re
 import signal
 import subprocess
@@ -30,7 +29,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 
-from .conftest import environment, Run
+from .conftest import environment, on_terminal, Run
 
 PNG = b'\x89PNG\r\n\x1a\n'
 
@@ -95,26 +94,9 @@ def test_ctrl_c_at_any_moment_leaves_no_open_bag(tmp_path: Path, after: float) -
 
 
 def test_on_a_terminal_the_display_is_live(tmp_path: Path) -> None:
-    ours, theirs = pty.openpty()
-    demo = subprocess.Popen(
-        [sys.executable, '-m', 'linkage_ros.cli.main', 'demo', '--seconds', '3'],
-        cwd=tmp_path,
-        env=environment(tmp_path) | {'TERM': 'xterm-256color', 'COLUMNS': '120', 'LINES': '40'},
-        stdout=theirs,
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(theirs)
-    shown = b''
-    while True:
-        try:
-            part = os.read(ours, 65536)
-        except OSError:  # a pty's way to say that the other end is closed
-            break
-        shown += part
-    os.close(ours)
-    assert demo.wait(30) == 0
-    text = re.sub(r'\x1b\[[0-9;?]*[A-Za-z]', '', shown.decode())
-    assert '\x1b[' in shown.decode()
+    shown = on_terminal(tmp_path, 'demo', '--seconds', '3')
+    text = re.sub(r'\x1b\[[0-9;?]*[A-Za-z]', '', shown)
+    assert '\x1b[' in shown
     for name in ('crank_joint', 'coupler_joint', 'rocker_joint', 'input age', 'lost', 'samples'):
         assert name in text
     assert 'joint states replay to the same bytes' in text

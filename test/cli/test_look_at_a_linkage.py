@@ -22,15 +22,13 @@ import csv
 import io
 import json
 from math import acos, degrees, pi, radians, remainder, tau
-import os
 from pathlib import Path
-import pty
 import subprocess
 import sys
 
 import pytest
 
-from .conftest import environment, Run
+from .conftest import environment, on_terminal, Run
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 FILES = sorted(LINKAGES.glob('*.yaml'))
@@ -106,26 +104,10 @@ def test_a_link_too_free_or_held_too_well_is_named_in_a_line(
 
 
 def test_check_on_a_terminal_draws_tables(tmp_path: Path) -> None:
-    ours, theirs = pty.openpty()
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'linkage_ros.cli.main', 'check', FOUR_BAR],
-        cwd=tmp_path,
-        env=environment(tmp_path) | {'TERM': 'xterm-256color', 'COLUMNS': '160', 'LINES': '40'},
-        stdout=theirs,
-    )
-    os.close(theirs)
-    shown = b''
-    while True:
-        try:
-            part = os.read(ours, 65536)
-        except OSError:  # a pty's way to say that the other end is closed
-            break
-        shown += part
-    os.close(ours)
-    assert process.wait(30) == 0
-    assert '╭' in shown.decode()
+    shown = on_terminal(tmp_path, 'check', FOUR_BAR, columns=160)
+    assert '╭' in shown
     # Units in brackets are no markup.
-    assert 'lengths [m]' in shown.decode()
+    assert 'lengths [m]' in shown
 
 
 def by_hand(a: float, b: float, c: float, d: float, phi: float) -> tuple[float, float]:

@@ -27,7 +27,6 @@ from typing import Any
 from linkage_ros.kinematics.batch.arrays import (
     Array,
     Complex,
-    joined,
     phases,
     reaches,
     roots_of,
@@ -38,8 +37,6 @@ from linkage_ros.kinematics.diagonal import (
     CrankDiagonal,
     Diagonal,
     FreeDiagonal,
-    Growth,
-    GrowthChange,
     SMALLEST,
     UnsignedDiagonal,
 )
@@ -80,41 +77,6 @@ class CrankDiagonalArrays(CrankDiagonal):
         gap = np.where(met, lower, gap)
         square = np.where(met, 0.0, square)
         return new(Diagonal, (square, direction, root_fold, root_stretch, gap, near, far, excess))
-
-    def rates(self, diagonal: Diagonal, _known: States, speeds: States) -> Growth:
-        """Return how they grow and turn."""
-        v = speeds[0]
-        first, second, _ = self.arms
-        square, _, _, _, _, near, far, _ = diagonal
-        a, difference = self._constants[:2]
-        p = (a * difference - 0.5 * near * near) / square
-        q = 0.5 * near * far / square
-        base = v[second]
-        return new(Growth, (joined(q, -p), v[first] - base, base))
-
-    def accelerations(
-        self,
-        diagonal: Diagonal,
-        growth: Growth,
-        _known: States,
-        _speeds: States,
-        changes: States,
-    ) -> GrowthChange:
-        """Return the derivative of `rates`."""
-        a = changes[0]
-        first, second, _ = self.arms
-        q, p = growth.unit.real, -growth.unit.imag
-        square, _, fold, stretch, _, near, far, _ = diagonal
-        (short, long), (fold_bracket, stretch_bracket) = self.sides, self.brackets
-        turn = joined(p + (p - q) * (p + q), q * ((long - short) * (long + short) / square))
-        bend = 0.0
-        if fold_bracket:
-            bend = fold_bracket * (far / fold) * (far / fold)
-        if self.limits[1] == inf:
-            bend = bend - near * near
-        elif stretch_bracket:
-            bend = bend - stretch_bracket * (near / stretch) * (near / stretch)
-        return new(GrowthChange, (turn, a[first] - a[second], a[second], 0.25 * bend / square))
 
 
 class UnsignedDiagonalArrays(UnsignedDiagonal, CrankDiagonalArrays):

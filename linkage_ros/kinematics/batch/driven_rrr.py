@@ -19,17 +19,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkage_ros.kinematics.batch.arrays import joined, phases, States, turned
+from linkage_ros.kinematics.batch.arrays import phases, States, turned
 from linkage_ros.kinematics.batch.diagonal import free_diagonals
 from linkage_ros.kinematics.batch.rrr import close_triangles
-from linkage_ros.kinematics.diagonal import Growth, GrowthChange
 from linkage_ros.kinematics.dyads.driven_rrr import (
     DrivenRRRDyad,
     DrivenRRRPose,
-    DrivenRRRRates,
     Side,
 )
-from linkage_ros.kinematics.dyads.rrr import triangle_accelerations, triangle_rates
 from linkage_ros.tuples import new
 import numpy as np
 
@@ -39,38 +36,7 @@ class SideArrays(Side):
 
     __slots__ = ()
 
-    def at(self, x: Any) -> Any:
-        """Return the vectors."""
-        z: Any = self._end
-        for origin, inner, angle, turn, slide, sign, unit in self._carries:
-            if turn >= 0:
-                z = origin + turned(angle + sign * x[turn]) * (z - inner)
-            else:
-                z = origin + turned(angle) * (z - inner) + sign * x[slide] * unit
-        return z - self._start
-
-    def changes(self, x: Any, v: Any, a: Any = None) -> tuple[Any, Any]:
-        """Return their first derivative, and the second one where accelerations are given."""
-        z: Any = self._end
-        rate: Any = 0j
-        change: Any = 0j
-        for origin, inner, angle, turn, slide, sign, unit in self._carries:
-            if turn >= 0:
-                facing = turned(angle + sign * x[turn])
-                w = sign * v[turn]
-                arm = z - inner
-                if a is not None:
-                    pull = joined(-w * w, sign * a[turn]) * arm
-                    change = facing * (change + joined(0.0, 2.0 * w) * rate + pull)
-                rate = facing * (rate + joined(0.0, w) * arm)
-                z = origin + facing * arm
-            else:
-                held = turned(angle)
-                if a is not None:
-                    change = held * change + sign * a[slide] * unit
-                rate = held * rate + sign * v[slide] * unit
-                z = origin + held * (z - inner) + sign * x[slide] * unit
-        return rate, change
+    _facing = staticmethod(turned)
 
 
 class DrivenRRRArrays(DrivenRRRDyad):
@@ -90,44 +56,6 @@ class DrivenRRRArrays(DrivenRRRDyad):
         x.append(pose.first - phases(one))
         x.append(pose.second - phases(other))
         return new(DrivenRRRPose, (pose.status, pose.gap, pose, (one, other)))
-
-    def rates(self, pose: DrivenRRRPose, known: States, speeds: States) -> DrivenRRRRates:
-        """Append the rates of the first link of each group."""
-        x, pins = known
-        v, velocities = speeds
-        start, end = self._ends
-        one, other = (side.changes(x, v)[0] for side in self._sides)
-        units = self._units(pose)
-        between = velocities[end] + other * units[1] - velocities[start] - one * units[0]
-        growth = Growth(between / (pins[end] - pins[start]), 1.0, 0.0)
-        rates = triangle_rates(pose.triangle, growth, speeds)
-        return DrivenRRRRates(rates, (one, other))
-
-    def accelerations(
-        self,
-        pose: DrivenRRRPose,
-        rates: DrivenRRRRates,
-        known: States,
-        speeds: States,
-        changes: States,
-    ) -> None:
-        """Append the accelerations of the first link of each group."""
-        x, pins = known
-        v, (a, pulls) = speeds[0], changes
-        start, end = self._ends
-        unit, cot_beta, cot_gamma = rates.triangle.growth.unit, *rates.triangle[1:]
-        turns = unit.imag + unit.real * cot_gamma, unit.imag + unit.real * cot_beta
-        one, other = (
-            (side.changes(x, v, a)[1] + joined(0.0, 2.0 * turn) * rate) * facing
-            for side, turn, rate, facing in zip(
-                self._sides, turns, rates.sides, self._units(pose), strict=True
-            )
-        )
-        between: Any = pulls[end] + other - pulls[start] - one
-        square = between / (pins[end] - pins[start]) - unit * unit
-        b, c = map(abs, pose.sides)
-        change = GrowthChange(square, 0.0, 0.0, None)
-        triangle_accelerations(pose.triangle, (b - c) * (b + c), rates.triangle, change, changes)
 
     def _units(self, pose: DrivenRRRPose) -> Any:
         """Return e^{iθ} of the first link of each group."""

@@ -17,9 +17,8 @@
 
 from __future__ import annotations
 
-from linkage_ros.kinematics.batch.arrays import joined, States, turned
+from linkage_ros.kinematics.batch.arrays import turned
 from linkage_ros.kinematics.places import PointOnLink, PointOnRail
-from linkage_ros.kinematics.step import PLACED, Pose
 
 
 class PointOnLinkArrays(PointOnLink):
@@ -27,25 +26,7 @@ class PointOnLinkArrays(PointOnLink):
 
     __slots__ = ()
 
-    def close(self, known: States) -> Pose:
-        """Append the point."""
-        x, pins = known
-        pins.append(pins[self._pin] + turned(x[self._arm]) * self._vector)
-        return PLACED
-
-    def rates(self, _pose: Pose, known: States, speeds: States) -> None:
-        """Append its velocity."""
-        pins, (v, velocities) = known[1], speeds
-        arm = pins[self._point] - pins[self._pin]
-        velocities.append(velocities[self._pin] + joined(0.0, v[self._arm]) * arm)
-
-    def accelerations(
-        self, _pose: Pose, _rates: None, known: States, speeds: States, changes: States
-    ) -> None:
-        """Append its acceleration."""
-        pins, turn, (a, pulls) = known[1], speeds[0][self._arm], changes
-        arm = pins[self._point] - pins[self._pin]
-        pulls.append(pulls[self._pin] + joined(-turn * turn, a[self._arm]) * arm)
+    _facing = staticmethod(turned)
 
 
 class PointOnRailArrays(PointOnRail):
@@ -53,29 +34,4 @@ class PointOnRailArrays(PointOnRail):
 
     __slots__ = ()
 
-    def close(self, known: States) -> Pose:
-        """Append the point."""
-        x, pins = known
-        unit = turned(x[self._arm]) * self._unit
-        pins.append(pins[self._pin] + x[self._slide] * unit)
-        return PLACED
-
-    def rates(self, _pose: Pose, known: States, speeds: States) -> None:
-        """Append its velocity."""
-        x, (v, velocities) = known[0], speeds
-        unit = turned(x[self._arm]) * self._unit
-        moved = joined(v[self._slide], v[self._arm] * x[self._slide])
-        velocities.append(velocities[self._pin] + moved * unit)
-
-    def accelerations(
-        self, _pose: Pose, _rates: None, known: States, speeds: States, changes: States
-    ) -> None:
-        """Append its acceleration."""
-        x, v, (a, pulls) = known[0], speeds[0], changes
-        unit = turned(x[self._arm]) * self._unit
-        slide, turn = x[self._slide], v[self._arm]
-        moved = joined(
-            a[self._slide] - turn * turn * slide,
-            a[self._arm] * slide + 2.0 * turn * v[self._slide],
-        )
-        pulls.append(pulls[self._pin] + moved * unit)
+    _facing = staticmethod(turned)

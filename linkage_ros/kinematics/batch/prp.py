@@ -19,9 +19,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkage_ros.kinematics.batch.arrays import codes_of, joined, States, turned
-from linkage_ros.kinematics.diagonal import ROUNDING
-from linkage_ros.kinematics.dyads.prp import PRPDyad, PRPPose
+from linkage_ros.kinematics.batch.arrays import codes_of, States, turned
+from linkage_ros.kinematics.diagonal import cross, ROUNDING
+from linkage_ros.kinematics.dyads.prp import PRPDyad, PRPPose, resolved
 from linkage_ros.tuples import new
 import numpy as np
 
@@ -36,50 +36,13 @@ class PRPArrays(PRPDyad):
         x, pins = known
         (i, j), (one, other) = self._arms, self._units
         start, end = (pins[k] for k in self._starts)
-        units = turned(x[i]) * one, turned(x[j]) * other
-        across = turned(x[j] - x[i]) * self._across
-        between = end - start
+        units: Any = turned(x[i]) * one, turned(x[j]) * other
+        across: Any = turned(x[j] - x[i]) * self._across
+        between: Any = end - start
         parallel = np.abs(across.imag) <= ROUNDING
-        apart = np.abs(_cross(units[0], between))
+        apart = np.abs(cross(units[0], between))
         far = parallel & (apart > ROUNDING * (np.abs(start) + np.abs(end)))
         gap = np.where(far, apart, 0.0)
-        first, second = _slides(between, units, across.imag, known)
+        first, second = resolved(between, units, across.imag, known)
         codes = codes_of(gap, parallel, False)
         return new(PRPPose, (codes, gap, first, second, across, units))
-
-    def rates(self, pose: PRPPose, _known: States, speeds: States) -> tuple[Any, Any]:
-        """Append the rates of both slides."""
-        v, velocities = speeds
-        (i, j), (one, other) = self._arms, pose.units
-        start, end = (velocities[k] for k in self._starts)
-        carried: Any = end + joined(0.0, v[j] * pose.second) * other
-        carried = carried - (start + joined(0.0, v[i] * pose.first) * one)
-        return _slides(carried, pose.units, pose.across.imag, speeds)
-
-    def accelerations(
-        self, pose: PRPPose, rates: Any, _known: States, speeds: States, changes: States
-    ) -> None:
-        """Append the accelerations of both slides."""
-        v, (a, pulls) = speeds[0], changes
-        (i, j), (one, other) = self._arms, pose.units
-        start, end = (pulls[k] for k in self._starts)
-        carried: Any = end + _carried(pose.second, rates[1], v[j], a[j]) * other
-        carried = carried - (start + _carried(pose.first, rates[0], v[i], a[i]) * one)
-        _slides(carried, pose.units, pose.across.imag, changes)
-
-
-def _carried(slide: Any, rate: Any, turn: Any, change: Any) -> Any:
-    """Return what a turning line does to a point on it, centrifugal, Euler and Coriolis."""
-    return joined(-turn * turn * slide, change * slide + 2.0 * turn * rate)
-
-
-def _slides(between: Any, units: tuple[Any, Any], sine: Any, states: States) -> tuple[Any, Any]:
-    """Resolve a vector along both lines, and append its parts."""
-    first, second = _cross(between, units[1]) / sine, _cross(between, units[0]) / sine
-    states[0].append(first)
-    states[0].append(second)
-    return first, second
-
-
-def _cross(one: Any, other: Any) -> Any:
-    return one.real * other.imag - one.imag * other.real

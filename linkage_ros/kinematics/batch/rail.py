@@ -70,22 +70,6 @@ class CrankRailArrays(CrankRail):
             np.where(shorter, abs(bracket) + square, size),
         )
 
-    def rates(self, sight: Sight, _known: States, speeds: States) -> tuple[Any, Any]:
-        """Return the pins' velocity in the frame of the rail, and the rate of the frame."""
-        first, second = self._arms
-        v = speeds[0]
-        swing, arm = v[first] - v[second], sight.arm
-        return joined(-swing * arm.imag, swing * arm.real), v[second]
-
-    def accelerations(
-        self, sight: Sight, _rates: Any, _known: States, speeds: States, changes: States
-    ) -> tuple[Any, Any]:
-        """Return the pins' acceleration in the frame of the rail, and that of the frame."""
-        first, second = self._arms
-        v, a = speeds[0], changes[0]
-        swing = v[first] - v[second]
-        return joined(-swing * swing, a[first] - a[second]) * sight.arm, a[second]
-
     def across(
         self,
         sight: Sight,
@@ -125,6 +109,8 @@ class FreeRailArrays(FreeRail):
 
     __slots__ = ()
 
+    _facing = staticmethod(turned)
+
     def at(self, known: States) -> Sight:
         """Return the pins in the frame of the rail."""
         x, pins = known
@@ -138,23 +124,3 @@ class FreeRailArrays(FreeRail):
         below, gap = roots_of(link - place.imag, size)
         above, missing = roots_of(link + place.imag, size)
         return new(Sight, (place, below, above, np.where(gap > 0.0, gap, missing), base, 0j))
-
-    def rates(self, sight: Sight, _known: States, speeds: States) -> tuple[Any, Any]:
-        """Return the pins' velocity in the frame of the rail, and the rate of the frame."""
-        v, velocities = speeds
-        start, end = (velocities[i] for i in self._ends)
-        turn = v[self._arm]
-        back = turned(-sight.base) * self._back
-        return (end - start) * back - joined(0.0, turn) * sight.place, turn
-
-    def accelerations(
-        self, sight: Sight, rates: Any, _known: States, _speeds: States, changes: States
-    ) -> tuple[Any, Any]:
-        """Return the pins' acceleration in the frame of the rail, and that of the frame."""
-        a, pulls = changes
-        start, end = (pulls[i] for i in self._ends)
-        velocity, turn = rates
-        change = a[self._arm]
-        back = turned(-sight.base) * self._back
-        apparent = joined(0.0, 2.0 * turn) * velocity + joined(-turn * turn, change) * sight.place
-        return (end - start) * back - apparent, change

@@ -25,7 +25,7 @@ velocity of its outer pin, this gives the velocity equation of a dyad of constan
 
 from __future__ import annotations
 
-from cmath import phase, rect
+from cmath import phase
 from typing import NamedTuple
 
 from linkage_ros.kinematics.diagonal import folded, free_diagonal, Growth, GrowthChange
@@ -37,7 +37,7 @@ from linkage_ros.kinematics.dyads.rrr import (
     triangle_rates,
 )
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.step import facing, State
 
 
 class Carry(NamedTuple):
@@ -72,6 +72,8 @@ class Side:
 
     __slots__ = ('_carries', '_end', '_start')
 
+    _facing = staticmethod(facing)
+
     def __init__(self, start: complex, end: complex, carries: tuple[Carry, ...]) -> None:
         self._start = start
         self._end = end
@@ -82,9 +84,9 @@ class Side:
         z = self._end
         for origin, inner, angle, turn, slide, sign, unit in self._carries:
             if turn >= 0:
-                z = origin + rect(1.0, angle + sign * x[turn]) * (z - inner)
+                z = origin + self._facing(angle + sign * x[turn]) * (z - inner)
             else:
-                z = origin + rect(1.0, angle) * (z - inner) + sign * x[slide] * unit
+                z = origin + self._facing(angle) * (z - inner) + sign * x[slide] * unit
         return z - self._start
 
     def changes(
@@ -94,16 +96,16 @@ class Side:
         z, rate, change = self._end, 0j, 0j
         for origin, inner, angle, turn, slide, sign, unit in self._carries:
             if turn >= 0:
-                turned = rect(1.0, angle + sign * x[turn])
+                turned = self._facing(angle + sign * x[turn])
                 w = sign * v[turn]
                 arm = z - inner
                 if a is not None:
-                    pull = complex(-w * w, sign * a[turn]) * arm
-                    change = turned * (change + complex(0.0, 2.0 * w) * rate + pull)
-                rate = turned * (rate + complex(0.0, w) * arm)
+                    pull = (1j * (sign * a[turn]) - w * w) * arm
+                    change = turned * (change + 2j * w * rate + pull)
+                rate = turned * (rate + 1j * w * arm)
                 z = origin + turned * arm
             else:
-                held = rect(1.0, angle)
+                held = self._facing(angle)
                 if a is not None:
                     change = held * change + sign * a[slide] * unit
                 rate = held * rate + sign * v[slide] * unit
@@ -156,7 +158,8 @@ class DrivenRRRDyad:
         one, other = (side.at(x) for side in self._sides)
         b, c = abs(one), abs(other)
         diagonal = free_diagonal(end - start, abs(start) + abs(end), abs(b - c), b + c)
-        pose = close_triangle(diagonal, *2 * ((b - c) * (b + c),), self._sign)
+        difference = (b - c) * (b + c)
+        pose = close_triangle(diagonal, difference, difference, self._sign)
         x.append(pose.first - phase(one))
         x.append(pose.second - phase(other))
         return DrivenRRRPose(pose.status, pose.gap, pose, (one, other))
@@ -189,8 +192,8 @@ class DrivenRRRDyad:
         # The rates of this dyad's own links, as `rates` has appended them.
         turns = unit.imag + unit.real * cot_gamma, unit.imag + unit.real * cot_beta
         one, other = (
-            (side.changes(x, v, a)[1] + complex(0.0, 2.0 * turn) * rate) * facing
-            for side, turn, rate, facing in zip(
+            (side.changes(x, v, a)[1] + 2j * turn * rate) * unit_now
+            for side, turn, rate, unit_now in zip(
                 self._sides, turns, rates.sides, self._units(pose), strict=True
             )
         )
@@ -208,6 +211,6 @@ class DrivenRRRDyad:
         """Return e^{iθ} of the first link of each group."""
         triangle = pose.triangle
         return (
-            rect(1.0, triangle.first - phase(pose.sides[0])),
-            rect(1.0, triangle.second - phase(pose.sides[1])),
+            facing(triangle.first - phase(pose.sides[0])),
+            facing(triangle.second - phase(pose.sides[1])),
         )

@@ -33,7 +33,7 @@ from cmath import rect
 from math import atan2
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import ROUNDING
+from linkage_ros.kinematics.diagonal import cross, ROUNDING
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new
@@ -101,11 +101,11 @@ class PRPDyad:
         across = rect(1.0, x[j] - x[i]) * self._across
         between = end - start
         if abs(across.imag) <= ROUNDING:
-            gap = abs(_cross(units[0], between))
+            gap = abs(cross(units[0], between))
             far = gap > ROUNDING * (abs(start) + abs(end))
             status = Status.OPEN if far else Status.INDETERMINATE
             return PRPPose(status, gap if far else 0.0, 0.0, 0.0, across, units)
-        first, second = _slides(between, units, across.imag, known)
+        first, second = resolved(between, units, across.imag, known)
         return new(PRPPose, (Status.CLOSED, 0.0, first, second, across, units))
 
     def rates(self, pose: PRPPose, _known: State, speeds: State) -> tuple[float, float]:
@@ -113,9 +113,9 @@ class PRPDyad:
         v, velocities = speeds
         (i, j), (one, other) = self._arms, pose.units
         start, end = (velocities[k] for k in self._starts)
-        carried = end + complex(0.0, v[j] * pose.second) * other
-        carried -= start + complex(0.0, v[i] * pose.first) * one
-        return _slides(carried, pose.units, pose.across.imag, speeds)
+        carried = end + 1j * (v[j] * pose.second) * other
+        carried -= start + 1j * (v[i] * pose.first) * one
+        return resolved(carried, pose.units, pose.across.imag, speeds)
 
     def accelerations(
         self,
@@ -131,7 +131,7 @@ class PRPDyad:
         start, end = (pulls[k] for k in self._starts)
         carried = end + _carried(pose.second, rates[1], v[j], a[j]) * other
         carried -= start + _carried(pose.first, rates[0], v[i], a[i]) * one
-        _slides(carried, pose.units, pose.across.imag, changes)
+        resolved(carried, pose.units, pose.across.imag, changes)
 
     def transmission_angle(self, pose: PRPPose) -> float:
         """Return the angle between the two lines, in [0, π/2], in [rad]."""
@@ -140,18 +140,14 @@ class PRPDyad:
 
 def _carried(slide: float, rate: float, turn: float, change: float) -> complex:
     """Return what a turning line does to a point on it, centrifugal, Euler and Coriolis."""
-    return complex(-turn * turn * slide, change * slide + 2.0 * turn * rate)
+    return 1j * (change * slide + 2.0 * turn * rate) - turn * turn * slide
 
 
-def _slides(
+def resolved(
     between: complex, units: tuple[complex, complex], sine: float, state: State
 ) -> tuple[float, float]:
     """Resolve a vector along both lines, and append its parts."""
-    first, second = _cross(between, units[1]) / sine, _cross(between, units[0]) / sine
+    first, second = cross(between, units[1]) / sine, cross(between, units[0]) / sine
     state[0].append(first)
     state[0].append(second)
     return first, second
-
-
-def _cross(one: complex, other: complex) -> float:
-    return one.real * other.imag - one.imag * other.real

@@ -31,6 +31,7 @@ from __future__ import annotations
 from math import asin
 from typing import NamedTuple
 
+from linkage_ros.kinematics.diagonal import cross
 from linkage_ros.kinematics.rail import Rail, Sight
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
@@ -81,7 +82,7 @@ class RPPDyad:
         self._constant = constant
         self._inner = inner
         self._outer = outer
-        self._across = _cross(inner, outer)
+        self._across = cross(inner, outer)
 
     def close(self, known: State) -> RPPPose:
         """Append both slides."""
@@ -113,12 +114,8 @@ class RPPDyad:
 
     def _slides(self, place: complex, state: State) -> tuple[float, float]:
         """Resolve a vector along both lines, and append its parts."""
-        first = _cross(place, self._outer) / self._across
-        second = -_cross(place, self._inner) / self._across
+        first = cross(place, self._outer) / self._across
+        second = -cross(place, self._inner) / self._across
         state[0].append(first)
         state[0].append(second)
         return first, second
-
-
-def _cross(one: complex, other: complex) -> float:
-    return one.real * other.imag - one.imag * other.real
