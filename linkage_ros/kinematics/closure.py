@@ -22,6 +22,7 @@ Position first; what a scene calls for beyond it starts from the position and re
 from __future__ import annotations
 
 from cmath import rect
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -37,6 +38,7 @@ from linkage_ros.tuples import new
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch.solve import Batch, Solver
+    from linkage_ros.kinematics.follower import Follower
     from numpy.typing import ArrayLike
 
 _CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
@@ -136,6 +138,7 @@ class Closure:
         self.scale = planner.scale
         """Metres in the unit of length of the steps."""
         steps = tuple(planner.steps)
+        self._known = planner
         self.step_groups = tuple(planner.step_groups)
         """For each step the number of the group that it belongs to."""
         self.turning = tuple(isinstance(j, RevoluteJoint) for j in linkage.joints.values())
@@ -286,6 +289,20 @@ class Closure:
             key: PointMotion(*(values.pins[i] * self.scale for values in (state, speeds, changes)))
             for key, i in self._point_index.items()
         }
+
+    def follower(self, points: Sequence[tuple[str, complex]]) -> Follower:
+        """
+        Return what follows certain points of links and computes no others.
+
+        Parameters
+        ----------
+        points
+            Each with the name of its link, and where it lies in that link's frame, in [m].
+
+        """
+        from linkage_ros.kinematics.follower import Follower  # local import: only forces need it
+
+        return Follower(self._known, points)
 
     def link_angles(self, position: Position) -> dict[str, float]:
         """Return the angle of every link to the ground, in [rad], not wrapped."""

@@ -16,13 +16,14 @@
 """
 What a linkage is: links with named points, pins, sliders, inputs and the joints to publish.
 
-Lengths are in metres, angles in radians. A point named on two or more links is a pin of them.
+Lengths are in metres, angles in radians, masses in kilograms. A point named on two or more links
+is a pin of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 Point = tuple[float, float]
@@ -113,6 +114,27 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True)
+class Mass:
+    """
+    What a link weighs.
+
+    Attributes
+    ----------
+    mass
+        In [kg], more than 0.
+    center
+        Centre of mass in the link's frame, in [m].
+    inertia
+        Moment of inertia about the centre of mass, in [kg·m²]; 0 for a point.
+
+    """
+
+    mass: float
+    center: Point
+    inertia: float
+
+
+@dataclass(frozen=True, slots=True)
 class Linkage:
     """
     A planar linkage, as a linkage file says it.
@@ -133,6 +155,8 @@ class Linkage:
         Names of points whose curves matter.
     pose
         Where an iteration starts; only for what no dyad covers.
+    masses
+        Of links, by name; only where forces matter, and then of every link that moves.
 
     """
 
@@ -143,3 +167,4 @@ class Linkage:
     sliders: Mapping[str, Slider]
     traced: tuple[str, ...] = ()
     pose: Pose | None = None
+    masses: Mapping[str, Mass] = field(default_factory=dict)

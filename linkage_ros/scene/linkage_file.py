@@ -19,11 +19,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
+    GROUND,
     Input,
     Linkage,
+    Mass,
     Pose,
     RevoluteJoint,
     SlideJoint,
@@ -31,9 +33,12 @@ from linkage_ros.kinematics.linkage import (
 )
 from linkage_ros.scene.section import Section
 
-_KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose')
+_KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose', 'masses')
 _FARTHEST = 1e9
 """Coordinates beyond this, in [m], are no machine's; below it no square overflows."""
+
+_HEAVIEST = 1e12
+"""Masses beyond this, in [kg], and moments of inertia, in [kg·m²], are no machine's either."""
 
 
 def read_linkage(content: Section) -> Linkage:
@@ -86,6 +91,7 @@ def _linkage(content: Section) -> Linkage:
         {name: _slider(sliders.section(name)) for name in sliders},
         tuple(content.texts('traced')),
         _pose(content.section('pose')) if 'pose' in content else None,
+        _masses(content.section('masses', required=False), tuple(points)),
     )
 
 
@@ -104,6 +110,26 @@ def _pose(content: Section) -> Pose:
     pose = Pose(inputs, {name: points.point(name, most=_FARTHEST) for name in points})
     content.finish()
     return pose
+
+
+def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
+    masses = {}
+    for name in content:
+        if name == GROUND:
+            raise content.error(name, 'the ground does not move', 'leave its mass out')
+        if name not in links:
+            moving = sorted({*links} - {GROUND})
+            raise content.error(
+                name, f'{quoted(name)} is not a link', f'name one of {", ".join(moving)}'
+            )
+        link = content.section(name)
+        masses[name] = Mass(
+            link.number('mass', above=0.0, most=_HEAVIEST, unit='kg'),
+            link.point('center', most=_FARTHEST),
+            link.number('inertia', least=0.0, most=_HEAVIEST, unit='kg·m²'),
+        )
+        link.finish()
+    return masses
 
 
 def _slider(content: Section) -> Slider:

@@ -1,0 +1,307 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The equation of motion of a linkage, and the effort of its drive, by virtual work.
+
+With one input q, each centre of mass moves with r' = dr/dq and each link turns with θ' = dθ/dq,
+which are the velocities at q̇ = 1; r'' and θ'' are the accelerations at q̇ = 1 and q̈ = 0. So::
+
+    I(q) = Id + Σ (m·|r'|² + J·θ'²)            ½·dI/dq = Σ (m·r'·r'' + J·θ'·θ'')
+    V(q) = −Σ m·g·r + Σ ½·k·(ℓ − ℓ0)²          dV/dq = −Σ m·g·r' + Σ k·(ℓ − ℓ0)·ℓ'
+    C(q) = Σ c·ψ'² + Σ c·ℓ'²                   F(q) = Σ T·|ψ'|
+
+    I·q̈ + ½·(dI/dq)·q̇² + dV/dq + C·q̇ + F·sign(q̇) = τ
+
+which is Eksergian's equation of motion (R. Eksergian, Dynamical Analysis of Machines, J. Franklin
+Institute, 1930–31; B. Paul, Kinematics and Dynamics of Planar Machinery, 1979, ch. 12; for virtual
+work also R. L. Norton, Design of Machinery, ch. 10). Id is the drive's own inertia; ψ the angle in
+a pin or the slide in a slider, with the viscous coefficient c and the Coulomb moment or force T; ℓ
+the length of a spring.
+
+With several inputs there is one such equation each: its left side is the work of inertia, loads
+and friction over the velocities that its input alone would give at a rate of 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import copysign, isfinite
+from typing import NamedTuple
+
+from linkage_ros.dynamics.loads import check_loads, check_masses, Friction, Loads
+from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.status import Status
+from linkage_ros.tuples import new
+
+_CLOSED = Status.CLOSED
+
+
+class Terms(NamedTuple):
+    """
+    The equation of motion at one value of its input, in SI units.
+
+    Attributes
+    ----------
+    inertia
+        I, in [kg·m²], or in [kg] where the input slides; the others go with it.
+    half_slope
+        ½·dI/dq.
+    potential_slope
+        dV/dq.
+    viscous
+        C; the force on q is −C·q̇.
+    coulomb
+        F; the force on q is −F·sign(q̇), and anything up to F either way where q stands.
+
+    """
+
+    inertia: float
+    half_slope: float
+    potential_slope: float
+    viscous: float
+    coulomb: float
+
+
+class Rubbing(NamedTuple):
+    """
+    A joint with friction.
+
+    Its rate is factor·(v[one] − v[other]) of the closure's coordinates, in [rad/s] or [m/s];
+    ``joint`` is its number among the joints of the structure.
+    """
+
+    joint: int
+    viscous: float
+    coulomb: float
+    one: int
+    other: int
+    factor: float
+
+
+class Mechanics:
+    """
+    A linkage with masses, and the forces that act on it.
+
+    Parameters
+    ----------
+    closure
+        The linkage, as it is solved.
+    loads
+        What acts on it; nothing if not given.
+    friction
+        In its pins and sliders; none if not given.
+
+    Raises
+    ------
+    DefinitionError
+        Where a link that moves has no mass, or a force acts on what is not there.
+
+    """
+
+    def __init__(
+        self, closure: Closure, loads: Loads | None = None, friction: Friction | None = None
+    ) -> None:
+        self.closure = closure
+        self.loads = loads or Loads()
+        self.friction = friction or Friction()
+        linkage = closure.linkage
+        check_masses(linkage)
+        check_loads(linkage, self.loads, self.friction)
+        moving = [link for link in linkage.links if link != GROUND]
+        points = [(link, complex(*linkage.masses[link].center)) for link in moving]
+        for spring in self.loads.springs:
+            for link, name in spring.ends:
+                points.append((link, complex(*linkage.links[link][name])))
+        self._follower = closure.follower(points)
+        at = iter(self._follower.indices)
+        self._bodies = tuple(
+            (linkage.masses[link].mass, linkage.masses[link].inertia, next(at), turn)
+            for link, turn in ((link, closure.angles[link].coordinate) for link in moving)
+        )
+        self._springs = tuple(
+            (spring.stiffness, spring.free_length, spring.damping, next(at), next(at))
+            for spring in self.loads.springs
+        )
+        self._gravity = complex(*self.loads.gravity)
+        self.rubbing = tuple(self._rubbing_joints())
+        """The joints that have friction."""
+        self._units = tuple(closure.scale if given.slider else 1.0 for given in linkage.inputs)
+
+    def terms(self, position: Position) -> Terms | None:
+        """
+        Return the equation of motion of a linkage with one input.
+
+        There is none where no rates exist, as at a toggle, where the linkage does not close, and
+        within floats of a toggle, where the terms are beyond a double.
+        """
+        if position[0] is not _CLOSED:
+            return None
+        velocity = self.closure.velocity(position, 1.0)
+        acceleration = self.closure.acceleration(position, velocity, 0.0)
+        places = self._follower.places(position)
+        velocities = self._follower.velocities(position, velocity, places)
+        accelerations = self._follower.accelerations(position, velocity, acceleration, places)
+        v, a = velocity[1][0], acceleration[1][0]
+        inertia, half_slope, momentum = self.loads.drive_inertia, 0.0, 0j
+        for mass, gyration, point, turn in self._bodies:
+            speed, pull, spin = velocities[point], accelerations[point], v[turn]
+            moved = mass * speed
+            momentum += moved
+            inertia += moved.real * speed.real + moved.imag * speed.imag + gyration * spin * spin
+            half_slope += moved.real * pull.real + moved.imag * pull.imag
+            half_slope += gyration * spin * a[turn]
+        gravity = self._gravity
+        slope = -(gravity.real * momentum.real + gravity.imag * momentum.imag)
+        viscous = coulomb = 0.0
+        for stiffness, free_length, damping, start, end in self._springs:
+            length, growth = stretched(places, velocities, start, end)
+            slope += stiffness * (length - free_length) * growth
+            viscous += damping * growth * growth
+        for _, drag, limit, one, other, factor in self.rubbing:
+            slip = factor * (v[one] - v[other])
+            viscous += drag * slip * slip
+            coulomb += limit * abs(slip)
+        if not (isfinite(inertia) and isfinite(half_slope)):
+            return None
+        return new(Terms, (inertia, half_slope, slope, viscous, coulomb))
+
+    def potential(self, position: Position) -> float:
+        """Return V at a closed position, in [J]; weight is 0 at the height of the origin."""
+        places = self._follower.places(position)
+        moment = 0j
+        for mass, _, point, _ in self._bodies:
+            moment += mass * places[point]
+        energy = -(self._gravity.real * moment.real + self._gravity.imag * moment.imag)
+        for stiffness, free_length, _, start, end in self._springs:
+            stretch = abs(places[end] - places[start]) - free_length
+            energy += 0.5 * stiffness * stretch * stretch
+        return energy
+
+    def kinetic(self, position: Position, velocity: Velocity) -> float:
+        """Return the kinetic energy, that of the drive's own inertia included, in [J]."""
+        places = self._follower.places(position)
+        velocities = self._follower.velocities(position, velocity, places)
+        v = velocity.state.coordinates
+        twice = 0.0
+        for mass, gyration, point, turn in self._bodies:
+            speed = velocities[point]
+            twice += mass * (speed.real * speed.real + speed.imag * speed.imag)
+            twice += gyration * v[turn] * v[turn]
+        for i, unit in enumerate(self._units, 1):
+            twice += self.loads.drive_inertia * (unit * v[i]) ** 2
+        return 0.5 * twice
+
+    def energy(self, position: Position, *rates: float) -> float:
+        """
+        Return kinetic and potential energy together, in [J].
+
+        Parameters
+        ----------
+        position
+            A closed position, no toggle.
+        *rates
+            Of the driven joints, in [rad/s] or [m/s].
+
+        """
+        velocity = self.closure.velocity(position, *rates)
+        return self.kinetic(position, velocity) + self.potential(position)
+
+    def drive_efforts(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> tuple[float, ...]:
+        """
+        Return what each drive must give for a motion: its own inertia, loads and friction borne.
+
+        Parameters
+        ----------
+        position
+            A closed position, no toggle.
+        velocity, acceleration
+            As the closure has found them. They hold the inputs' own.
+
+        Returns
+        -------
+        efforts
+            For each input a moment in [N·m], or a force in [N] where it slides, positive where it
+            drives the input forward. Coulomb friction is 0 in a joint that stands.
+
+        """
+        follower, count = self._follower, len(self._units)
+        places = follower.places(position)
+        velocities = follower.velocities(position, velocity, places)
+        accelerations = follower.accelerations(position, velocity, acceleration, places)
+        v, a = velocity.state.coordinates, acceleration.state.coordinates
+        pulls = self._spring_pulls(places, velocities)
+        drags = [resistance(rubbing, v) for rubbing in self.rubbing]
+        efforts: tuple[float, ...] = ()
+        for i, unit in enumerate(self._units):
+            alone = [0.0] * count
+            alone[i] = 1.0
+            virtual = self.closure.velocity(position, *alone)
+            w = virtual.state.coordinates
+            moved = follower.velocities(position, virtual, places)
+            effort = self.loads.drive_inertia * a[1 + i] * unit
+            for mass, gyration, point, turn in self._bodies:
+                force, way = mass * (accelerations[point] - self._gravity), moved[point]
+                effort += force.real * way.real + force.imag * way.imag
+                effort += gyration * a[turn] * w[turn]
+            for pull, (_, _, _, start, end) in zip(pulls, self._springs, strict=True):
+                effort += pull * stretched(places, moved, start, end)[1]
+            for drag, (_, _, _, one, other, factor) in zip(drags, self.rubbing, strict=True):
+                effort += drag * factor * (w[one] - w[other])
+            efforts += (effort,)
+        return efforts
+
+    def _spring_pulls(self, places: list[complex], velocities: list[complex]) -> list[float]:
+        """Return what each spring pulls its ends together with, in [N]."""
+        return [
+            spring.tension(*stretched(places, velocities, start, end))
+            for spring, (_, _, _, start, end) in zip(
+                self.loads.springs, self._springs, strict=True
+            )
+        ]
+
+    def _rubbing_joints(self) -> Iterator[Rubbing]:
+        closure = self.closure
+        for number, joint in enumerate(closure.structure.joints):
+            friction = self.friction.joints.get(joint.name)
+            if friction is None:
+                continue
+            one, other = closure.angles[joint.link].coordinate, closure.angles[joint.to].coordinate
+            factor = 1.0
+            if joint.kind == 'P':
+                slide = closure.slides[joint.name]
+                one, other, factor = slide.coordinate, 0, slide.sign * closure.scale
+            yield Rubbing(number, friction.viscous, friction.coulomb, one, other, factor)
+
+
+def resistance(rubbing: Rubbing, v: list[float]) -> float:
+    """Return what a joint resists its motion with, in [N·m] or [N], of the sign of its rate."""
+    _, viscous, coulomb, one, other, factor = rubbing
+    slip = factor * (v[one] - v[other])
+    return viscous * slip + (copysign(coulomb, slip) if slip else 0.0)
+
+
+def stretched(
+    places: list[complex], velocities: list[complex], start: int, end: int
+) -> tuple[float, float]:
+    """Return how long a spring is and how fast it grows; not at all where its ends meet."""
+    along, apart = places[end] - places[start], velocities[end] - velocities[start]
+    length = abs(along)
+    if not length:
+        return 0.0, 0.0
+    return length, (along.real * apart.real + along.imag * apart.imag) / length

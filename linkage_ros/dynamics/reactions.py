@@ -1,0 +1,333 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The forces in the pins and sliders of a linkage, by Newton and Euler's equations of every link.
+
+For each link that moves, with all that acts on it::
+
+    Σ F = m·(a − g)        Σ (p − c) × F + Σ M = J·α
+
+p is where a force acts and c the centre of mass. Unknown are the force in each pin, the force
+across and the moment in each slider, and the effort of each drive: as many as equations, one
+linear system A·f = b (R. L. Norton, Design of Machinery, ch. 11; E. J. Haug, Computer Aided
+Kinematics and Dynamics of Mechanical Systems, 1989, ch. 6).
+
+The columns of A are what each unknown does to each link (`joint_matrix.py`). So, by virtual work,
+the rows of Aᵀ are what small displacements Δ of the links open in each joint: Aᵀ·Δ = δ.
+`Reactions.shift` solves this for Δ, with the inputs held: how far play in a pin or the stretch of
+a link moves the linkage, to first order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import NamedTuple
+
+from linkage_ros.dynamics.joint_matrix import Array, JointMatrix
+from linkage_ros.dynamics.mechanics import Mechanics, resistance, stretched
+from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
+from linkage_ros.kinematics.groups import Joint
+from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
+from linkage_ros.kinematics.status import Status
+from linkage_ros.tuples import new
+import numpy as np
+
+_CLOSED = Status.CLOSED
+
+
+class Reaction(NamedTuple):
+    """
+    What ``joint.to`` exerts on ``joint.link``; the opposite acts on ``joint.to``.
+
+    The drive's own effort is no part of it: that acts beside the joint that it drives.
+
+    Attributes
+    ----------
+    fx, fy
+        Force in the frame of the ground, in [N]: at the pin; in a slider at its point, across the
+        line, and along it no more than friction.
+    moment
+        About that point, counter-clockwise, in [N·m]: in a pin no more than friction; in a slider
+        what keeps the block from turning.
+
+    """
+
+    fx: float
+    fy: float
+    moment: float
+
+
+class Reactions:
+    """
+    The joints of a linkage, as they carry forces. Not for several threads at once.
+
+    Parameters
+    ----------
+    mechanics
+        The linkage with its masses, loads and friction.
+
+    Attributes
+    ----------
+    joints
+        Those of ``closure.structure.joints``, in the same order.
+    names
+        Of each joint: of its pin or slider; where a pin has several joints, ``pin/link`` with the
+        joint's ``link``; where a slider is named as a pin, ``slider/link`` with the link that it
+        is along.
+
+    """
+
+    def __init__(self, mechanics: Mechanics) -> None:
+        closure = mechanics.closure
+        linkage, structure = closure.linkage, closure.structure
+        self._mechanics = mechanics
+        self._scale = closure.scale
+        self.joints = structure.joints
+        self.names = _names(self.joints)
+
+        moving = [link for link in structure.links if link != GROUND]
+        points, weights = [], []
+        for link in moving:
+            # A block that a pin in a slot stands for has no mass, and one point.
+            mass = linkage.masses.get(link)
+            center = mass.center if mass else next(iter(structure.links[link].values()))
+            weights.append((mass.mass, mass.inertia) if mass else (0.0, 0.0))
+            points.append((link, complex(*center)))
+        for joint in self.joints:
+            name = linkage.sliders[joint.name].point if joint.kind == 'P' else joint.name
+            points.append((joint.link, complex(*structure.links[joint.link][name])))
+        for spring in mechanics.loads.springs:
+            points += [(link, complex(*linkage.links[link][name])) for link, name in spring.ends]
+
+        self._follower = closure.follower(points)
+        at = iter(self._follower.indices)
+        centers = {link: next(at) for link in moving}
+        self._places = tuple(next(at) for _ in self.joints)
+        self._bodies = tuple(
+            (mass, inertia, centers[link], closure.angles[link].coordinate)
+            for link, (mass, inertia) in zip(moving, weights, strict=True)
+        )
+        self._matrix = JointMatrix(closure, centers, self._places)
+        rows = self._matrix.rows
+        self._springs = tuple(
+            (spring, (next(at), next(at)), tuple(rows.get(link, -1) for link, _ in spring.ends))
+            for spring in mechanics.loads.springs
+        )
+        self._published = tuple(
+            (rows.get(joint.child, -1), rows.get(joint.parent, -1))
+            if isinstance(joint, RevoluteJoint)
+            else next(
+                n for n, j in enumerate(self.joints) if (j.kind, j.name) == ('P', joint.slider)
+            )
+            for joint in linkage.joints.values()
+        )
+        # The matrix counts moments by the scale, the closure counts lengths by it.
+        self._drives = tuple(
+            (1.0, closure.scale) if given.slider else (closure.scale, 1.0)
+            for given in linkage.inputs
+        )
+
+    def solve(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> tuple[Reaction, ...] | None:
+        """
+        Return the reaction in each joint, in the order of `names`.
+
+        There is none at a toggle and where the linkage does not close.
+
+        Parameters
+        ----------
+        position, velocity, acceleration
+            As the closure has found them.
+
+        """
+        found = self._balance(position, velocity, acceleration)
+        if found is None:
+            return None
+        forces, resistances = found
+        x, lines = position.state.coordinates, self._matrix.lines
+        reactions: tuple[Reaction, ...] = ()
+        for number in range(len(self.joints)):
+            one, other = forces[2 * number], forces[2 * number + 1]
+            resisting = resistances[number]
+            if number in lines:
+                force = complex(-resisting, one) * lines[number].direction(x)
+                reaction = new(Reaction, (force.real, force.imag, other * self._scale))
+            else:
+                reaction = new(Reaction, (one, other, 0.0 - resisting))
+            reactions += (reaction,)
+        return reactions
+
+    def efforts(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> tuple[float, ...] | None:
+        """
+        Return what each drive must give, from the forces: as `Mechanics.drive_efforts` otherwise.
+
+        There is none at a toggle and where the linkage does not close.
+        """
+        found = self._balance(position, velocity, acceleration)
+        if found is None:
+            return None
+        forces, _ = found
+        a, inertia = acceleration.state.coordinates, self._mechanics.loads.drive_inertia
+        first = 2 * len(self.joints)
+        drives = zip(forces[first:], a[1:], self._drives, strict=False)
+        return tuple(
+            effort * moment + inertia * pull * length for effort, pull, (moment, length) in drives
+        )
+
+    def shift(self, position: Position, offsets: Sequence[complex]) -> tuple[float, ...] | None:
+        """
+        Return how far joints that do not meet exactly move the published joints.
+
+        To first order in the offsets: the error falls with their square. There is no answer at a
+        toggle and where the linkage does not close.
+
+        Parameters
+        ----------
+        position
+            The linkage as it would be without offsets. Its inputs are held.
+        offsets
+            For each joint, in the order of `names`, the place of its point on ``joint.link`` less
+            that of its point on ``joint.to``, in the frame of the ground, in [m]. Of a slider only
+            what is across its line counts.
+
+            Play: a link that is pushed with the force f leans away from what pushes it, so the
+            offset is −e·f/|f| with the radial play e and the force f of `Reaction`, whichever of
+            the two links has the hole. Stretch: where a pin of a link lies farther out by the
+            vector u than the linkage says, the offset is −u in a joint whose ``link`` it is and
+            +u in one whose ``to`` it is.
+
+        Returns
+        -------
+        shift
+            Of each published joint, in [rad] or [m].
+
+        """
+        if position.status is not _CLOSED:
+            return None
+        places, x = self._follower.places(position), position.state.coordinates
+        matrix, lines = self._matrix.at(x, places), self._matrix.lines
+        gaps = [0.0] * self._matrix.size
+        for number, offset in enumerate(offsets):
+            if number in lines:
+                across = 1j * lines[number].direction(x)
+                gaps[2 * number] = offset.real * across.real + offset.imag * across.imag
+            else:
+                gaps[2 * number], gaps[2 * number + 1] = offset.real, offset.imag
+        moved = _solved(matrix.T, gaps)
+        if moved is None:
+            return None
+        shifts: tuple[float, ...] = ()
+        for published in self._published:
+            if isinstance(published, int):
+                shifts += (self._slid(published, moved, x, places),)
+            else:
+                child, parent = (moved[row + 2] if row >= 0 else 0.0 for row in published)
+                shifts += ((child - parent) / self._scale,)
+        return shifts
+
+    def _slid(
+        self, number: int, moved: list[float], x: Sequence[float], places: list[complex]
+    ) -> float:
+        """Return how far displacements of the links move a point along its slider."""
+        along = self._matrix.lines[number].direction(x)
+        place, slid = places[self._places[number]], 0.0
+        for row, center, sign in self._matrix.sides[number]:
+            lever = (place - places[center]) / self._scale
+            way = complex(moved[row], moved[row + 1]) + 1j * moved[row + 2] * lever
+            slid += sign * (way.real * along.real + way.imag * along.imag)
+        return slid
+
+    def _balance(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> tuple[list[float], list[float]] | None:
+        """Return the solution of the system, and what each joint resists its motion with."""
+        if position.status is not _CLOSED:
+            return None
+        loads, scale = self._mechanics.loads, self._scale
+        gravity = complex(*loads.gravity)
+        places = self._follower.places(position)
+        pulls = self._follower.accelerations(position, velocity, acceleration, places)
+        x, v, a = (found.state.coordinates for found in (position, velocity, acceleration))
+        sides: list[float] = []
+        for mass, inertia, center, turn in self._bodies:
+            pull = mass * (pulls[center] - gravity)
+            sides += (pull.real, pull.imag, inertia * a[turn] / scale)
+        if self._springs:
+            velocities = self._follower.velocities(position, velocity, places)
+            for spring, (start, end), rows in self._springs:
+                length, growth = stretched(places, velocities, start, end)
+                if not length:
+                    continue
+                force = spring.tension(length, growth) / length * (places[end] - places[start])
+                for row, point, pulled in zip(rows, (start, end), (force, -force), strict=True):
+                    if row >= 0:
+                        lever = places[point] - places[self._bodies[row // 3][2]]
+                        self._push(sides, row, lever, pulled)
+        resistances = [0.0] * len(self.joints)
+        for rubbing in self._mechanics.rubbing:
+            number = rubbing.joint
+            resistances[number] = resistance(rubbing, v)
+            self._rub(sides, number, resistances[number], x, places)
+        forces = _solved(self._matrix.at(x, places), sides)
+        return None if forces is None else (forces, resistances)
+
+    def _rub(
+        self,
+        sides: list[float],
+        number: int,
+        resisting: float,
+        x: Sequence[float],
+        places: list[complex],
+    ) -> None:
+        """Bring friction in a joint to the right sides of its links."""
+        line = self._matrix.lines.get(number)
+        for row, center, sign in self._matrix.sides[number]:
+            if line is None:
+                sides[row + 2] += sign * resisting / self._scale
+            else:
+                lever = places[self._places[number]] - places[center]
+                self._push(sides, row, lever, -sign * resisting * line.direction(x))
+
+    def _push(self, sides: list[float], row: int, lever: complex, force: complex) -> None:
+        """Bring a known force on a link to its right sides."""
+        sides[row] -= force.real
+        sides[row + 1] -= force.imag
+        sides[row + 2] -= (lever.real * force.imag - lever.imag * force.real) / self._scale
+
+
+def _solved(matrix: Array, sides: list[float]) -> list[float] | None:
+    """Return the solution of a linear system, if it has one."""
+    try:
+        found: list[float] = np.linalg.solve(matrix, sides).tolist()
+    except np.linalg.LinAlgError:
+        return None
+    return found if all(map(isfinite, found)) else None
+
+
+def _names(joints: Sequence[Joint]) -> tuple[str, ...]:
+    pins = [joint.name for joint in joints if joint.kind == 'R']
+    names = []
+    for joint in joints:
+        if joint.kind == 'P':
+            names.append(f'{joint.name}/{joint.to}' if joint.name in pins else joint.name)
+        else:
+            several = pins.count(joint.name) > 1
+            names.append(f'{joint.name}/{joint.link}' if several else joint.name)
+    return tuple(names)

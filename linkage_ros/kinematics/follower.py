@@ -1,0 +1,177 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Points of links followed through positions, velocities and accelerations, and no others computed.
+
+From the coordinates that a closure's steps have found, a point is walked to: from the ground (or
+from where an iteration has placed a link) along arms e^{iθ}·c of links and ways s·e^{iθ}·û along
+sliders. With the rates ω = θ̇ and α = θ̈ of its link, an arm r adds iω·r to the velocity and
+(iα − ω²)·r to the acceleration; a way adds (ṡ + iω·s)·û and (s̈ − ω²·s + i(α·s + 2ω·ṡ))·û, with û
+turned into the ground's frame (R. L. Norton, Design of Machinery, ch. 6 and 7: the velocity of
+slip and Coriolis' acceleration).
+"""
+
+from __future__ import annotations
+
+from cmath import rect
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from linkage_ros.kinematics.known_links import KnownLinks
+from linkage_ros.kinematics.linkage import GROUND
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
+
+_Node = tuple[int, int, complex, int]
+"""Where it starts, the coordinate that turns it, its vector, and its slide's coordinate or −1."""
+
+
+class Follower:
+    """
+    Certain points of links.
+
+    Each method returns a list of every point that is walked through; those that were asked for
+    stand at `indices`.
+
+    Parameters
+    ----------
+    known
+        The links of a closure, all known.
+    points
+        Each with the name of its link, and where it lies in that link's frame, in [m].
+
+    Attributes
+    ----------
+    indices
+        For each of the points its index in the lists.
+
+    """
+
+    __slots__ = ('_fixed', '_nodes', '_pins', '_scale', '_still', 'indices')
+
+    def __init__(self, known: KnownLinks, points: Sequence[tuple[str, complex]]) -> None:
+        walk = _Walk(known)
+        found = [walk.to(link, point / known.scale) for link, point in points]
+        self._scale = known.scale
+        self._fixed = [place * known.scale for place in walk.fixed]
+        self._still = [0j] * len(walk.fixed)
+        self._pins = tuple(walk.pins)
+        self._nodes = tuple(
+            (walk.number(base), arm, vector * known.scale, slide)
+            for base, arm, vector, slide in walk.nodes
+        )
+        self.indices = tuple(walk.number(place) for place in found)
+
+    def places(self, position: Position) -> list[complex]:
+        """Return where the points are in the frame of the ground, in [m]."""
+        x, pins = position.state
+        places = self._started(self._fixed, pins)
+        for base, arm, vector, slide in self._nodes:
+            way = rect(1.0, x[arm]) * vector
+            places.append(places[base] + (way if slide < 0 else x[slide] * way))
+        return places
+
+    def velocities(
+        self, position: Position, velocity: Velocity, places: list[complex]
+    ) -> list[complex]:
+        """Return the velocities of the points, in [m/s], given their places."""
+        v, speeds = velocity.state
+        velocities = self._started(self._still, speeds)
+        for base, arm, vector, slide in self._nodes:
+            moved = 1j * v[arm] * (places[len(velocities)] - places[base])
+            if slide >= 0:
+                moved += v[slide] * (rect(1.0, position.state.coordinates[arm]) * vector)
+            velocities.append(velocities[base] + moved)
+        return velocities
+
+    def accelerations(
+        self,
+        position: Position,
+        velocity: Velocity,
+        acceleration: Acceleration,
+        places: list[complex],
+    ) -> list[complex]:
+        """Return the accelerations of the points, in [m/s²], given their places."""
+        v = velocity.state.coordinates
+        a, pulls = acceleration.state
+        accelerations = self._started(self._still, pulls)
+        for base, arm, vector, slide in self._nodes:
+            turn = v[arm]
+            lever = places[len(accelerations)] - places[base]
+            moved = complex(-turn * turn, a[arm]) * lever
+            if slide >= 0:
+                unit = rect(1.0, position.state.coordinates[arm]) * vector
+                moved += complex(a[slide], 2.0 * turn * v[slide]) * unit
+            accelerations.append(accelerations[base] + moved)
+        return accelerations
+
+    def _started(self, fixed: list[complex], pins: list[complex]) -> list[complex]:
+        """Return what stands on the ground and what the steps have found."""
+        started = fixed.copy()
+        for index in self._pins:
+            started.append(pins[index] * self._scale)
+        return started
+
+
+_Place = tuple[str, int]
+"""A place on the walk: the list of `_Walk` that it stands in, and its index there."""
+
+
+class _Walk:
+    """The way to the points, as short as it can be, in the unit of the closure's lengths."""
+
+    def __init__(self, known: KnownLinks) -> None:
+        self._known = known
+        self._places: dict[tuple[str, complex], _Place] = {}
+        self.fixed: list[complex] = []
+        self.pins: list[int] = []
+        self.nodes: list[tuple[_Place, int, complex, int]] = []
+
+    def number(self, place: _Place) -> int:
+        """Return the index of a place where all lists stand one after the other."""
+        kind, index = place
+        before = {'fixed': 0, 'pin': len(self.fixed), 'node': len(self.fixed) + len(self.pins)}
+        return before[kind] + index
+
+    def to(self, link: str, point: complex) -> _Place:
+        """Return the place of a point of a link, with the way to it."""
+        if (link, point) not in self._places:
+            self._places[link, point] = self._new(link, point)
+        return self._places[link, point]
+
+    def _new(self, link: str, point: complex) -> _Place:
+        if link == GROUND:
+            self.fixed.append(point)
+            return 'fixed', len(self.fixed) - 1
+        held = self._known.held[link]
+        if held.point != point:
+            angle = self._known.angles[link]
+            vector = angle.unit * (point - held.point)
+            return self._node((self.to(link, held.point), angle.coordinate, vector, -1))
+        if held.pin >= 0:
+            self.pins.append(held.pin)
+            return 'pin', len(self.pins) - 1
+        base = self.to(held.link, held.at)
+        if held.slide is None:
+            return base
+        angle, slide = self._known.angles[held.link], held.slide
+        unit = angle.unit * (slide.sign * held.direction)
+        return self._node((base, angle.coordinate, unit, slide.coordinate))
+
+    def _node(self, node: tuple[_Place, int, complex, int]) -> _Place:
+        self.nodes.append(node)
+        return 'node', len(self.nodes) - 1

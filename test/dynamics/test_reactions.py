@@ -1,0 +1,267 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Forces in pins and sliders: statics of the textbook, and Newton's law for the linkage as a whole.
+
+Pins of a four-bar and a six-bar are held against another engine in `test_against_mujoco`.
+"""
+
+from __future__ import annotations
+
+from cmath import rect
+from dataclasses import replace
+from math import asin, cos, hypot, sin, tan
+
+from linkage_ros.dynamics.loads import Friction, JointFriction, Loads, Spring
+from linkage_ros.dynamics.mechanics import Mechanics
+from linkage_ros.dynamics.reactions import Reactions
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Mass, RevoluteJoint, Slider
+from linkage_ros.kinematics.status import Status
+import pytest
+
+from .loaded import closed, four_bar, loads_of, scotch_yoke, shipped, slope, STATES
+
+WEIGHTLESS = 1e-300
+"""In [kg]: a mass there must be."""
+
+
+def at_rest(mechanics, *inputs):
+    """Return the reactions by name, and the effort of the first drive, of what stands still."""
+    closure, still = mechanics.closure, [0.0] * len(inputs)
+    position = closure.position(*inputs)
+    velocity = closure.velocity(position, *still)
+    return moving(mechanics, position, velocity, closure.acceleration(position, velocity, *still))
+
+
+def moving(mechanics, position, velocity, acceleration):
+    reactions = Reactions(mechanics)
+    found = reactions.solve(position, velocity, acceleration)
+    effort = reactions.efforts(position, velocity, acceleration)[0]
+    return dict(zip(reactions.names, found, strict=True)), effort
+
+
+@pytest.mark.parametrize('angle', [0.5, 1.2, 2.2])
+def test_a_weight_on_two_bars(angle):
+    # Coupler and rocker are two bars that meet at B, where all the weight hangs; A is held by the
+    # crank. Method of joints: each bar is in line with its force, and both carry the weight.
+    none = Mass(WEIGHTLESS, (0.0, 0.0), 0.0)
+    masses = {'crank': none, 'coupler': Mass(3.0, (0.3, 0.0), 0.0), 'rocker': none}
+    closure = four_bar(masses, 0.1, 0.3, 0.25, 0.35, side='right')
+    found, effort = at_rest(Mechanics(closure, Loads((0.0, -10.0))), angle)
+    points = closure.points(closure.position(angle))
+    a, b, d = (points[key] for key in (('crank', 'A'), ('rocker', 'B'), ('ground', 'O4')))
+    one, other = (b - a) / abs(b - a), (b - d) / abs(b - d)
+    # n1·one + n2·other = weight, by Cramer's rule; n is a tension.
+    across = one.real * other.imag - one.imag * other.real
+    n1, n2 = 30.0 * other.real / across, -30.0 * one.real / across
+    # At A the crank pulls the coupler back with n1, at D the ground the rocker with n2.
+    assert found['A'][:2] == pytest.approx((-n1 * one.real, -n1 * one.imag))
+    assert found['O4'][:2] == pytest.approx((-n2 * other.real, -n2 * other.imag))
+    assert found['B'][:2] == pytest.approx((n2 * other.real, n2 * other.imag))
+    assert effort == pytest.approx(-n1 * (a.real * one.imag - a.imag * one.real))
+    assert all(reaction.moment == 0.0 for reaction in found.values())
+
+
+@pytest.mark.parametrize('angle', [0.4, 1.5, 2.7, -1.0])
+def test_side_force_of_a_slider_crank(angle):
+    # A spring far behind pushes on the piston along its line: N = F·tan φ, and the crank takes
+    # M = F·r·sin(θ + φ)/cos φ (R. L. Norton, Design of Machinery, ch. 13).
+    r, rod, force = 0.04, 0.14, 50.0
+    linkage = Linkage(
+        {
+            'ground': {'O': (0.0, 0.0), 'S': (10.0, 0.0)},
+            'crank': {'O': (0.0, 0.0), 'A': (r, 0.0)},
+            'rod': {'A': (0.0, 0.0), 'B': (rod, 0.0)},
+        },
+        (Input('turn', 'ground', 'crank'),),
+        {'cylinder': 'ahead'},
+        {'rod': RevoluteJoint('crank', 'rod')},
+        {'cylinder': Slider('B', 'ground', 'O', (1.0, 0.0))},
+        masses={name: Mass(WEIGHTLESS, (0.0, 0.0), 0.0) for name in ('crank', 'rod')},
+    )
+    closure = Closure(linkage)
+    phi = asin(r / rod * sin(angle))
+    length = 10.0 - r * cos(angle) - rod * cos(phi)
+    spring = Spring('ground', 'S', 'rod', 'B', 100.0, length + force / 100.0)
+    found, effort = at_rest(Mechanics(closure, Loads(springs=(spring,))), angle)
+    assert effort == pytest.approx(-force * r * sin(angle + phi) / cos(phi))
+    assert found['cylinder'] == pytest.approx((0.0, force * tan(phi), 0.0), abs=1e-9)
+    assert found['A'][:2] == pytest.approx((force, -force * tan(phi)))
+    # The rod pushes the block, which has no mass, as hard against the cylinder.
+    assert found['B'] == pytest.approx((0.0, -force * tan(phi), 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize('angle', [0.3, 1.2, 2.8, -0.7])
+def test_scotch_yoke(angle):
+    # x = a·cos θ: the slot pushes the yoke with m·ẍ at the height a·sin θ of the crank pin, and
+    # rubs along the slot; the guide bears the rest of the weight and both moments about Y.
+    a, m, rate, pull = 0.05, 1.5, 3.0, 7.0
+    closure = scotch_yoke(Mass(WEIGHTLESS, (0.0, 0.0), 0.0), Mass(m, (0.3, 0.2), 5.0))
+    friction = Friction({'guide': JointFriction(2.0, 0.4), 'slot': JointFriction(0.0, 0.6)})
+    mechanics = Mechanics(closure, Loads((0.0, -10.0)), friction)
+    position = closure.position(angle)
+    velocity = closure.velocity(position, rate)
+    acceleration = closure.acceleration(position, velocity, pull)
+    found, effort = moving(mechanics, position, velocity, acceleration)
+
+    sine, cosine = sin(angle), cos(angle)
+    speed, bend = -a * sine * rate, -a * (cosine * rate**2 + sine * pull)
+    rubbing = -(2.0 * speed + (0.4 if speed > 0 else -0.4))
+    dragged = -0.6 if cosine * rate > 0 else 0.6  # what the yoke does to the block in the slot
+    pushed = m * bend - rubbing
+    lift = 10.0 * m + dragged
+    # About the yoke's centre, which is 0.3 to the right of Y and 0.2 above it:
+    # moment + (Y − c) × guide + (pin − c) × slot = 0.
+    moment = -(-0.3 * lift + 0.2 * rubbing) - (-0.3 * -dragged - (a * sine - 0.2) * pushed)
+    assert found['slot'] == pytest.approx((-pushed, dragged, 0.0), abs=1e-12)
+    assert found['guide'] == pytest.approx((rubbing, lift, moment), rel=1e-12)
+    assert effort == pytest.approx(a * (-sine * pushed - cosine * dragged))
+
+
+@pytest.mark.parametrize('name', STATES)
+def test_both_ways_to_the_effort(name):
+    closure = closed(name)
+    friction = Friction(
+        {joint.name: JointFriction(0.1, 0.3) for joint in closure.structure.joints}
+    )
+    mechanics = Mechanics(closure, loads_of(closure.linkage, damping=15.0), friction)
+    reactions = Reactions(mechanics)
+    for q in STATES[name]:
+        rates, pulls = [1.3, -0.8][: len(q)], [-2.0, 3.5][: len(q)]
+        position = closure.position(*q)
+        velocity = closure.velocity(position, *rates)
+        acceleration = closure.acceleration(position, velocity, *pulls)
+        assert reactions.efforts(position, velocity, acceleration) == pytest.approx(
+            mechanics.drive_efforts(position, velocity, acceleration), rel=1e-10
+        )
+
+
+@pytest.mark.parametrize('name', STATES)
+def test_the_ground_bears_what_the_linkage_does(name):
+    # All forces from outside make the rate of the momentum, by differences of the places; all
+    # moments about the origin that of the moment of momentum.
+    closure = closed(name)
+    linkage, structure = closure.linkage, closure.structure
+    loads = replace(loads_of(linkage), springs=())
+    reactions = Reactions(Mechanics(closure, loads))
+    gravity = complex(*loads.gravity)
+    centers = [(link, complex(*mass.center)) for link, mass in linkage.masses.items()]
+    follower = closure.follower(centers)
+
+    for q in STATES[name]:
+        rates, pulls = [1.3, -0.8][: len(q)], [-2.0, 3.5][: len(q)]
+
+        def at(t, q=q, rates=rates, pulls=pulls):
+            moved = [x + v * t + 0.5 * a * t * t for x, v, a in zip(q, rates, pulls, strict=True)]
+            return closure.position(*moved)
+
+        def momentum(t, at=at):
+            """Return the momentum, and its moment about the origin."""
+            total, moment = 0j, 0.0
+            for i, (link, mass) in zip(follower.indices, linkage.masses.items(), strict=True):
+                place = follower.places(at(t))[i]
+                speed = slope(lambda s, i=i: follower.places(at(s))[i], t)
+                turn = slope(lambda s, link=link: closure.link_angles(at(s))[link], t)
+                total += mass.mass * speed
+                moment += mass.mass * (place.conjugate() * speed).imag + mass.inertia * turn
+            return total, moment
+
+        position = at(0.0)
+        velocity = closure.velocity(position, *rates)
+        acceleration = closure.acceleration(position, velocity, *pulls)
+        points = closure.points(position)
+        force, moment = 0j, 0.0
+        found = reactions.solve(position, velocity, acceleration)
+        for joint, reaction in zip(reactions.joints, found, strict=True):
+            if GROUND in (joint.link, joint.to):
+                sign = 1.0 if joint.to == GROUND else -1.0
+                point = linkage.sliders[joint.name].point if joint.kind == 'P' else joint.name
+                push = sign * complex(*reaction[:2])
+                force += push
+                moment += (points[joint.link, point].conjugate() * push).imag
+                moment += sign * reaction.moment
+        efforts = reactions.efforts(position, velocity, acceleration)
+        for given, effort, pull in zip(linkage.inputs, efforts, pulls, strict=True):
+            moved = effort - loads.drive_inertia * pull
+            if given.slider:
+                slider, block = linkage.sliders[given.slider], structure.blocks[given.slider]
+                line = complex(*slider.direction) / hypot(*slider.direction)
+                line *= rect(1.0, closure.link_angles(position)[slider.along])
+                if GROUND in (slider.along, block):
+                    push = moved * line if slider.along == GROUND else -moved * line
+                    force += push
+                    moment += (points[block, slider.point].conjugate() * push).imag
+            elif GROUND in (given.parent, given.child):
+                moment += moved if given.parent == GROUND else -moved
+        for i, mass in zip(follower.indices, linkage.masses.values(), strict=True):
+            weight = mass.mass * gravity
+            force += weight
+            moment += (follower.places(position)[i].conjugate() * weight).imag
+        assert force == pytest.approx(slope(lambda t: momentum(t)[0], 0.0), rel=1e-6)
+        assert moment == pytest.approx(slope(lambda t: momentum(t)[1], 0.0), rel=1e-6)
+
+
+def test_moments_of_pins_are_friction_alone():
+    closure = Closure(shipped('four_bar'))
+    mechanics = Mechanics(closure, Loads(), Friction({'B': JointFriction(0.5, 0.25)}))
+    position = closure.position(1.0)
+    velocity = closure.velocity(position, 2.0)
+    found, _ = moving(mechanics, position, velocity, closure.acceleration(position, velocity, 0.0))
+    coupler, rocker = velocity.joints
+    rate = rocker - (coupler + 2.0)  # of the rocker, which is the joint's link, to the coupler
+    sign = 1.0 if rate > 0 else -1.0
+    assert found['B'].moment == pytest.approx(-0.5 * rate - sign * 0.25)
+    assert [found[name].moment for name in ('O2', 'O4', 'A')] == [0.0, 0.0, 0.0]
+
+
+NAMES = {
+    'four_bar': ('O2', 'O4', 'A', 'B'),
+    'slider_crank': ('O2', 'A', 'B', 'cylinder'),
+    # Three links share the pin C.
+    'excavator_bucket': ('J', 'I', 'K', 'C/rocker', 'C/bucket_link', 'E', 'bore'),
+}
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_names(name):
+    assert Reactions(Mechanics(Closure(shipped(name)))).names == NAMES[name]
+
+
+def test_a_slider_named_as_its_pin():
+    linkage = shipped('slider_crank')
+    cylinder = linkage.sliders['cylinder']
+    renamed = replace(
+        linkage,
+        sliders={'B': cylinder},
+        assembly={'B': 'ahead'},
+        joints={'rod_joint': RevoluteJoint('crank', 'connecting_rod')},
+    )
+    names = Reactions(Mechanics(Closure(renamed))).names
+    assert names == ('O2', 'A', 'B', 'B/ground')
+
+
+def test_nothing_where_no_rates_exist():
+    masses = {name: Mass(1.0, (0.0, 0.0), 1.0) for name in ('crank', 'coupler', 'rocker')}
+    closure = four_bar(masses, 1.0, 1.0, 1.0, 3.0)
+    reactions = Reactions(Mechanics(closure))
+    for angle, status in ((0.0, Status.TOGGLE), (1.0, Status.OPEN)):
+        position = closure.position(angle)
+        assert position.status is status
+        assert reactions.shift(position, [0j] * 4) is None
+        # There is no velocity to give.
+        assert reactions.solve(position, None, None) is None
+        assert reactions.efforts(position, None, None) is None
