@@ -64,3 +64,33 @@ def head_of_joints(names: Sequence[str], *counts: int) -> bytes:
     for count in counts:
         add(count)
     return bytes(head[STAMP_END:]) + bytes(aligned(len(head), 8) - len(head))
+
+
+_TIME = Struct('<4siI')
+
+
+def time_message(time: int) -> bytes:
+    """Return a ``builtin_interfaces/msg/Time``, of a time in [ns]."""
+    return _TIME.pack(ENCAPSULATION, *divmod(time, 1_000_000_000))
+
+
+def text_message(text: str) -> bytes:
+    """Return a ``std_msgs/msg/String``."""
+    data = text.encode() + b'\0'
+    return ENCAPSULATION + _COUNT.pack(len(data)) + data
+
+
+def text_of(message: bytes) -> str:
+    """
+    Return the text of a ``std_msgs/msg/String`` as `text_message` writes it.
+
+    Raises
+    ------
+    ValueError
+        Where it is not one.
+
+    """
+    if message[:4] != ENCAPSULATION or len(message) < 9:
+        raise ValueError('not a text')
+    end = 7 + int.from_bytes(message[4:8], 'little')
+    return message[8:end].decode()

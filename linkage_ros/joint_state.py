@@ -47,6 +47,9 @@ class Rejection(Enum):
     NO_RATE = 'no velocities'
     NOT_FINITE = 'position or rate not finite'
     TOO_LARGE = 'position or rate beyond 1e10'
+    NO_EFFORT = 'no efforts'
+    EFFORT_NOT_FINITE = 'effort not finite'
+    EFFORT_TOO_LARGE = 'effort beyond 1e10'
     STAMP_ZERO = 'stamp zero'
     STAMP_INVALID = 'stamp negative or with 1e9 ns or more'
     STAMP_FUTURE = 'stamp in the future'
@@ -128,7 +131,12 @@ class JointStateReader:
         return self.read(data)
 
 
-def _find(data: bytes, joints: Sequence[bytes]) -> _Layout | Rejection:
+def _arrays(data: bytes) -> tuple[str, list[bytes], list[tuple[int, int, int]]] | Rejection:
+    """
+    Return byte order, names, and where the arrays of numbers stand.
+
+    Of each array: where its count stands, the count, and where its first number stands.
+    """
     order = {b'\x00\x00': '>', b'\x00\x01': '<'}.get(data[:2])
     if order is None:
         return Rejection.MALFORMED
@@ -157,7 +165,17 @@ def _find(data: bytes, joints: Sequence[bytes]) -> _Layout | Rejection:
         return Rejection.MALFORMED
     if at > len(data):
         return Rejection.MALFORMED
-    (_, n_positions, positions), (rate_at, n_rates, rates), (effort_at, n_efforts, _) = arrays
+    return order, names, arrays
+
+
+def _find(data: bytes, joints: Sequence[bytes]) -> _Layout | Rejection:
+    found = _arrays(data)
+    if isinstance(found, Rejection):
+        return found
+    order, names, arrays = found
+    n_names, (_, n_efforts, after_all) = len(names), arrays[2]
+    at = after_all + 8 * n_efforts
+    (_, n_positions, positions), (rate_at, n_rates, rates), (effort_at, _, _) = arrays
     if not n_names or not n_positions:
         return Rejection.EMPTY
     if n_positions != n_names or n_rates not in (0, n_names) or n_efforts not in (0, n_names):
@@ -205,23 +223,34 @@ class JointStateWriter:
 
     """
 
-    __slots__ = ('_join', '_middle', '_positions_only', '_tail', '_with_rates', 'names')
+    __slots__ = ('_between', '_end', '_layouts', '_no_rates', 'names')
 
     names: bytes
     """What its messages have from byte 12 up to the first position: names and counts."""
 
     def __init__(self, names: Sequence[str]) -> None:
         n = len(names)
-        # After n doubles the offset is a multiple of 8: the next count, then four bytes of
-        # padding.
         self.names = head = head_of_joints(names, n)
-        self._join = Struct('<II').pack(n, 0)
-        self._tail = Struct('<I').pack(0)
-        self._middle = Struct('<II').pack(0, 0)
-        self._positions_only = Struct(f'<4siI{len(head)}s{n}d8s')
-        self._with_rates = Struct(f'<4siI{len(head)}s{n}d8s{n}d4s')
+        # After n doubles the offset is a multiple of 8: the next count, then four bytes of
+        # padding, unless nothing follows.
+        self._between = Struct('<II').pack(n, 0)
+        self._no_rates = Struct('<II').pack(0, n)  # the counts of rates and efforts
+        self._end = bytes(8)
+        numbers = f'<4siI{len(head)}s{n}d'
+        self._layouts = (
+            Struct(f'{numbers}8s'),
+            Struct(f'{numbers}8s{n}d4s'),
+            Struct(f'{numbers}8s{n}d'),
+            Struct(f'{numbers}8s{n}d8s{n}d'),
+        )
 
-    def write(self, stamp: int, positions: Sequence[float], rates: Sequence[float]) -> bytes:
+    def write(
+        self,
+        stamp: int,
+        positions: Sequence[float],
+        rates: Sequence[float],
+        efforts: Sequence[float] = (),
+    ) -> bytes:
         """
         Return a message.
 
@@ -233,14 +262,42 @@ class JointStateWriter:
             One for each joint, in [rad] or [m].
         rates
             One for each joint, in [rad/s] or [m/s], or none: then the array is left empty.
+        efforts
+            One for each joint, in [N·m] or [N], or none.
 
         """
         seconds, nanoseconds = divmod(stamp, NANOSECONDS)
+        alone, with_rates, with_efforts, with_both = self._layouts
+        # A field shorter than what is packed into it takes as much as it holds.
+        if efforts:
+            begin = (ENCAPSULATION, seconds, nanoseconds, self.names, *positions)
+            if rates:
+                return with_both.pack(*begin, self._between, *rates, self._between, *efforts)
+            return with_efforts.pack(*begin, self._no_rates, *efforts)
         if rates:
-            return self._with_rates.pack(
+            return with_rates.pack(
                 ENCAPSULATION, seconds, nanoseconds, self.names,
-                *positions, self._join, *rates, self._tail,
+                *positions, self._between, *rates, self._end,
             )  # fmt: skip
-        return self._positions_only.pack(
-            ENCAPSULATION, seconds, nanoseconds, self.names, *positions, self._middle
-        )
+        return alone.pack(ENCAPSULATION, seconds, nanoseconds, self.names, *positions, self._end)
+
+
+def head_of(data: bytes) -> tuple[set[bytes], int] | None:
+    """Return the names in a message and where they end; nothing of a malformed one."""
+    found = _arrays(data)
+    if isinstance(found, Rejection):
+        return None
+    _, names, arrays = found
+    return set(names), arrays[0][0]
+
+
+def with_every_number(data: bytes, value: float) -> bytes:
+    """Return a message with every position, rate and effort replaced; a malformed one as it is."""
+    found = _arrays(data)
+    if isinstance(found, Rejection):
+        return data
+    order, _, arrays = found
+    spoilt = bytearray(data)
+    for _, n, first in arrays:
+        Struct(f'{order}{n}d').pack_into(spoilt, first, *(value,) * n)
+    return bytes(spoilt)

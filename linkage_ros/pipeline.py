@@ -14,23 +14,29 @@
 
 
 """
-From a scene to its tick: drive, closure, the stages that the scene calls for, and the messages.
+From a scene to its tick: each linkage looked at, and the messages written.
 
 Building puts in only what the scene names; a tick asks no scene.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.drives.topic import TopicDrive
-from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS, Stage, Writer
-from linkage_ros.effects.turns import Continuous, Wrapped
-from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.effects.stage import Reading
+from linkage_ros.joint_state import JointStateWriter, Rejection
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.line import Line, Look
+from linkage_ros.routes import Routes
 from linkage_ros.scene.scene import Scene
 from linkage_ros.tuples import new
+
+if TYPE_CHECKING:
+    from linkage_ros.faults.injection import Injection
+
+_WITHHOLDING = {'rate_limit', 'dropout', 'delay'}
+"""Effects that may leave a tick without a message."""
 
 
 class Tick(NamedTuple):
@@ -39,24 +45,19 @@ class Tick(NamedTuple):
 
     Attributes
     ----------
-    position
-        The loop at the tick; nothing where there is no crank.
-    motion
-        What is published; nothing where nothing is.
+    looks
+        What each linkage came to.
     message
         The JointState, serialized; empty where nothing is published.
-    trajectory
-        The JointTrajectory, serialized; empty where nothing is published, or none is called for.
+    extras
+        For each of the pipeline's further topics its message, serialized; empty where nothing is
+        published on it.
 
     """
 
-    position: Position | None
-    motion: Motion | None
+    looks: tuple[Look, ...]
     message: bytes
-    trajectory: bytes
-
-
-_SILENT = Tick(None, None, b'', b'')
+    extras: tuple[bytes, ...]
 
 
 class Pipeline:
@@ -67,41 +68,56 @@ class Pipeline:
     ----------
     scene
         The scene.
-    closure
-        Its linkage, where that is at hand: it remembers nothing, and serves every reset.
+    closures
+        Its linkages, where they are at hand: they remember nothing, and serve every reset.
+    injection
+        Its faults, where they are at hand: they outlive a reset.
 
     Raises
     ------
     FileError
-        Where the scene names an effect that does not exist, or gives it a wrong parameter.
-    DefinitionError
-        Where the linkage does not close.
+        Where something in the scene does not go together.
 
     """
 
-    __slots__ = ('_drive', '_path', '_reader', 'closure')
+    def __init__(
+        self,
+        scene: Scene,
+        closures: Sequence[Closure] | None = None,
+        injection: Injection | None = None,
+    ) -> None:
+        if injection is None and scene.faults:
+            from linkage_ros.faults.injection import Injection
 
-    def __init__(self, scene: Scene, closure: Closure | None = None) -> None:
-        self.closure = closure or Closure(scene.linkage)
-        self._reader = JointStateReader([driven.joint for driven in scene.linkage.inputs])
-        called_for = {*scene.effects, *(n for name in scene.effects for n in NEEDS.get(name, ()))}
-        effects = {name: import_module(EFFECTS[name]) for name in EFFECTS if name in called_for}
-        stages: list[Stage] = [
-            effect.build(effect.read(scene.effects.section(name, required=False)), self.closure)
-            for name, effect in effects.items()
+            injection = Injection(scene.faults)
+        self.injection = injection
+        """The faults; nothing where the scene has none."""
+        self.lines = [
+            Line(scene, member, closures[number] if closures else None, injection)
+            for number, member in enumerate(scene.members)
         ]
-        scene.effects.finish(tuple(EFFECTS))
-        turns = Wrapped if scene.wrapped else Continuous
-        stages.append(turns(self.closure.turning))
-        self._drive = TopicDrive(
-            scene.drive, needs_rate=any(e.NEEDS_CRANK_RATE for e in effects.values())
+        self.extras = [extra for line in self.lines for extra in line.extras]
+        """The topics beside the joint states."""
+        topics = sorted({line.topic for line in self.lines} - {''})
+        if len(topics) > 1:
+            raise scene.members[0].content.error(
+                'drive', f'{" and ".join(topics)} are listened to', 'drive all by one of them'
+            )
+        self.topic = topics[0] if topics else ''
+        """The topic that the drives listen to; '' for none."""
+        self.withholds = injection is not None or any(
+            not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines
         )
-        joints = list(scene.linkage.joints)
-        write = JointStateWriter(joints).write
-        write_motion: Writer | None = None
-        if 'acceleration' in effects:
-            write_motion = effects['acceleration'].writer(joints)
-        self._path = (self._drive.state, self.closure.position, tuple(stages), write, write_motion)
+        """Whether there may be ticks with a pose and without a message."""
+        if len(self.lines) == 1:
+            (line,) = self.lines
+            writer = JointStateWriter(line.member.joints)
+            self._parts = (line.look, writer.write, tuple(e.write for e in line.extras))
+            self.tick = self._tick_one
+        else:
+            self._routes = Routes({line: line.member.inputs for line in self.lines})
+            self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
+            self.tick = self._tick_many
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """
@@ -115,42 +131,89 @@ class Pipeline:
             The time, in [ns].
 
         """
-        sample = self._reader.read(message)
-        if isinstance(sample, Rejection):
-            return sample
-        return self._drive.offer(sample, now)
+        if len(self.lines) == 1:
+            return self.lines[0].offer(message, now)
+        # It may be for one linkage or for several: it is good if one of them takes it.
+        rejections = [line.offer(message, now) for line in self._routes.find(message)]
+        return None if None in rejections else next(iter(rejections), Rejection.MISSING)
 
-    def tick(self, now: int) -> Tick:
+    def _tick_one(self, now: int) -> Tick:
         """
         Return the linkage at a time.
 
         Parameters
         ----------
         now
-            The time, and the stamp of the message, in [ns].
+            The time, in [ns].
 
         """
-        state, close, stages, write, write_motion = self._path
-        crank = state(now)
-        if crank is None:
-            return _SILENT
-        position = close(*crank[0])
-        joints = position[2]
-        if not joints:
-            return Tick(position, None, b'', b'')
-        motion = new(Motion, (crank, position, joints, (), (), None))
-        for stage in stages:
-            motion = stage(motion)
-        _, _, joints, rates, _, _ = motion
-        trajectory = b'' if write_motion is None else write_motion(now, motion)
-        return new(Tick, (position, motion, write(now, joints, rates), trajectory))
+        look_at, write, extras = self._parts
+        look = look_at(now)
+        _, _, motion, reading = look
+        if reading is None:
+            return new(Tick, ((look,), b'', ()))
+        stamp, joints, rates, _, efforts = reading
+        message = write(stamp, joints, rates, efforts)
+        if not extras or motion is None:
+            return new(Tick, ((look,), message, ()))
+        written = tuple([write_extra(motion, reading) for write_extra in extras])
+        return new(Tick, ((look,), message, written))
+
+    def _tick_many(self, now: int) -> Tick:
+        """Return all linkages at a time, in [ns], those joints left out that have no reading."""
+        looks = tuple([line.look(now) for line in self.lines])
+        read = [look[3] for look in looks]
+        present = tuple([reading is not None for reading in read])
+        readings = [reading for reading in read if reading is not None]
+        if not readings:
+            return Tick(looks, b'', ())
+        writer = self._writers.get(present) or self._writer(present)
+        stamp = max(reading.stamp for reading in readings)
+        message = writer.write(stamp, *_joined(readings))
+        extras = tuple(
+            extra.write(motion, reading) if motion is not None and reading is not None else b''
+            for line, (_, _, motion, reading) in zip(self.lines, looks, strict=True)
+            for extra in line.extras
+        )
+        return Tick(looks, message, extras)
+
+    def _writer(self, present: tuple[bool, ...]) -> JointStateWriter:
+        joints = [
+            joint
+            for line, there in zip(self.lines, present, strict=True)
+            if there
+            for joint in line.member.joints
+        ]
+        self._writers[present] = writer = JointStateWriter(joints)
+        return writer
 
     @property
-    def writes_trajectory(self) -> bool:
-        """Whether a tick that publishes has a JointTrajectory too."""
-        return self._path[-1] is not None
+    def closures(self) -> list[Closure]:
+        """The linkages."""
+        return [line.closure for line in self.lines]
 
     @property
     def newest_stamp(self) -> int:
         """Stamp of the newest good sample, in [ns]; 0 before the first."""
-        return self._drive.stamp
+        return max(line.drive.stamp for line in self.lines)
+
+    @property
+    def max_age(self) -> int:
+        """Age of the newest sample beyond which something is amiss, in [ns]; 0 for never."""
+        return max(line.drive.max_age for line in self.lines)
+
+
+def _joined(
+    readings: Sequence[Reading],
+) -> tuple[list[float], list[float], list[float]]:
+    """
+    Return positions, rates and efforts of all readings.
+
+    The arrays of a JointState are of one length or empty. Where some readings have rates and
+    others, at a toggle or without the effect, have none, none are published; so with efforts.
+    """
+    positions = [value for reading in readings for value in reading[1]]
+    rates = [value for reading in readings for value in reading[2]]
+    efforts = [value for reading in readings for value in reading[4]]
+    n = len(positions)
+    return positions, rates if len(rates) == n else [], efforts if len(efforts) == n else []

@@ -17,25 +17,27 @@
 A run once more, from its bag: the same pipeline over the same samples in the same order.
 
 The bag holds the messages in the order in which the tick took and published them. The log time is
-that by which the tick judged a sample, the publish time of a joint state, or a motion, that for
-which it solved. So the pipeline, built from the scene in the bag, comes to the same states.
+that by which the tick judged a sample, the publish time of what it published that for which it
+solved. So the pipeline, built from the scene in the bag, comes to the same states. Faults begin
+and end where the bag says so, not by the scene's timeline: somebody may have asked for one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 import json
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.bag.reader import Bag
+from linkage_ros.bag.reader import Bag, RUN_FILE
+from linkage_ros.cdr import text_of
 from linkage_ros.errors import BagError
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
 
-RUN_FILE = 'run.json'
-"""Name of the attachment that names scene, topics and versions of a run."""
+if TYPE_CHECKING:
+    from linkage_ros.faults.injection import Change
 
 
 class ReplayedTick(NamedTuple):
@@ -47,9 +49,9 @@ class ReplayedTick(NamedTuple):
     time
         Time of the tick, in [ns].
     recorded
-        Its joint state in the bag; empty where only its motion is there.
-    recorded_motion
-        Its motion in the bag; empty where there is none.
+        Its joint state in the bag; empty where there is none.
+    recorded_extras
+        For each of the pipeline's extras its message in the bag; empty where there is none.
     tick
         What the pipeline makes of the bag's samples.
 
@@ -57,7 +59,7 @@ class ReplayedTick(NamedTuple):
 
     time: int
     recorded: bytes
-    recorded_motion: bytes
+    recorded_extras: tuple[bytes, ...]
     tick: Tick
 
 
@@ -74,7 +76,12 @@ def recorded_scene(bag: Bag) -> Scene:
 
     """
     run = _run(bag)
-    return parse_scene(run.scene, str(bag.path), bag.attachments)
+    files = {name: data for name, data in bag.attachments.items() if name.endswith('.yaml')}
+    if len(files) < 2:
+        raise BagError(
+            bag.path, f'carries no {LINKAGE_FILE}', 'name a bag that linkage_ros has recorded'
+        )
+    return parse_scene(run.scene, str(bag.path), files, run.scene_folder)
 
 
 def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
@@ -82,49 +89,73 @@ def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
     run = _run(bag)
     # Where crank and joint states share a topic, as in the tick: by their joints.
     shared = run.crank_topic == run.joint_states_topic
-    own = JointStateWriter(list(scene.linkage.joints)).names if shared else b''
+    own = JointStateWriter(scene.joints).names if shared else b''
+    outputs = {topic: number for number, topic in enumerate((run.joint_states_topic, *run.extras))}
     pipeline = Pipeline(scene)
+    closures, injection = pipeline.closures, pipeline.injection
     last = 0
-    ticked: ReplayedTick | None = None  # its motion may follow
+    open_tick: tuple[int, list[bytes], Tick] | None = None  # more of its messages may follow
     for topic, log_time, publish_time, data in bag.messages():
-        if topic not in run.topics:
+        published = outputs.get(topic)
+        if topic == run.crank_topic and not (published == 0 and data.startswith(own, 12)):
+            published = None
+        elif published is None and topic not in (run.faults_topic, run.withheld_topic):
             continue
-        if topic == run.motion_topic and ticked is not None and ticked.time == publish_time:
-            yield ticked._replace(recorded_motion=data)
-            ticked = None
-            continue
-        if ticked is not None:
-            yield ticked
-            ticked = None
+        if published is not None and open_tick is not None:
+            time, recorded, _ = open_tick
+            if time == publish_time and not any(recorded[published:]):
+                recorded[published] = data
+                continue
+        if open_tick is not None:
+            yield _replayed(open_tick)
+            open_tick = None
         if log_time < last:
-            pipeline = Pipeline(scene)
+            pipeline = Pipeline(scene, closures, injection)
         last = log_time
-        if topic == run.motion_topic:  # the recorder had to drop its joint state
-            yield ReplayedTick(publish_time, b'', data, pipeline.tick(publish_time))
-        elif topic == run.joint_states_topic and data.startswith(own, 12):
-            ticked = ReplayedTick(publish_time, data, b'', pipeline.tick(publish_time))
+        if published is not None:
+            open_tick = publish_time, [b''] * len(outputs), pipeline.tick(publish_time)
+            open_tick[1][published] = data
+        elif topic == run.faults_topic:
+            if injection is not None:
+                injection.set(*read_change(data))
+        elif topic == run.withheld_topic:
+            pipeline.tick(publish_time)
         else:
             pipeline.offer(data, log_time)
-    if ticked is not None:
-        yield ticked
+    if open_tick is not None:
+        yield _replayed(open_tick)
+
+
+def _replayed(tick: tuple[int, list[bytes], Tick]) -> ReplayedTick:
+    time, (joint_states, *extras), now = tick
+    return ReplayedTick(time, joint_states, tuple(extras), now)
+
+
+def change_text(change: Change, kind: str) -> str:
+    """Return that a fault has begun or ended, as the text that is published and recorded."""
+    return json.dumps({'fault': change.name, 'kind': kind, 'injected': change.on})
+
+
+def read_change(message: bytes) -> tuple[str, bool]:
+    """Return what a message of the faults' topic says: of which fault, and whether it began."""
+    said = json.loads(text_of(message))
+    return str(said['fault']), bool(said['injected'])
 
 
 class _Run(NamedTuple):
-    """What a run's account of itself says."""
+    """What a run's account of itself says; of topics that there are not, ''."""
 
     scene: str
+    scene_folder: str
     crank_topic: str
     joint_states_topic: str
-    motion_topic: str
-    """Empty where none was published, and in bags older than it."""
-
-    @property
-    def topics(self) -> tuple[str, ...]:
-        return self[1:]
+    faults_topic: str
+    withheld_topic: str
+    extras: tuple[str, ...]
 
 
 def _run(bag: Bag) -> _Run:
-    missing = {RUN_FILE, SCENE_FILE, LINKAGE_FILE} - set(bag.attachments)
+    missing = {RUN_FILE, SCENE_FILE} - set(bag.attachments)
     if missing:
         raise BagError(
             bag.path,
@@ -135,9 +166,12 @@ def _run(bag: Bag) -> _Run:
         run = json.loads(bag.attachments[RUN_FILE])
         return _Run(
             scene=str(run['scene']),
-            crank_topic=str(run['crank_topic']),
+            scene_folder=str(run.get('scene_folder', '')),
+            crank_topic=str(run.get('crank_topic', '')),
             joint_states_topic=str(run['joint_states_topic']),
-            motion_topic=str(run.get('motion_topic', '')),
+            faults_topic=str(run.get('faults_topic', '')),
+            withheld_topic=str(run.get('withheld_topic', '')),
+            extras=tuple(map(str, run.get('extra_topics', ()))),
         )
     except (ValueError, KeyError, TypeError, AttributeError):
         raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag') from None

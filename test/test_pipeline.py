@@ -26,6 +26,7 @@ import sys
 
 from linkage_ros.joint_state import JointStateWriter, Rejection
 from linkage_ros.kinematics.status import Status
+from linkage_ros.line import Look
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
@@ -89,7 +90,7 @@ def test_over_several_turns_angles_run_on_or_stay_wrapped(wrap_input, direction,
 
     continuous = turn(pipeline(linkage=linkage), angle_at, wrap=wrap_input)
     wrapped = turn(pipeline(b'angles: wrapped', linkage), angle_at, wrap=wrap_input)
-    slides = not pipeline(linkage=linkage).closure.turning[1]
+    slides = not pipeline(linkage=linkage).closures[0].turning[1]
     previous = None
     for long, short in zip(map(read, continuous), map(read, wrapped), strict=True):
         if previous is not None:
@@ -145,10 +146,10 @@ def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
 
 def test_before_the_first_sample_and_after_the_last_there_is_silence():
     silent = pipeline()
-    assert silent.tick(BEGIN) == (None, None, b'', b'')
+    assert silent.tick(BEGIN) == ((Look(None, None, None, None),), b'', ())
     silent.offer(CRANK.write(BEGIN, [0.5], [1.0]), BEGIN)
     assert silent.tick(BEGIN + 200 * MS).message
-    assert silent.tick(BEGIN + 201 * MS) == (None, None, b'', b'')
+    assert silent.tick(BEGIN + 201 * MS) == ((Look(None, None, None, None),), b'', ())
 
 
 @pytest.mark.parametrize(
@@ -161,17 +162,17 @@ def test_before_the_first_sample_and_after_the_last_there_is_silence():
 def test_where_there_is_no_pose_nothing_is_published(linkage, angle, status, gap):
     stuck = pipeline(linkage=linkage)
     stuck.offer(CRANK.write(BEGIN, [angle], [1.0]), BEGIN)
-    position, motion, message, trajectory = stuck.tick(BEGIN)
+    ((_, position, motion, reading),), message, extras = stuck.tick(BEGIN)
     assert position.status is status
     assert position.gap == pytest.approx(gap)
-    assert motion is None
-    assert message == trajectory == b''
+    assert motion is reading is None
+    assert (message, extras) == (b'', ())
 
 
 def test_at_a_toggle_positions_are_published_and_rates_are_not():
     toggle = pipeline(linkage=b'four_bar: {a: 1, b: 1, c: 1, d: 3}')
     toggle.offer(CRANK.write(BEGIN, [0.0], [1.0]), BEGIN)
-    position, _, message, _ = toggle.tick(BEGIN)
+    ((_, position, _, _),), message, _ = toggle.tick(BEGIN)
     assert position.status is Status.TOGGLE
     assert len(read(message).position) == 2
     assert len(read(message).velocity) == 0
@@ -185,8 +186,8 @@ def test_without_acceleration_there_is_no_trajectory():
     for scene in (b'', b'effects: {velocity: {}}'):
         plain = pipeline(scene)
         plain.offer(CRANK.write(BEGIN, [0.5], [1.0]), BEGIN)
-        assert not plain.writes_trajectory
-        assert plain.tick(BEGIN).trajectory == b''
+        assert plain.extras == []
+        assert plain.tick(BEGIN).extras == ()
 
 
 @pytest.mark.parametrize(
@@ -197,12 +198,12 @@ def test_without_acceleration_there_is_no_trajectory():
 def test_a_trajectory_says_what_the_joint_state_says_and_accelerations(effects):
     # To name acceleration is to name velocity; turns are added to both messages.
     both, velocity = pipeline(b'effects: ' + effects), pipeline(b'effects: {velocity: {}}')
-    assert both.writes_trajectory
+    assert [extra.topic for extra in both.extras] == ['~/motion']
     for number in range(300):
         now, angle = BEGIN + number * 2 * MS, 0.1 * number
         message = CRANK.write(now, [remainder(angle, tau)], [50.0])
         assert both.offer(message, now) is velocity.offer(message, now) is None
-        _, motion, state, trajectory = both.tick(now)
+        ((_, _, motion, _),), state, (trajectory,) = both.tick(now)
         assert state == velocity.tick(now).message
         written = read_motion(trajectory)
         assert written.header == read(state).header
@@ -210,7 +211,7 @@ def test_a_trajectory_says_what_the_joint_state_says_and_accelerations(effects):
         (point,) = written.points
         assert list(point.positions) == list(read(state).position)
         assert list(point.velocities) == list(read(state).velocity)
-        assert tuple(point.accelerations) == motion.accelerations
+        assert tuple(point.accelerations) == motion.acceleration.joints
         assert len(point.accelerations) == 2
 
 
@@ -218,7 +219,7 @@ def test_at_a_toggle_a_trajectory_has_positions_only():
     scene, linkage = b'effects: {acceleration: {}}', b'four_bar: {a: 1, b: 1, c: 1, d: 3}'
     toggle = pipeline(scene, linkage)
     toggle.offer(CRANK.write(BEGIN, [0.0], [1.0]), BEGIN)
-    position, _, _, trajectory = toggle.tick(BEGIN)
+    ((_, position, _, _),), _, (trajectory,) = toggle.tick(BEGIN)
     assert position.status is Status.TOGGLE
     (point,) = read_motion(trajectory).points
     assert len(point.positions) == 2
@@ -247,10 +248,10 @@ def test_two_inputs_come_out_of_one_message_in_any_order():
         writer = JointStateWriter(names)
         five_bar = pipeline(b'effects: {acceleration: {}}', TWO_CRANKS)
         assert five_bar.offer(CRANK.write(BEGIN, [0.3], [1.0]), BEGIN) is Rejection.MISSING
-        assert five_bar.tick(BEGIN).position is None
+        assert five_bar.tick(BEGIN).looks[0].position is None
         rates = [10.0 * value for value in values]
         assert five_bar.offer(writer.write(BEGIN, values, rates), BEGIN) is None
-        _, motion, message, _ = five_bar.tick(BEGIN + 10 * MS)
+        ((_, _, motion, _),), message, _ = five_bar.tick(BEGIN + 10 * MS)
         assert motion.crank.rates == (3.0, 20.0)
         assert motion.crank.angles == pytest.approx((0.33, 2.2))
         assert closes(read(message).position, 0.33, 2.2)
@@ -263,7 +264,7 @@ def test_two_inputs_come_out_of_one_message_in_any_order():
         )
         assert list(rates) == pytest.approx(list((after - before) / 2e-5), rel=1e-5)
         slopes = (after - 2.0 * now + before) / 1e-10
-        assert list(motion.accelerations) == pytest.approx(list(slopes), rel=1e-5)
+        assert list(motion.acceleration.joints) == pytest.approx(list(slopes), rel=1e-5)
 
 
 def test_a_rejected_message_leaves_the_next_ticks_as_they_were():
@@ -289,7 +290,7 @@ GALLERY = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
 def test_a_linkage_of_the_gallery_moves_as_its_rates_and_accelerations_say(file):
     scene = pipeline(b'effects: {velocity: {}, acceleration: {}}', file.read_bytes())
-    closure = scene.closure
+    (closure,) = scene.closures
     inputs = closure.linkage.inputs
     if len(inputs) == 1:
         interval = max(closure.input_ranges, key=lambda r: r.highest - r.lowest)
@@ -310,7 +311,7 @@ def test_a_linkage_of_the_gallery_moves_as_its_rates_and_accelerations_say(file)
         slope = (after.position - before.position) / (2 * step)
         assert state.velocity == pytest.approx(slope, rel=1e-4, abs=1e-4)
     trajectories = [
-        STORE.deserialize_cdr(tick.trajectory, 'trajectory_msgs/msg/JointTrajectory').points[0]
+        STORE.deserialize_cdr(tick.extras[0], 'trajectory_msgs/msg/JointTrajectory').points[0]
         for tick in motions
     ]
     for before, point, after in zip(

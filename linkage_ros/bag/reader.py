@@ -34,6 +34,9 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 import yaml
 
+RUN_FILE = 'run.json'
+"""Name of the attachment in which a run names its scene, topics and versions."""
+
 
 class BagMessage(NamedTuple):
     """One message: the topic's name, when it was received and made [ns], and its CDR bytes."""

@@ -33,6 +33,10 @@ if _RICH:
     from rich.text import Text
 
 _LIVE_PERIOD, _PLAIN_PERIOD = 0.25, 1.0
+_MOST_SHOWN = 24
+"""Joints beyond this do not fit on a screen."""
+
+_Shown = tuple[str, float, float | None]
 
 
 class Display:
@@ -69,40 +73,46 @@ class Display:
         ticks = node.loop.counts.ticks
         rate = (ticks - self._before[0]) / (now - self._before[1])
         self._before = (ticks, now)
-        linkage = node.scene.linkage
-        names = [*(driven.joint for driven in linkage.inputs), *linkage.joints]
         if self._live is None:
-            print(_line(node.loop, names, rate), flush=True)
+            print(_line(node.loop, rate), flush=True)
             return
         if not self._entered:
             self._live.start()
             self._entered = True
-        self._live.update(_table(node.loop, names, rate), refresh=True)
+        self._live.update(_table(node.loop, rate), refresh=True)
 
 
-def _state(loop: TickLoop) -> tuple[str, list[tuple[float, float | None]]]:
-    """Return the input's age as text, and value and rate of inputs and joints."""
+def _state(loop: TickLoop) -> tuple[str, list[_Shown]]:
+    """Return the input's age as text, and name, value and rate of inputs and joints."""
     tick = loop.counts.last
-    if tick is None or tick.position is None:
-        return 'no crank', []
-    if tick.motion is None:
-        return f'{tick.position.status.value}, gap {tick.position.gap:.3g} m', []
-    crank, _, joints, rates, _, _ = tick.motion
-    values: list[tuple[float, float | None]] = list(zip(crank.angles, crank.rates, strict=True))
-    values += zip(joints, rates or [None] * len(joints), strict=True)
-    return f'{crank.age * 1e-6:.2f} ms', values
+    age = 'no crank'
+    values: list[_Shown] = []
+    for line, (crank, position, _, reading) in zip(
+        loop.pipeline.lines, tick.looks if tick else (), strict=False
+    ):
+        if crank is None or position is None:
+            continue
+        if not position.joints:
+            age = f'{position.status.value}, gap {position.gap:.3g} m'
+            continue
+        member = line.member
+        age = f'{crank.age * 1e-6:.2f} ms'
+        if not set(member.inputs) <= set(member.joints):
+            values += zip(member.inputs, crank.angles, crank.rates, strict=True)
+        if reading is not None:
+            rates = reading.rates or [None] * len(reading.joints)
+            values += zip(member.joints, reading.joints, rates, strict=True)
+    return age, values[:_MOST_SHOWN]
 
 
-def _line(loop: TickLoop, names: list[str], rate: float) -> str:
+def _line(loop: TickLoop, rate: float) -> str:
     age, values = _state(loop)
     counts = loop.counts
-    shown = '  '.join(
-        f'{name} {value:+.4f}' for name, (value, _) in zip(names, values, strict=False)
-    )
+    shown = '  '.join(f'{name} {value:+.4f}' for name, value, _ in values)
     return f'{rate:7.1f} ticks/s  lost {counts.lost}  late {counts.late}  age {age}  {shown}'
 
 
-def _table(loop: TickLoop, names: list[str], rate: float) -> Any:
+def _table(loop: TickLoop, rate: float) -> Any:
     age, values = _state(loop)
     counts = loop.counts
     status = Text(
@@ -115,6 +125,6 @@ def _table(loop: TickLoop, names: list[str], rate: float) -> Any:
     table.add_column('joint')
     table.add_column('position [rad, m]', justify='right', min_width=18)
     table.add_column('rate [1/s]', justify='right', min_width=14)
-    for name, (value, speed) in zip(names, values, strict=False):
+    for name, value, speed in values:
         table.add_row(name, f'{value:+.6f}', '' if speed is None else f'{speed:+.5f}')
     return Group(status, table)

@@ -25,11 +25,11 @@ from threading import Event
 from typing import Any
 
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.replay import recorded_scene, replay
 from linkage_ros.effects.turns import wrapped
 from linkage_ros.errors import BagError, LinkageError
 from linkage_ros.joint_state import JointStateReader, Rejection
 from linkage_ros.kinematics.linkage import Input, RevoluteJoint
+from linkage_ros.replay import recorded_scene, replay
 
 _COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
 """Okabe and Ito's, which colour-blind readers can tell."""
@@ -69,31 +69,43 @@ def draw(bag_path: Path, picture: Path) -> None:
         )
     bag = read_bag(bag_path, allow_truncated=True)
     scene = recorded_scene(bag)
-    positions: Curves = {name: ([], []) for name in scene.linkage.joints}
-    rates: Curves = {name: ([], []) for name in scene.linkage.joints}
-    turns = {name: isinstance(j, RevoluteJoint) for name, j in scene.linkage.joints.items()}
-    driven = scene.linkage.inputs[0]
-    reader = JointStateReader(list(scene.linkage.joints))
+    # Over the crank of the first linkage, with its joints.
+    member = scene.members[0]
+    linkage = member.linkage
+    driven = linkage.inputs[0]
+    drawn = {
+        name: (place, isinstance(joint, RevoluteJoint))
+        for place, (name, joint) in enumerate(linkage.joints.items())
+        if name != driven.joint
+    }
+    positions: Curves = {name: ([], []) for name in drawn}
+    rates: Curves = {name: ([], []) for name in drawn}
+    reader = JointStateReader(member.joints)
     states = 0
     for _, recorded, _, tick in replay(bag, scene):
-        if tick.motion is None or not recorded:
+        crank_state = tick.looks[0].crank
+        if crank_state is None or not recorded:
             continue
-        states += 1
         sample = reader.read(recorded)
+        if sample is Rejection.MISSING:  # this linkage had no reading, others had
+            continue
         if isinstance(sample, Rejection):
             raise BagError(bag_path, f'a joint state: {sample.value}', 'name another bag')
-        crank = tick.motion.crank.angles[0]
+        states += 1
+        crank = crank_state.angles[0]
         if not driven.slider:
             crank %= tau
-        for (name, turning), value in zip(turns.items(), sample.angles, strict=True):
+        for name, (place, turning) in drawn.items():
+            value = sample.angles[place]
             _add(positions[name], crank, wrapped(value) if turning else value, turning)
-        for name, rate in zip(turns, sample.rates or (), strict=False):
-            _add(rates[name], crank, rate, False)
+            if sample.rates:
+                _add(rates[name], crank, sample.rates[place], False)
     if not states:
         raise BagError(bag_path, 'holds no joint states', 'record a run with a crank')
     over = driven.joint if driven.slider else f'one turn of {driven.joint}'
     title = f'{scene.name}: dependent joints over {over} ({states} joint states)'
-    used = (('rad', any(turns.values())), ('m', not all(turns.values())))
+    turns = [turning for _, turning in drawn.values()]
+    used = (('rad', any(turns)), ('m', not all(turns)))
     units = [unit for unit, is_used in used if is_used]
     _figure(title, driven, units, positions, rates, picture)
 

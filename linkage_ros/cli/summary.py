@@ -20,10 +20,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.replay import recorded_scene, replay
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import recorded_scene, replay
 from linkage_ros.ros.node import LinkageNode
 
 
@@ -45,8 +45,12 @@ def summary(node: LinkageNode) -> str:
         ]
     rows += [
         ('published', f'{counts.published} joint states; {counts.silent} ticks without a crank'),
-        ('samples', f'{counts.received} received, {counts.used} used, {rejected} rejected'),
     ]
+    if counts.withheld:
+        rows.append(('withheld', f'{counts.withheld} readings, by what the scene does to sensors'))
+    if node.crank_topic:
+        samples = f'{counts.received} received, {counts.used} used, {rejected} rejected'
+        rows.append(('samples', samples))
     rows += [
         (status.value, f'{counts.unclosed[status]} ticks')
         for status in (Status.TOGGLE, Status.OPEN, Status.INDETERMINATE)
@@ -68,25 +72,21 @@ def _proof(folder: Path) -> str:
     try:
         bag = read_bag(folder)
         scene = recorded_scene(bag)
-        closure = Closure(scene.linkage)
-        found = {'joint states': [0, 0], 'motions': [0, 0]}
+        pipeline = Pipeline(scene)
+        found = {'joint states': [0, 0]}
+        found |= {extra.topic.removeprefix('~/'): [0, 0] for extra in pipeline.extras}
         worst = 0.0
-        for _, recorded, recorded_motion, tick in replay(bag, scene):
-            for counts, before, now in zip(
-                found.values(),
-                (recorded, recorded_motion),
-                (tick.message, tick.trajectory),
-                strict=True,
+        for _, recorded, recorded_extras, tick in replay(bag, scene):
+            now = (tick.message, *(tick.extras or [b''] * len(recorded_extras)))
+            for counts, then, again in zip(
+                found.values(), (recorded, *recorded_extras), now, strict=True
             ):
-                counts[0] += bool(before) and before == now
-                counts[1] += bool(before)
-            if tick.motion is not None:
-                worst = max(worst, closure.residual(tick.motion.position))
+                counts[0] += bool(then) and then == again
+                counts[1] += bool(then)
+            for line, look in zip(pipeline.lines, tick.looks, strict=True):
+                if look.position is not None and look.position.joints:
+                    worst = max(worst, line.closure.residual(look.position))
     except LinkageError as error:
         return str(error)
-    proof = ' and '.join(
-        f'{same} of {of} {what}'
-        for what, (same, of) in found.items()
-        if of or what == 'joint states'
-    )
+    proof = ' and '.join(f'{same} of {of} {what}' for what, (same, of) in found.items())
     return f'{proof} replay to the same bytes; worst loop residual {worst:.1e} m'

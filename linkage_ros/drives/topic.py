@@ -19,57 +19,49 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
-from typing import NamedTuple
 
-from linkage_ros.joint_state import CrankSample, Rejection
+from linkage_ros.drives.drive import Context, CrankState, Reader
+from linkage_ros.joint_state import CrankSample, JointStateReader, NANOSECONDS, Rejection
+from linkage_ros.parameters import flag, number
 from linkage_ros.tuples import new
 
 LARGEST = 1e10
 """Angles beyond this, in [rad], are 2e-6 rad apart as doubles: none of a machine. Rates alike."""
 
 
+TOPIC = 'crank_states'
+
+
 @dataclass(frozen=True, slots=True)
 class TopicParameters:
-    """
-    How samples of the crank are used.
+    """A measured crank: the newest sample of crank_states, a sensor_msgs/JointState."""
 
-    Attributes
-    ----------
-    carry_forward
-        Whether the crank is carried to the tick's time by its rate, or held as measured.
-    max_age
-        Age of the newest sample beyond which there is no crank, in [ns].
-    max_lead
-        How far ahead of the clock a stamp may be, in [ns].
-
-    """
-
-    carry_forward: bool
-    max_age: int
-    max_lead: int
+    carry_forward: bool = flag(
+        "carry the crank to the tick's time by its rate; else it is held as measured", True
+    )
+    max_age: float = number(
+        'age of the newest sample beyond which there is no crank',
+        0.2,
+        unit='s',
+        least=1e-6,
+        most=3600.0,
+    )
+    max_lead: float = number(
+        'how far ahead of the clock a stamp may be', 0.1, unit='s', least=0.0, most=3600.0
+    )
 
 
-class CrankState(NamedTuple):
-    """
-    The crank at a tick.
+PARAMETERS = TopicParameters
 
-    Attributes
-    ----------
-    angles
-        Of each input, in the order of the linkage, in [rad]; of one that slides in [m].
-    rates
-        In [rad/s] or [m/s].
-    accelerations
-        In [rad/s²] or [m/s²]; 0 where they are unknown.
-    age
-        Time of the tick less that of the sample, in [ns].
 
-    """
+def reader(context: Context) -> Reader:
+    """Build what reads the messages."""
+    return JointStateReader(context.inputs_in_messages).read
 
-    angles: tuple[float, ...]
-    rates: tuple[float, ...]
-    accelerations: tuple[float, ...]
-    age: int
+
+def build(parameters: TopicParameters, context: Context) -> TopicDrive:
+    """Build the drive."""
+    return TopicDrive(parameters, context.needs_rate)
 
 
 _Values = tuple[float, ...]
@@ -92,12 +84,15 @@ class TopicDrive:
 
     """
 
-    __slots__ = ('_carry_forward', '_max_age', '_max_lead', '_needs_rate', '_sample')
+    __slots__ = ('_carry_forward', '_max_lead', '_needs_rate', '_sample', 'max_age')
+
+    max_age: int
+    """Age of the newest sample beyond which there is no crank, in [ns]."""
 
     def __init__(self, use: TopicParameters, needs_rate: bool) -> None:
         self._carry_forward = use.carry_forward
-        self._max_age = use.max_age
-        self._max_lead = use.max_lead
+        self.max_age = round(use.max_age * NANOSECONDS)
+        self._max_lead = round(use.max_lead * NANOSECONDS)
         self._needs_rate = needs_rate or use.carry_forward
         self._sample: tuple[int, _Values, _Values, _Values] | None = None
 
@@ -143,7 +138,7 @@ class TopicDrive:
             return None
         stamp, angles, rates, zeros = self._sample
         age = now - stamp
-        if age > self._max_age:
+        if age > self.max_age:
             return None
         if self._carry_forward:
             seconds = age * 1e-9

@@ -24,53 +24,50 @@ both stay empty.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
-from linkage_ros.effects.stage import Motion, Stage, Writer
-from linkage_ros.joint_trajectory import JointTrajectoryWriter
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.scene.section import Section
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Motion, Reading, Stage, Writer
 from linkage_ros.tuples import new
 
-NEEDS_CRANK_RATE = True
+TOPIC = '~/motion'
+MESSAGE = 'trajectory_msgs/msg/JointTrajectory'
 
 
 @dataclass(frozen=True, slots=True)
 class AccelerationParameters:
-    """Acceleration has none."""
+    """Accelerations of the joints, on ~/motion; and with them velocity."""
 
 
-def read(content: Section) -> AccelerationParameters:
-    """Read the parameters."""
-    content.finish()
-    return AccelerationParameters()
+PARAMETERS = AccelerationParameters
 
 
-def build(_parameters: AccelerationParameters, closure: Closure) -> Stage:
+def stage(_parameters: AccelerationParameters, context: Context) -> Stage:
     """Build the stage."""
-    acceleration_of = closure.acceleration
+    acceleration_of = context.closure.acceleration
 
     def acceleration(motion: Motion) -> Motion:
-        crank, position, joints, rates, _, velocity = motion
+        crank, position, velocity, _, _, _, _ = motion
         if velocity is None:
             return motion
-        found = acceleration_of(position, velocity, *crank.accelerations).joints
+        found = acceleration_of(position, velocity, *crank.accelerations)
         # Towards a toggle it grows as the cube of what the rates grow as: it may overflow alone.
-        if not all(map(isfinite, found)):
+        if not all(map(isfinite, found.joints)):
             return motion
-        return new(Motion, (crank, position, joints, rates, found, velocity))
+        return new(Motion, (crank, position, velocity, found, (), (), ()))
 
     return acceleration
 
 
-def writer(joints: Sequence[str]) -> Writer:
-    """Build what writes the message: the motion, as a trajectory of one point."""
-    write = JointTrajectoryWriter(joints).write
+def writer(context: Context) -> Writer:
+    """Build what writes the message: what is read, as a trajectory of one point."""
+    from linkage_ros.joint_trajectory import JointTrajectoryWriter  # local import: if published
 
-    def write_motion(stamp: int, motion: Motion) -> bytes:
-        _, _, positions, rates, accelerations, _ = motion
+    write = JointTrajectoryWriter(context.joints_in_messages).write
+
+    def write_motion(_motion: Motion, reading: Reading) -> bytes:
+        stamp, positions, rates, accelerations, _ = reading
         return write(stamp, positions, rates, accelerations)
 
     return write_motion

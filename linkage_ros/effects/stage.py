@@ -18,40 +18,84 @@ The effects, in the order in which physics applies them.
 
 Each is a module, imported only where a scene names the effect, with
 
-``NEEDS_CRANK_RATE``
-    Whether it uses the crank's rate.
-``read(content: Section) -> parameters``
-    Read its parameters, strictly; a frozen type.
-``build(parameters, closure: Closure) -> Stage``
-    Build the stage of the tick.
+``PARAMETERS``
+    The type of its parameters (see `linkage_ros.parameters`).
+
+and with what builds its part of the tick; which, says where in the tick it stands:
+
+``alter(parameters, linkage, random) -> Linkage``
+    Another linkage in the place of the one that is drawn; no part of the tick.
+``drive_stage(parameters, context) -> Callable[[CrankState], CrankState]``
+    Between the drive and the crank.
+``stage(parameters, context) -> Callable[[Motion], Motion]``
+    In the mechanism, once its loops are closed.
+``sensor(parameters, context) -> Callable[[int, Reading], Reading | None]``
+    Between the mechanism and the message: given the time of the tick, in [ns], and what is read
+    so far, return what is read; None where nothing is.
 
 An effect that publishes a message of its own has also
 
-``writer(joints: Sequence[str]) -> Writer``
-    Build what writes the message, from the motion as it is published.
+``TOPIC``, ``MESSAGE``
+    The topic, and the type of the message: package/msg/Type.
+``writer(context) -> Callable[[Motion, Reading], bytes]``
+    Build what writes the message.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.drives.topic import CrankState
-from linkage_ros.kinematics.closure import Position, Velocity
+from linkage_ros.drives.drive import CrankState
+from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
+
+if TYPE_CHECKING:
+    from linkage_ros.dynamics.reactions import Reaction
 
 EFFECTS = {
+    # The mechanism as it was made.
+    'tolerance': 'linkage_ros.effects.tolerance',
+    # Between motor and crank.
+    'backlash': 'linkage_ros.effects.backlash',
+    # How it moves, and what that takes.
     'velocity': 'linkage_ros.effects.velocity',
     'acceleration': 'linkage_ros.effects.acceleration',
+    'friction': 'linkage_ros.effects.friction',
+    'effort': 'linkage_ros.effects.effort',
+    'pin_forces': 'linkage_ros.effects.pin_forces',
+    # How it yields under these forces.
+    'compliance': 'linkage_ros.effects.compliance',
+    'clearance': 'linkage_ros.effects.clearance',
+    # What a sensor makes of it: when it looks, what it sees, and when that arrives.
+    'jitter': 'linkage_ros.effects.jitter',
+    'bias': 'linkage_ros.effects.bias',
+    'noise': 'linkage_ros.effects.noise',
+    'encoder': 'linkage_ros.effects.encoder',
+    'rate_limit': 'linkage_ros.effects.rate_limit',
+    'dropout': 'linkage_ros.effects.dropout',
+    'delay': 'linkage_ros.effects.delay',
 }
 """Name of each effect, and the module that holds it."""
 
-NEEDS = {'acceleration': ('velocity',)}
-"""What an effect starts from: to name it is to name these too."""
+NEEDS = {
+    'acceleration': ('velocity',),
+    'effort': ('velocity', 'acceleration'),
+    'pin_forces': ('velocity', 'acceleration'),
+    'compliance': ('velocity', 'acceleration', 'pin_forces'),
+    'clearance': ('velocity', 'acceleration', 'pin_forces'),
+}
+"""What an effect starts from, which is then computed; but published only where it is named."""
+
+PUBLISHED_WITH = {'acceleration': ('velocity',)}
+"""What to name an effect is to name too: a trajectory without rates is of no use."""
+
+LOADED = ('effort', 'pin_forces', 'compliance', 'clearance')
+"""Effects to which masses, loads and friction matter."""
 
 
 class Motion(NamedTuple):
     """
-    What a tick knows, handed from stage to stage.
+    What the mechanism does at a tick, handed from stage to stage.
 
     Attributes
     ----------
@@ -59,25 +103,54 @@ class Motion(NamedTuple):
         The crank at the tick.
     position
         The closed loop.
-    joints
-        Values of the published joints, in [rad] or [m].
-    rates
-        Their rates, in [rad/s] or [m/s]; empty where no one asked, or at a toggle.
-    accelerations
-        Their accelerations, in [rad/s²] or [m/s²]; empty as the rates are.
-    velocity
-        The loop's, from which its acceleration starts; nothing where there are no rates.
+    velocity, acceleration
+        The loop's; nothing where no stage asked, or at a toggle.
+    efforts
+        Of the inputs, in [N·m] or [N]; empty where no stage asked, or at a toggle.
+    reactions
+        In pins and sliders; empty as the efforts are.
+    shift
+        What is added to the published joints, in [rad] or [m], because the mechanism yields; empty
+        for nothing.
 
     """
 
     crank: CrankState
     position: Position
+    velocity: Velocity | None
+    acceleration: Acceleration | None
+    efforts: tuple[float, ...]
+    reactions: tuple[Reaction, ...]
+    shift: tuple[float, ...]
+
+
+class Reading(NamedTuple):
+    """
+    What the sensors make of a motion, and what is published.
+
+    Attributes
+    ----------
+    stamp
+        Of the message, in [ns].
+    joints
+        Values of the published joints, in [rad] or [m].
+    rates
+        In [rad/s] or [m/s]; empty where not called for, or at a toggle.
+    accelerations
+        In [rad/s²] or [m/s²]; empty as the rates are.
+    efforts
+        In [N·m] or [N]; empty as the rates are.
+
+    """
+
+    stamp: int
     joints: tuple[float, ...]
     rates: tuple[float, ...]
     accelerations: tuple[float, ...]
-    velocity: Velocity | None
+    efforts: tuple[float, ...]
 
 
+DriveStage = Callable[[CrankState], CrankState]
 Stage = Callable[[Motion], Motion]
-Writer = Callable[[int, Motion], bytes]
-"""Writes a message, given its stamp, in [ns], and the motion."""
+Sensor = Callable[[int, Reading], Reading | None]
+Writer = Callable[[Motion, Reading], bytes]

@@ -17,8 +17,8 @@
 How a published angle runs: on beyond a turn, or wrapped.
 
 The closure knows an angle up to whole turns. `Continuous` adds the turns that bring it nearest to
-what was published last, so it takes steps of less than half a turn; it is the only stage with a
-memory.
+what came last, so it takes steps of less than half a turn. It stands before the sensors, which may
+then mix and quantise what they get without a thought of wrapping; `Wrapped` stands behind them.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import pi, remainder, tau
 
-from linkage_ros.effects.stage import Motion
+from linkage_ros.effects.stage import Reading
 from linkage_ros.tuples import new
 
 
@@ -41,25 +41,45 @@ class Continuous:
 
     """
 
-    __slots__ = ('_last', '_turning')
+    __slots__ = ('_raw', '_turning', '_turns')
 
     def __init__(self, turning: Sequence[bool]) -> None:
         self._turning = tuple(i for i, turns in enumerate(turning) if turns)
-        self._last: list[float] | None = None
+        self._raw: tuple[float, ...] | None = None
+        """The angles as they came last."""
+        self._turns: list[int] | None = None
+        """What was added to them, in turns; nothing where it is 0 for all."""
 
-    def __call__(self, motion: Motion) -> Motion:
-        """Return the motion with the turns added."""
-        crank, position, joints, rates, accelerations, velocity = motion
-        last = self._last
-        if last is None:
-            now = [wrapped(v) if i in self._turning else v for i, v in enumerate(joints)]
-        else:
-            now = list(joints)
+    def __call__(self, _now: int, reading: Reading) -> Reading:
+        """Return the reading with the turns added."""
+        stamp, joints, rates, accelerations, efforts = reading
+        raw, self._raw = self._raw, joints
+        if raw is None:
+            first = list(joints)
             for i in self._turning:
-                if not -pi < last[i] - now[i] < pi:
-                    now[i] += round((last[i] - now[i]) / tau) * tau
-        self._last = now
-        return new(Motion, (crank, position, tuple(now), rates, accelerations, velocity))
+                first[i] = wrapped(joints[i])
+            self._add([round((w - v) / tau) for w, v in zip(first, joints, strict=True)])
+            return new(Reading, (stamp, tuple(first), rates, accelerations, efforts))
+        for i in self._turning:
+            if not -pi < raw[i] - joints[i] < pi:
+                self._follow(raw, joints)
+                break
+        turns = self._turns
+        if turns is None:
+            return reading
+        added = tuple([v + n * tau if n else v for v, n in zip(joints, turns, strict=True)])
+        return new(Reading, (stamp, added, rates, accelerations, efforts))
+
+    def _follow(self, raw: tuple[float, ...], joints: tuple[float, ...]) -> None:
+        """Add the turns that take back the jumps since the last reading."""
+        turns = self._turns or [0] * len(joints)
+        for i in self._turning:
+            if not -pi < raw[i] - joints[i] < pi:
+                turns[i] += round((raw[i] - joints[i]) / tau)
+        self._add(turns)
+
+    def _add(self, turns: list[int]) -> None:
+        self._turns = turns if any(turns) else None
 
 
 class Wrapped:
@@ -78,11 +98,11 @@ class Wrapped:
     def __init__(self, turning: Sequence[bool]) -> None:
         self._turning = tuple(turning)
 
-    def __call__(self, motion: Motion) -> Motion:
-        """Return the motion with whole turns left out."""
-        crank, position, joints, rates, accelerations, velocity = motion
+    def __call__(self, _now: int, reading: Reading) -> Reading:
+        """Return the reading with whole turns left out."""
+        stamp, joints, rates, accelerations, efforts = reading
         now = [wrapped(v) if turns else v for v, turns in zip(joints, self._turning, strict=True)]
-        return new(Motion, (crank, position, tuple(now), rates, accelerations, velocity))
+        return new(Reading, (stamp, tuple(now), rates, accelerations, efforts))
 
 
 def wrapped(angle: float) -> float:

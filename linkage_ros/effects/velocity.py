@@ -23,35 +23,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Stage
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.scene.section import Section
 from linkage_ros.tuples import new
-
-NEEDS_CRANK_RATE = True
 
 
 @dataclass(frozen=True, slots=True)
 class VelocityParameters:
-    """Velocity has none."""
+    """Rates of the joints, in JointState.velocity."""
 
 
-def read(content: Section) -> VelocityParameters:
-    """Read the parameters."""
-    content.finish()
-    return VelocityParameters()
+PARAMETERS = VelocityParameters
 
 
-def build(_parameters: VelocityParameters, closure: Closure) -> Stage:
+def stage(_parameters: VelocityParameters, context: Context) -> Stage:
     """Build the stage."""
-    toggle, velocity_of = Status.TOGGLE, closure.velocity
+    toggle, velocity_of = Status.TOGGLE, context.closure.velocity
 
     def velocity(motion: Motion) -> Motion:
-        crank, position, joints, _, _, _ = motion
+        crank, position, _, _, _, _, _ = motion
         if position.status is toggle:
             return motion
         found = velocity_of(position, *crank.rates)
-        return new(Motion, (crank, position, joints, found.joints, (), found))
+        return new(Motion, (crank, position, found, None, (), (), ()))
 
     return velocity

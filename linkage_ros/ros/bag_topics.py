@@ -18,13 +18,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib import import_module
 import json
 from pathlib import Path
 import re
 from typing import Any
 
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.errors import RecordingError
+from linkage_ros.errors import LinkageError, RecordingError
 from linkage_ros.shipped import share_folders
 from rclpy.qos import QoSProfile
 
@@ -49,6 +50,34 @@ _PRIMITIVES = frozenset(
     ]
 )
 _SEPARATOR = f'\n{"=" * 80}\n'
+
+
+def message_type(name: str, key: str) -> Any:
+    """
+    Return the class of a message; it is imported here, so that only what is called for is.
+
+    Parameters
+    ----------
+    name
+        package/msg/Type.
+    key
+        Of the scene, that calls for it.
+
+    Raises
+    ------
+    LinkageError
+        Where its package is not installed.
+
+    """
+    package, _, kind = name.split('/')
+    try:
+        return getattr(import_module(f'{package}.msg'), kind)
+    except ImportError:
+        raise LinkageError(
+            key,
+            f'the ROS package {package} is not installed',
+            'install it, or leave it out',
+        ) from None
 
 
 def bag_topic(name: str, message_type: Any, qos: QoSProfile) -> Topic:

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
+from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from linkage_ros.joint_state import NANOSECONDS
@@ -27,7 +28,11 @@ from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.linkage import Input
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.status import Status
+from linkage_ros.line import Line
 from linkage_ros.ros.tick_loop import Counts, TickLoop
+
+if TYPE_CHECKING:
+    from linkage_ros.faults.injection import Injection
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,
@@ -81,16 +86,12 @@ class Health:
         Name of the node.
     scene
         Name of the scene.
-    inputs
-        The driven joints.
     rate
         Ticks wanted a second; 0 for one for every sample.
     clock
         Time by the node's clock, in [ns].
-    max_age
-        Age beyond which a sample is no crank, in [ns].
     crank_topic
-        Resolved name of the crank's topic.
+        Resolved name of the topic that the drives listen to; '' for none.
     publishers
         Who publishes on it.
     loop
@@ -106,10 +107,8 @@ class Health:
 
     node: str
     scene: str
-    inputs: Sequence[Input]
     rate: float
     clock: int
-    max_age: int
     crank_topic: str
     publishers: Sequence[str]
     loop: TickLoop
@@ -120,7 +119,10 @@ class Health:
 
     def statuses(self) -> list[DiagnosticStatus]:
         """Return the statuses, one for each task."""
-        return [self._tick(), self._crank(), self._closure(), self._recording()]
+        statuses = [self._tick(), self._crank(), self._closure(), self._recording()]
+        if self.loop.injection is not None:
+            statuses.append(self._faults(self.loop.injection))
+        return statuses
 
     def _tick(self) -> DiagnosticStatus:
         window = max(self.now.time - self.before.time, 1) / NANOSECONDS
@@ -165,7 +167,10 @@ class Health:
         age = (self.clock - stamp) / NANOSECONDS if stamp else inf
         rejected = self.now.rejected - self.before.rejected
         level, message = OK, 'Samples arriving'
-        if age * NANOSECONDS > self.max_age:
+        max_age = self.loop.pipeline.max_age
+        if not self.crank_topic:
+            message = 'Driven by the scene'
+        elif max_age and age * NANOSECONDS > max_age:
             level = STALE
             message = f'No crank for {age:.1f} s, by its stamps' if stamp else 'No crank yet'
         elif len(self.publishers) > 1:
@@ -186,8 +191,9 @@ class Health:
     def _closure(self) -> DiagnosticStatus:
         counts = self.loop.counts
         level, message = OK, 'Closed'
-        reachable = describe(self.loop.closure.input_ranges)
-        last = counts.last_unclosed
+        lines = self.loop.pipeline.lines
+        number, last = counts.last_unclosed or (0, None)
+        reachable = describe(lines[number].closure.input_ranges)
         if last is not None and self.now.unclosed > self.before.unclosed:
             level = ERROR
             message = (
@@ -205,29 +211,42 @@ class Health:
             'Ticks indeterminate': counts.unclosed[Status.INDETERMINATE],
             'Gap when last open (m)': f'{last.gap:.6g}' if last is not None else '0',
         }
-        tick = counts.last
-        if tick is not None and tick.motion is not None:
-            _, position, *_ = tick.motion
-            for driven, angle in zip(self.inputs, tick.motion.crank.angles, strict=True):
-                values[f'Input {driven.joint} ({_unit(driven)})'] = f'{angle:.6f}'
-            values['Residual (m)'] = f'{self.loop.closure.residual(position):.3g}'
-            near, warning = self._nearness(position)
-            values |= near
+        for line, look in zip(lines, counts.last.looks if counts.last else (), strict=False):
+            crank, position, _, _ = look
+            if crank is None or position is None or not position.joints:
+                continue
+            # Of several linkages each has its own lines, with its name before them.
+            of = f'{line.member.name}: ' if line.member.name else ''
+            inputs = line.member.linkage.inputs
+            for driven, angle in zip(inputs, crank.angles, strict=True):
+                values[f'{of}Input {driven.joint} ({_unit(driven)})'] = f'{angle:.6f}'
+            values[f'{of}Residual (m)'] = f'{line.closure.residual(position):.3g}'
+            near, warning = self._nearness(line, position)
+            values |= {f'{of}{key}': value for key, value in near.items()}
             if warning and level == OK:
-                level, message = WARN, warning
+                level, message = WARN, f'{of}{warning}'
         return self._status('loop closure', level, message, values)
 
-    def _nearness(self, position: Position) -> tuple[dict[str, str], str]:
+    def _nearness(self, line: Line, position: Position) -> tuple[dict[str, str], str]:
         """Return how near trouble a position is, and of what there is to warn."""
-        unit = ' or '.join(sorted({_unit(driven) for driven in self.inputs}))
+        unit = ' or '.join(sorted({_unit(driven) for driven in line.member.linkage.inputs}))
         values, warnings = {}, []
-        nearness = self.loop.closure.nearness(position)
+        nearness = line.closure.nearness(position)
         for name, text in _NEARNESS.items():
             key, value, limit = text.format(unit=unit), getattr(nearness, name), self.limits[name]
             values[key] = f'{value:.6g}'
             if value < limit:
                 warnings.append(f'{key} is {value:.3g}, below warn.{name} of {limit:.3g}')
         return values, '; '.join(warnings)
+
+    def _faults(self, injection: Injection) -> DiagnosticStatus:
+        on = [name for name, switch in injection.switches.items() if switch.on]
+        message = f'Injected: {", ".join(on)}' if on else 'None injected'
+        values: dict[str, object] = {}
+        for name, fault in injection.faults.items():
+            values[f'{name} ({fault.kind})'] = 'injected' if name in on else 'off'
+            values[f'Times injected: {name}'] = injection.injected[name]
+        return self._status('faults', WARN if on else OK, message, values)
 
     def _recording(self) -> DiagnosticStatus:
         level, message = OK, 'Not recording'

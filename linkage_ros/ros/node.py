@@ -25,19 +25,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial, wraps
 import time
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
 from linkage_ros.bag.topic import Topic
+from linkage_ros.cdr import text_message
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import change_text
 from linkage_ros.ros import pacing
-from linkage_ros.ros.bag_topics import bag_topic
+from linkage_ros.ros.bag_topics import bag_topic, message_type
 from linkage_ros.ros.diagnostics import Health, Snapshot
 from linkage_ros.ros.parameters import declare_parameters, nearness_limits
-from linkage_ros.ros.run_recording import RunRecording
+from linkage_ros.ros.run_recording import EXTRA, RunRecording
 from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
 from linkage_ros.ros.warnings import Warnings
 from linkage_ros.scene.load import load_scene
@@ -47,12 +48,16 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.serialization import serialize_message
+from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
+
+if TYPE_CHECKING:
+    from linkage_ros.faults.injection import Change
 
 CRANK_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Sensor data, but deeper: at a slow tick every sample still gets into the bag."""
@@ -63,6 +68,7 @@ OUTPUT_QOS = QoSProfile(depth=10)
 _CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 _DIAGNOSTICS_QOS = QoSProfile(depth=1)
 _WATCH_PERIOD = 0.25
+_CHANGES_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NOT_YET_KNOWN = '_NODE_NAME_UNKNOWN_'
 
 Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
@@ -99,21 +105,16 @@ class LinkageNode(LifecycleNode):
         self._joint_states = self.create_publisher(
             JointState, 'joint_states', OUTPUT_QOS, qos_overriding_options=overridable
         )
-        self._motion: Publisher | None = None
+        self._extras: list[Publisher] = []
+        self._changes: Publisher | None = None
+        self._injectors: list[Any] = []
+        self._crank: Subscription | None = None
         self._diagnostics = self.create_publisher(
             DiagnosticArray, '/diagnostics', _DIAGNOSTICS_QOS
         )
-        taken_by_tick = _TakenByTick()
-        self._crank = self.create_subscription(
-            JointState,
-            'crank_states',
-            _never_called,
-            CRANK_QOS,
-            callback_group=taken_by_tick,
-            qos_overriding_options=overridable,
-        )
+        self._taken_by_tick = _TakenByTick()
         self._simulation = self.create_subscription(
-            ClockMessage, '/clock', _never_called, _CLOCK_QOS, callback_group=taken_by_tick
+            ClockMessage, '/clock', _never_called, _CLOCK_QOS, callback_group=self._taken_by_tick
         )
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
@@ -128,8 +129,8 @@ class LinkageNode(LifecycleNode):
 
     @property
     def crank_topic(self) -> str:
-        """Return the resolved name of the topic from which the crank comes."""
-        return str(self._crank.topic_name)
+        """Return the resolved name of the topic that the drives listen to; '' for none."""
+        return '' if self._crank is None else str(self._crank.topic_name)
 
     # Transitions.
 
@@ -144,8 +145,9 @@ class LinkageNode(LifecycleNode):
                 )
             scene = load_scene(file)
             pipeline = Pipeline(scene)  # what it calls for is proven now, not at the first tick
-            self._advertise_motion(pipeline.writes_trajectory)
+            self._connect(pipeline)
         except LinkageError as error:
+            self._disconnect()
             self.failure = error
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
@@ -158,18 +160,21 @@ class LinkageNode(LifecycleNode):
         assert self.scene is not None
         self.loop = self._build_loop(self.scene)
         self._warnings = Warnings(self.get_logger())  # as new as the counts that it compares
-        while self._crank.handle.take_message(JointState, True) is not None:
-            pass  # what came before this moment is not of this run
+        if self._crank is not None:
+            while self._crank.handle.take_message(JointState, True) is not None:
+                pass  # what came before this moment is not of this run
         self._before = Snapshot.of(self.loop.counts, time.monotonic_ns())
         if self.scene.record is not None:
             self._start_recording()
         self.loop.start(self._pace(self.scene.rate))
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
-        cranks = ', '.join(driven.joint for driven in self.scene.linkage.inputs)
-        to = [each.topic_name for each in (self._joint_states, self._motion) if each is not None]
+        cranks = ', '.join(joint for member in self.scene.members for joint in member.inputs)
+        drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))
+        source = f'from {self.crank_topic}' if self.crank_topic else f'driven by {drives}'
+        to = [each.topic_name for each in (self._joint_states, *self._extras)]
         self.get_logger().info(
-            f'{self.scene.name}: ticking {rate}; crank {cranks} from {self.crank_topic}; '
-            f'{", ".join(self.scene.linkage.joints)} to {" and ".join(to)}'
+            f'{self.scene.name}: ticking {rate}; crank {cranks} {source}; '
+            f'{", ".join(self.scene.joints)} to {" and ".join(to)}'
         )
         return TransitionCallbackReturn.SUCCESS
 
@@ -183,7 +188,7 @@ class LinkageNode(LifecycleNode):
     def on_cleanup(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Forget the scene."""
         self.scene = None
-        self._advertise_motion(False)
+        self._disconnect()
         return TransitionCallbackReturn.SUCCESS
 
     @_reporting
@@ -197,43 +202,81 @@ class LinkageNode(LifecycleNode):
         """Return to unconfigured."""
         self.get_logger().error('a transition failed; the node is unconfigured now')
         self.end()
-        self._advertise_motion(False)
+        self._disconnect()
         return TransitionCallbackReturn.SUCCESS
 
-    def _advertise_motion(self, wanted: bool) -> None:
-        """Have the publisher of ~/motion, or have none."""
-        if wanted and self._motion is None:
-            try:
-                # Within the function: a scene without accelerations must not wait for it.
-                from trajectory_msgs.msg import JointTrajectory
-            except ImportError:
-                raise LinkageError(
-                    'effects.acceleration',
-                    'the ROS package trajectory_msgs is not installed',
-                    'install it, or leave out acceleration',
-                ) from None
-            self._motion = self.create_publisher(
-                JointTrajectory,
-                '~/motion',
-                OUTPUT_QOS,
-                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+    def _connect(self, pipeline: Pipeline) -> None:
+        """Have the topics and services that a scene calls for, and no others."""
+        self._disconnect()
+        overridable = QoSOverridingOptions.with_default_policies()
+        for extra in pipeline.extras:
+            self._extras.append(
+                self.create_publisher(
+                    message_type(extra.message, f'effects.{extra.effect}'),
+                    extra.topic,
+                    OUTPUT_QOS,
+                    qos_overriding_options=overridable,
+                )
             )
-        elif not wanted and self._motion is not None:
-            self.destroy_publisher(self._motion)
-            self._motion = None
+        if pipeline.topic:
+            self._crank = self.create_subscription(
+                JointState,
+                pipeline.topic,
+                _never_called,
+                CRANK_QOS,
+                callback_group=self._taken_by_tick,
+                qos_overriding_options=overridable,
+            )
+        if pipeline.injection is not None:
+            # What one who joins later has to know: which faults are on.
+            self._changes = self.create_publisher(
+                message_type('std_msgs/msg/String', 'faults'), '~/faults', _CHANGES_QOS
+            )
+            for name in pipeline.injection.faults:
+                self._injectors.append(
+                    self.create_service(
+                        SetBool, f'~/inject/{name}', partial(self._on_inject, name)
+                    )
+                )
+
+    def _disconnect(self) -> None:
+        """Have none of them."""
+        for publisher in (*self._extras, self._changes):
+            if publisher is not None:
+                self.destroy_publisher(publisher)
+        for service in self._injectors:
+            self.destroy_service(service)
+        if self._crank is not None:
+            self.destroy_subscription(self._crank)
+        self._extras, self._injectors, self._changes, self._crank = [], [], None, None
 
     def _build_loop(self, scene: Scene) -> TickLoop:
         shared = self.crank_topic == self._joint_states.topic_name
-        closure = Closure(scene.linkage)
-        # Found before the first tick, which would wait for it: iterated links are followed there.
-        _ = closure.critical_inputs
+        pipeline = Pipeline(scene)
+        closures, injection = pipeline.closures, pipeline.injection
+        for closure in closures:
+            # Found before the first tick, which would wait for it: iterated links are followed
+            # there.
+            _ = closure.critical_inputs
+        take = None
+        if self._crank is not None:
+            take = partial(self._crank.handle.take_message, JointState, True)
         return TickLoop(
-            partial(Pipeline, scene, closure),
-            partial(self._crank.handle.take_message, JointState, True),
+            partial(Pipeline, scene, closures, injection),
+            take,
             self._joint_states.handle.publish_raw,
-            JointStateWriter(list(scene.linkage.joints)).names if shared else b'',
-            None if self._motion is None else self._motion.handle.publish_raw,
+            JointStateWriter(scene.joints).names if shared else b'',
+            [extra.handle.publish_raw for extra in self._extras],
+            self._publish_change,
         )
+
+    def _publish_change(self, change: Change) -> bytes:
+        """Publish that a fault has begun or ended, on the thread of the tick."""
+        assert self.scene is not None
+        assert self._changes is not None
+        message = text_message(change_text(change, self.scene.faults[change.name].kind))
+        self._changes.handle.publish_raw(message)
+        return message
 
     def _pace(self, rate: float) -> Pace:
         simulated = self.get_parameter('use_sim_time').value
@@ -241,6 +284,7 @@ class LinkageNode(LifecycleNode):
             return pacing.on_clock(self.context, self._simulation, rate)
         if rate:
             return pacing.steady(rate)
+        assert self._crank is not None  # without samples a scene has a rate
         clock = self.get_clock()
         now = (lambda: int(clock.now().nanoseconds)) if simulated else time.time_ns
         return pacing.on_samples(self.context, self._crank, now)
@@ -258,19 +302,39 @@ class LinkageNode(LifecycleNode):
         directory = self.get_parameter('runs_directory').value
         return self.recording.start(self.scene, self.loop, directory, self._bag_topics)
 
-    def _bag_topics(self) -> list[Topic]:
+    def _bag_topics(self) -> list[tuple[str, Topic]]:
         """Describe what is recorded, in the order of the tick's topic numbers."""
+        assert self.loop is not None
         joint_states = self._joint_states
         offered = [
-            info.qos_profile for info in self.get_publishers_info_by_topic(self.crank_topic)
+            info.qos_profile
+            for info in (
+                self.get_publishers_info_by_topic(self.crank_topic) if self.crank_topic else []
+            )
         ]
         topics = [
-            bag_topic(self.crank_topic, JointState, offered[0] if offered else CRANK_QOS),
-            bag_topic(joint_states.topic_name, JointState, joint_states.qos_profile),
-            bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS),
+            (
+                'joint_states_topic',
+                bag_topic(joint_states.topic_name, JointState, joint_states.qos_profile),
+            ),
+            ('diagnostics_topic', bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS)),
         ]
-        if (motion := self._motion) is not None:
-            topics.append(bag_topic(motion.topic_name, motion.msg_type, motion.qos_profile))
+        if self.crank_topic:
+            qos = offered[0] if offered else CRANK_QOS
+            topics.append(('crank_topic', bag_topic(self.crank_topic, JointState, qos)))
+        if (changes := self._changes) is not None:
+            topics.append(
+                ('faults_topic', bag_topic(changes.topic_name, changes.msg_type, _CHANGES_QOS))
+            )
+        if self.loop.pipeline.withholds:
+            # For the replay alone: on the graph there is nothing to say at such a tick.
+            name = f'{self.get_fully_qualified_name()}/withheld'
+            time_type = message_type('builtin_interfaces/msg/Time', 'record')
+            topics.append(('withheld_topic', bag_topic(name, time_type, OUTPUT_QOS)))
+        topics += [
+            (EXTRA, bag_topic(extra.topic_name, extra.msg_type, extra.qos_profile))
+            for extra in self._extras
+        ]
         return topics
 
     # Services.
@@ -291,6 +355,15 @@ class LinkageNode(LifecycleNode):
             return _answer(response, False, 'not active: nothing to reset')
         self.loop.reset_requested = True
         return _answer(response, True, 'crank and turns are forgotten before the next tick')
+
+    def _on_inject(
+        self, name: str, request: SetBool.Request, response: SetBool.Response
+    ) -> SetBool.Response:
+        if self.loop is None or not self.loop.running or self.loop.injection is None:
+            return _answer(response, False, 'not active: nothing to inject into')
+        self.loop.injection.ask(name, bool(request.data))
+        what = 'begins' if request.data else 'ends'
+        return _answer(response, True, f'{name} {what} at the next tick')
 
     def _on_start_recording(
         self, _: Trigger.Request, response: Trigger.Response
@@ -318,7 +391,7 @@ class LinkageNode(LifecycleNode):
         if loop is None or not loop.running:
             return
         period = self.get_parameter('warning_period').value
-        self._warnings.look(loop.counts, loop.closure, self.crank_topic, period)
+        self._warnings.look(loop.counts, loop.pipeline.closures, self.crank_topic, period)
         if loop.failure:
             self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
         if loop.recorder is not None and loop.recorder.failure is not None:
@@ -344,10 +417,8 @@ class LinkageNode(LifecycleNode):
         health = Health(
             node=self.get_name(),
             scene=self.scene.name,
-            inputs=self.scene.linkage.inputs,
             rate=0.0 if simulated else self.scene.rate,
             clock=clock.nanoseconds,
-            max_age=self.scene.drive.max_age,
             crank_topic=self.crank_topic,
             publishers=publishers,
             loop=self.loop,
@@ -366,7 +437,7 @@ class LinkageNode(LifecycleNode):
 
     def _crank_publishers(self) -> list[str]:
         """Return who publishes the crank; where others share the topic, no one can tell."""
-        if self.crank_topic == self._joint_states.topic_name:
+        if self.crank_topic in ('', self._joint_states.topic_name):
             return []
         return [
             f'{info.node_namespace.rstrip("/")}/{info.node_name}'
@@ -392,7 +463,7 @@ def _never_called(_: Any) -> None:
     pass
 
 
-def _answer(response: Trigger.Response, success: bool, message: str) -> Trigger.Response:
+def _answer(response: Any, success: bool, message: str) -> Any:
     response.success = success
     response.message = message
     return response

@@ -25,17 +25,21 @@ from pathlib import Path
 import platform
 
 from linkage_ros import __version__
+from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.recorder import Recorder, RecordingSummary
-from linkage_ros.bag.replay import RUN_FILE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
-from linkage_ros.ros.tick_loop import CRANK, JOINT_STATES, MOTION, TickLoop
+from linkage_ros.ros.tick_loop import TickLoop
 from linkage_ros.scene.scene import RecordParameters, Scene
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
 """How a run is recorded that a service asks for where the scene says nothing."""
+
+
+EXTRA = 'extra'
+"""The key of a topic of which there may be several."""
 
 
 class RunRecording:
@@ -57,7 +61,11 @@ class RunRecording:
         """Why a recording could not be started or ended early; '' while none has."""
 
     def start(
-        self, scene: Scene, loop: TickLoop, directory: str, topics: Callable[[], Sequence[Topic]]
+        self,
+        scene: Scene,
+        loop: TickLoop,
+        directory: str,
+        topics: Callable[[], Sequence[tuple[str, Topic]]],
     ) -> str:
         """
         Start a bag that explains itself; return what came of it, as one line.
@@ -71,14 +79,15 @@ class RunRecording:
         directory
             Where the bag's folder is made; '' for where the scene says.
         topics
-            Returns what will be recorded, in the order of the tick's topic numbers.
+            Returns what will be recorded, in the order of the tick's topic numbers, each with the
+            key under which the bag's account of the run names it; that of several names a list.
 
         """
         record = scene.record or _DEFAULT
         try:
             described = topics()
             folder = _folder(Path(directory or record.directory), record.name, scene.name)
-            writer = BagWriter(folder, described, _attachments(scene, described))
+            writer = BagWriter(folder, [t for _, t in described], _attachments(scene, described))
         except RecordingError as error:
             self.failure = f'not recording: {error}'
             self._logger.error(self.failure)
@@ -108,17 +117,19 @@ class RunRecording:
         return line
 
 
-def _attachments(scene: Scene, topics: Sequence[Topic]) -> dict[str, tuple[str, bytes]]:
+def _attachments(
+    scene: Scene, topics: Sequence[tuple[str, Topic]]
+) -> dict[str, tuple[str, bytes]]:
+    named = {key: topic.name for key, topic in topics if key != EXTRA}
     run = {
         'scene': scene.name,
-        'crank_topic': topics[CRANK].name,
-        'joint_states_topic': topics[JOINT_STATES].name,
+        'scene_folder': str(Path(scene.folder).resolve()),
+        **named,
+        'extra_topics': [topic.name for key, topic in topics if key == EXTRA],
         'linkage_ros': __version__,
         'python': platform.python_version(),
         'machine': platform.machine(),
     }
-    if len(topics) > MOTION:
-        run['motion_topic'] = topics[MOTION].name
     return {
         **{name: ('application/yaml', data) for name, data in scene.files.items()},
         RUN_FILE: ('application/json', json.dumps(run).encode()),

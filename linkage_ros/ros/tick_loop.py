@@ -23,22 +23,28 @@ for another thread; what it has seen stands in its counts, for others to read.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from threading import Event, Thread
 from time import monotonic_ns
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from linkage_ros.bag.recorder import Recorder
+from linkage_ros.cdr import time_message
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.ros.duration_histogram import DurationHistogram
 
-CRANK, JOINT_STATES, DIAGNOSTICS, MOTION = range(4)
-"""The recorder's topics; the last of them only where it is published."""
+if TYPE_CHECKING:
+    from linkage_ros.faults.injection import Change, Injection
 
+JOINT_STATES, DIAGNOSTICS = range(2)
+"""
+The recorder's first topics. Where there are such, the crank's follows, those of the faults and of
+the ticks without a message, and those of the pipeline's extras.
+"""
 
 _CLOSED = Status.CLOSED
 
@@ -50,6 +56,7 @@ class Counts:
     ticks: int = 0
     published: int = 0
     silent: int = 0
+    withheld: int = 0
     lost: int = 0
     late: int = 0
     clock_jumps: int = 0
@@ -60,12 +67,17 @@ class Counts:
     lateness: DurationHistogram = field(default_factory=DurationHistogram)
     last: Tick | None = None
     unclosed: dict[Status, int] = field(default_factory=lambda: dict.fromkeys(Status, 0))
-    last_unclosed: Position | None = None
+    last_unclosed: tuple[int, Position] | None = None
+    """Number of the linkage, and its position."""
 
 
 Take = Callable[[], tuple[bytes, dict[str, Any]] | None]
 Pace = Callable[['TickLoop', Event], None]
 """Runs a tick loop until the event: waits, and calls `tick_at` or `tick_samples`."""
+
+
+def _take_nothing() -> None:
+    return None
 
 
 class TickLoop:
@@ -77,34 +89,43 @@ class TickLoop:
     build
         Builds the pipeline; called again for a reset.
     take
-        Takes the next crank message, as bytes and message info; nothing where there is none.
+        Takes the next message for the drives, as bytes and message info; nothing where there is
+        none. Absent where they listen to no topic.
     publish
         Publishes a serialized JointState.
     own
         What the node's own messages have behind the stamp where they come back on the crank's
         topic, so that they can be told; empty where they do not.
-    publish_motion
-        Publishes a serialized JointTrajectory, where the pipeline writes one.
+    publish_extras
+        For each of the pipeline's extras what publishes it, serialized.
+    publish_change
+        Publishes that a fault has begun or ended, and returns the message, serialized.
 
     """
 
     def __init__(
         self,
         build: Callable[[], Pipeline],
-        take: Take,
+        take: Take | None,
         publish: Callable[[bytes], None],
         own: bytes = b'',
-        publish_motion: Callable[[bytes], None] | None = None,
+        publish_extras: Sequence[Callable[[bytes], None]] = (),
+        publish_change: Callable[[Change], bytes] | None = None,
     ) -> None:
         self._build = build
-        self._take = take
+        self._take = take or _take_nothing
         self._publish = publish
         self._own = own
-        self._publish_motion = publish_motion
         self._last_time = 0
         self._pipeline = build()
+        self.injection = self._pipeline.injection
+        self._publish_change = publish_change
+        self._crank_number = DIAGNOSTICS + 1
+        self._change_number = self._crank_number + (take is not None)
+        self._withheld_number = self._change_number + (self.injection is not None)
+        first = self._withheld_number + self._pipeline.withholds
+        self._publish_extras = tuple(enumerate(publish_extras, first))
         self._stopping = Event()
-        self.closure = self._pipeline.closure
         self._thread: Thread | None = None
         self.counts = Counts()
         self.recorder: Recorder | None = None
@@ -138,6 +159,11 @@ class TickLoop:
         """Stamp of the newest good sample, in [ns]; 0 before the first."""
         return self._pipeline.newest_stamp
 
+    @property
+    def pipeline(self) -> Pipeline:
+        """The pipeline, as it was built last."""
+        return self._pipeline
+
     def _offer(self, message: bytes, info: dict[str, Any], now: int) -> bool:
         """Record a message and offer it to the pipeline; return whether it was good."""
         if self._own and message.startswith(self._own, 12):
@@ -145,7 +171,7 @@ class TickLoop:
         counts = self.counts
         counts.received += 1
         if (recorder := self.recorder) is not None:  # another thread takes it away
-            recorder.offer(CRANK, now, info['source_timestamp'], message)
+            recorder.offer(self._crank_number, now, info['source_timestamp'], message)
         rejection = self._pipeline.offer(message, now)
         if rejection is not None:
             counts.rejected[rejection] += 1
@@ -154,6 +180,8 @@ class TickLoop:
 
     def tick_at(self, now: int) -> None:
         """Take every message that has come and tick at a time, in [ns]."""
+        if self.injection is not None:
+            now = self._inject(self.injection, now)
         if now < self._last_time or self.reset_requested:
             self._rebuild(now)
         self._last_time = now
@@ -165,6 +193,8 @@ class TickLoop:
 
     def tick_samples(self, now: int) -> None:
         """Take every message that has come and tick once for each, at its stamp."""
+        if self.injection is not None:
+            now = self._inject(self.injection, now)
         if now < self._last_time or self.reset_requested:
             self._rebuild(now)
         self._last_time = now
@@ -182,26 +212,45 @@ class TickLoop:
             self.counts.resets += 1
         self._pipeline = self._build()
 
+    def _inject(self, injection: Injection, now: int) -> int:
+        """Let faults begin and end; return the time by which the tick goes, in [ns]."""
+        changes = injection.advance(now)
+        now = injection.clock(now)
+        for change in changes:
+            if self._publish_change is not None:
+                message = self._publish_change(change)
+                if (recorder := self.recorder) is not None:
+                    recorder.offer(self._change_number, now, now, message)
+        return now
+
     def _tick(self, now: int, at: int) -> None:
         """Solve now for a time, both in [ns]; publish, record and count."""
         counts = self.counts
         counts.last = tick = self._pipeline.tick(at)
-        position, _, message, trajectory = tick
+        looks, message, extras = tick
+        recorder = self.recorder
         if message:
             self._publish(message)
-            if (recorder := self.recorder) is not None:
+            if recorder is not None:
                 recorder.offer(JOINT_STATES, now, at, message)
             counts.published += 1
-            if (publish_motion := self._publish_motion) is not None:
-                publish_motion(trajectory)
-                if recorder is not None:
-                    recorder.offer(MOTION, now, at, trajectory)
+            if extras:
+                for (number, publish), extra in zip(self._publish_extras, extras, strict=True):
+                    if extra:
+                        publish(extra)
+                        if recorder is not None:
+                            recorder.offer(number, now, at, extra)
         counts.ticks += 1
-        if position is None:
-            counts.silent += 1
-        elif position.status is not _CLOSED:
-            counts.unclosed[position.status] += 1
-            counts.last_unclosed = position
+        for number, (_, position, _, reading) in enumerate(looks):
+            if position is None:
+                counts.silent += 1
+            elif position[0] is not _CLOSED:
+                counts.unclosed[position[0]] += 1
+                counts.last_unclosed = number, position
+            if reading is None and position is not None and position[2]:
+                counts.withheld += 1
+                if recorder is not None and not message:
+                    recorder.offer(self._withheld_number, now, at, time_message(at))
 
     def _guarded(self, pace: Pace) -> None:
         # A defect here must neither vanish with its thread nor show a traceback.

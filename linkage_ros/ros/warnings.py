@@ -21,6 +21,7 @@ The gate is our own: a log line that rclpy's throttle suppresses costs 150 µs.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
 from time import monotonic
 
@@ -40,6 +41,9 @@ _REMEDIES = {
     Rejection.NO_RATE: 'fill velocity, or set carry_forward: false and leave out velocity',
     Rejection.NOT_FINITE: 'look at the sensor',
     Rejection.TOO_LARGE: 'the units are rad and m',
+    Rejection.NO_EFFORT: 'fill name and effort',
+    Rejection.EFFORT_NOT_FINITE: 'look at the controller',
+    Rejection.EFFORT_TOO_LARGE: 'the units are N·m and N',
     Rejection.STAMP_ZERO: 'stamp the messages',
     Rejection.STAMP_INVALID: 'stamp the messages with the time',
     Rejection.STAMP_FUTURE: 'synchronise the clocks, or raise max_lead',
@@ -65,7 +69,9 @@ class Warnings:
         self._unclosed = dict.fromkeys(Status, 0)
         self._lost = 0
 
-    def look(self, counts: Counts, closure: Closure, crank_topic: str, period: float) -> None:
+    def look(
+        self, counts: Counts, closures: Sequence[Closure], crank_topic: str, period: float
+    ) -> None:
         """
         Warn of what has happened since the last warning of its kind.
 
@@ -73,8 +79,8 @@ class Warnings:
         ----------
         counts
             The tick's.
-        closure
-            The linkage.
+        closures
+            The linkages.
         crank_topic
             Where samples come from.
         period
@@ -96,10 +102,11 @@ class Warnings:
         for status, text in _UNCLOSED.items():
             ticks = counts.unclosed[status] - self._unclosed[status]
             if ticks and counts.last_unclosed is not None:
+                number, position = counts.last_unclosed
                 line = text.format(
                     ticks=ticks,
-                    gap=counts.last_unclosed.gap,
-                    reachable=describe(closure.input_ranges),
+                    gap=position.gap,
+                    reachable=describe(closures[number].input_ranges),
                 )
                 if self.say(status.value, line, period):
                     self._unclosed[status] = counts.unclosed[status]

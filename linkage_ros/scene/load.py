@@ -17,27 +17,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from importlib import import_module
 from os.path import isfile
 from pathlib import Path
+from typing import Any
 
-from linkage_ros.drives.topic import TopicParameters
-from linkage_ros.errors import quoted
+from linkage_ros.drives.drive import DRIVES
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.faults.fault import Fault, FAULTS
+from linkage_ros.kinematics.checks import check
+from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.scene import RecordParameters, Scene
+from linkage_ros.scene.loads import read_loads
+from linkage_ros.scene.read import parts_of, read_parameters
+from linkage_ros.scene.scene import Member, RecordParameters, Scene
 from linkage_ros.scene.section import Section
 from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
-"""Names of the files of a scene where a bag carries them."""
+"""Names of the files of a scene where a bag carries them; further linkages are numbered."""
 
 LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
 """Ticks a second, in [Hz]: of these the higher is what a core was measured to hold."""
 
+Open = Callable[[Section], tuple[Section, bytes]]
+"""Opens the linkage file that a section names under ``linkage``."""
+
 
 def load_scene(file: str | Path) -> Scene:
     """
-    Read a scene and the linkage that it names.
+    Read a scene and the linkages that it names.
 
     Parameters
     ----------
@@ -51,16 +63,21 @@ def load_scene(file: str | Path) -> Scene:
 
     """
     content, scene_bytes = read_yaml(file)
-    linkage = Path(file).parent / content.text('linkage')
-    if not isfile(linkage):  # noqa: PTH113 (Path's raises where a name is too long)
-        raise content.error(
-            'linkage', f'{quoted(str(linkage))} is not a file', 'name one, relative to the scene'
-        )
-    linkage_content, linkage_bytes = read_yaml(linkage)
-    return _scene(Path(file).stem, content, linkage_content, scene_bytes, linkage_bytes)
+
+    def open_linkage(where: Section) -> tuple[Section, bytes]:
+        linkage = Path(file).parent / where.text('linkage')
+        if not isfile(linkage):  # noqa: PTH113 (Path's raises where a name is too long)
+            raise where.error(
+                'linkage',
+                f'{quoted(str(linkage))} is not a file',
+                'name one, relative to the scene',
+            )
+        return read_yaml(linkage)
+
+    return _scene(Path(file).stem, content, open_linkage, scene_bytes, str(Path(file).parent))
 
 
-def parse_scene(name: str, where: str, files: Mapping[str, bytes]) -> Scene:
+def parse_scene(name: str, where: str, files: Mapping[str, bytes], folder: str = '') -> Scene:
     """
     Read a scene out of the files that a bag carries.
 
@@ -70,7 +87,7 @@ def parse_scene(name: str, where: str, files: Mapping[str, bytes]) -> Scene:
         Name of the scene.
     where
         Where the files come from, for messages.
-    files
+    files, folder
         As in `Scene`.
 
     Raises
@@ -79,28 +96,162 @@ def parse_scene(name: str, where: str, files: Mapping[str, bytes]) -> Scene:
         As `load_scene`.
 
     """
-    content, linkage_content = (
-        parse_yaml(files[part], f'{where}: {part}') for part in (SCENE_FILE, LINKAGE_FILE)
-    )
-    content.text('linkage')
-    return _scene(name, content, linkage_content, files[SCENE_FILE], files[LINKAGE_FILE])
+    content = parse_yaml(files[SCENE_FILE], f'{where}: {SCENE_FILE}')
+    linkages = iter([part for part in files if part != SCENE_FILE])
+
+    def open_linkage(within: Section) -> tuple[Section, bytes]:
+        within.text('linkage')
+        part = next(linkages, None)
+        if part is None:
+            raise within.error('linkage', 'is not among the files', 'name another bag')
+        return parse_yaml(files[part], f'{where}: {part}'), files[part]
+
+    return _scene(name, content, open_linkage, files[SCENE_FILE], folder)
 
 
 def _scene(
-    name: str, content: Section, linkage: Section, scene_bytes: bytes, linkage_bytes: bytes
+    name: str, content: Section, open_linkage: Open, scene_bytes: bytes, folder: str
 ) -> Scene:
+    files = {SCENE_FILE: scene_bytes}
+    members: list[Member] = []
+    if 'linkages' in content:
+        if 'linkage' in content:
+            raise content.error('linkage', 'stands beside linkages', 'write one of the two')
+        for entry in content.sections('linkages'):
+            linkage_content, data = open_linkage(entry)
+            files[f'linkage_{len(files)}.yaml'] = data
+            own = entry.text('name')
+            if own in [member.name for member in members]:
+                raise entry.error('name', f'{quoted(own)} is taken', 'give each its own')
+            members.append(_member(own, linkage_content, entry, content, folder))
+            entry.finish(_OF_A_MEMBER)
+    else:
+        linkage_content, files[LINKAGE_FILE] = open_linkage(content)
+        members.append(_member('', linkage_content, content, content, folder))
     scene = Scene(
         name=name,
-        linkage=read_linkage(linkage),
+        members=tuple(members),
         rate=_rate(content),
         wrapped=content.choice('angles', ('continuous', 'wrapped'), 'continuous') == 'wrapped',
-        drive=_drive(content.section('drive', required=False)),
-        effects=content.section('effects', required=False),
+        seed=_whole(content, 'seed', 0, 0, 2**53),
+        faults=_faults(content, members),
         record=_record(content.section('record')) if 'record' in content else None,
-        files={SCENE_FILE: scene_bytes, LINKAGE_FILE: linkage_bytes},
+        files=files,
+        folder=folder,
     )
-    content.finish(('record',))
+    for key in _OF_A_MEMBER:
+        if key in content:
+            content.taken(key)
+    content.finish(('record', 'linkages', *_OF_A_MEMBER))
+    for member in members:
+        drive, _ = member.drive
+        if scene.rate == 0.0 and drive != 'topic':
+            raise content.error(
+                'rate',
+                f'0 is one tick for every crank sample, and {drive} has none',
+                'name a rate',
+            )
     return scene
+
+
+_OF_A_MEMBER = ('publish_input', 'drive', 'effects', 'loads')
+"""What an entry of ``linkages`` may say for itself, and the scene for all that do not."""
+
+
+def _member(
+    name: str, linkage_content: Section, own: Section, scene: Section, folder: str
+) -> Member:
+    linkage = read_linkage(linkage_content)
+
+    def where(key: str) -> Section:
+        return own if key in own else scene
+
+    drives = where('drive').section('drive', required=False)
+    named = list(drives) or ['topic']
+    if len(named) > 1:
+        raise drives.error(named[1], 'is a second drive', f'leave it, or {named[0]}, out')
+    drive = named[0]
+    if drive not in DRIVES:
+        drives.finish(tuple(DRIVES))
+    effects = where('effects').section('effects', required=False)
+    loads = where('loads').section('loads') if 'loads' in where('loads') else None
+
+    published = where('publish_input').flag(
+        'publish_input', drive != 'topic' or 'effort' in effects
+    )
+    if published:
+        linkage = _with_inputs(linkage, linkage_content)
+    elif 'effort' in effects:
+        raise effects.error(
+            'effort', 'is that of the input joint', 'set publish_input: true, or name pin_forces'
+        )
+    parts = parts_of(linkage)
+    types = {e: import_module(EFFECTS[e]).PARAMETERS for e in EFFECTS if e in effects}
+    member = Member(
+        name=name,
+        linkage=linkage,
+        drive=(
+            drive,
+            read_parameters(
+                drives.section(drive, required=False),
+                import_module(DRIVES[drive]).PARAMETERS,
+                parts,
+                folder,
+            ),
+        ),
+        effects={e: read_parameters(effects.section(e), of, parts) for e, of in types.items()},
+        loads=read_loads(loads) if loads is not None else None,
+        content=own,
+    )
+    effects.finish(tuple(EFFECTS))
+    return member
+
+
+def _with_inputs(linkage: Linkage, content: Section) -> Linkage:
+    """Return a linkage that publishes its input joints too, before the others."""
+    inputs: dict[str, RevoluteJoint | SlideJoint] = {
+        given.joint: SlideJoint(given.slider)
+        if given.slider
+        else RevoluteJoint(given.parent, given.child)
+        for given in linkage.inputs
+    }
+    changed = replace(linkage, joints=inputs | dict(linkage.joints))
+    try:
+        check(changed)
+    except DefinitionError as error:
+        raise content.error(error.where, error.reason, error.remedy) from None
+    return changed
+
+
+def _faults(content: Section, members: list[Member]) -> dict[str, Fault]:
+    section = content.section('faults', required=False)
+    parts: dict[str, tuple[str, ...]] = {}
+    for member in members:
+        for kind, names in parts_of(member.linkage).items():
+            parts[kind] = (*parts.get(kind, ()), *(member.prefix + name for name in names))
+    return {name: _fault(section.section(name), parts) for name in section}
+
+
+def _fault(content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
+    kinds = [key for key in content if key in FAULTS]
+    if len(kinds) != 1:
+        for key in content:
+            if key in (*_WHEN, *FAULTS):
+                content.taken(key)
+        content.finish((*_WHEN, *FAULTS))
+        raise content.error('', f'{len(kinds)} kinds', f'name one of {", ".join(FAULTS)}')
+    parameters: Any = read_parameters(
+        content.section(kinds[0]), import_module(FAULTS[kinds[0]]).PARAMETERS, parts
+    )
+    at = content.numbers('at', most=1e9) if 'at' in content else []
+    if any(time < 0.0 for time in at):
+        raise content.error('at', f'{at} begins before the first tick', 'write seconds from it on')
+    seconds = content.number('seconds', least=1e-6, most=1e9, unit='s') if at else 0.0
+    content.finish(_WHEN)
+    return Fault(kinds[0], parameters, tuple(at), seconds)
+
+
+_WHEN = ('at', 'seconds')
 
 
 def _rate(content: Section) -> float:
@@ -114,26 +265,18 @@ def _rate(content: Section) -> float:
     return rate
 
 
-def _drive(content: Section) -> TopicParameters:
-    topic = content.section('topic', required=False)
-    content.finish()
-    drive = TopicParameters(
-        carry_forward=topic.flag('carry_forward', True),
-        max_age=round(1e9 * topic.number('max_age', 0.2, least=1e-6, most=3600.0, unit='s')),
-        max_lead=round(1e9 * topic.number('max_lead', 0.1, least=0.0, most=3600.0, unit='s')),
-    )
-    topic.finish()
-    return drive
+def _whole(content: Section, key: str, default: int, least: int, most: int) -> int:
+    value = content.number(key, default, least=least, most=most)
+    if not value.is_integer():
+        raise content.error(key, f'{value:g} is not whole', 'write a whole number')
+    return int(value)
 
 
 def _record(content: Section) -> RecordParameters:
-    queue = content.number('queue', 20_000, least=100, most=10_000_000)
-    if not queue.is_integer():
-        raise content.error('queue', f'{queue:g} is no number of messages', 'write a whole number')
     record = RecordParameters(
         directory=content.text('directory', 'runs'),
         name=content.text('name', ''),
-        queue=int(queue),
+        queue=_whole(content, 'queue', 20_000, 100, 10_000_000),
     )
     if record.name != Path(record.name).name or record.name == '..':
         raise content.error(

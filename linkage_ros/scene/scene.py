@@ -18,9 +18,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
-from linkage_ros.drives.topic import TopicParameters
+from linkage_ros.dynamics.loads import Loads
+from linkage_ros.faults.fault import Fault
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.scene.section import Section
 
@@ -47,36 +49,90 @@ class RecordParameters:
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class Member:
     """
-    A linkage, its drive, its effects and its recording.
+    A linkage of a scene, with its drive and its effects.
 
     Attributes
     ----------
     name
-        The scene file's name without its ending.
+        Its name, which its joints have before their own with an underscore between; '' where the
+        scene has one linkage only.
     linkage
-        The linkage.
-    rate
-        Ticks a second, in [Hz]; 0 for one tick for every crank sample.
-    wrapped
-        Whether published angles are wrapped to (−π, π], or run on beyond a turn.
+        The linkage. Where its input joints are published, they are the first of its joints.
     drive
-        Where the crank comes from.
+        The drive's name, and its parameters.
     effects
-        What is called for beyond positions, as written: its modules read it when it is built.
-    record
-        How the run is recorded; absent for no bag.
-    files
-        The scene and linkage files as they stand, by a name for each.
+        Parameters of each effect that is called for, by its name, in physical order.
+    loads
+        What acts on it; nothing where the scene does not say.
+    content
+        Where all this stands, for messages.
 
     """
 
     name: str
     linkage: Linkage
+    drive: tuple[str, Any]
+    effects: Mapping[str, Any]
+    loads: Loads | None
+    content: Section = field(compare=False, repr=False)
+
+    @property
+    def prefix(self) -> str:
+        """What its joints' names have before their own."""
+        return f'{self.name}_' if self.name else ''
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The names under which its joints are published."""
+        return tuple(self.prefix + joint for joint in self.linkage.joints)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of its driven joints in messages."""
+        return tuple(self.prefix + given.joint for given in self.linkage.inputs)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """
+    Linkages, their drives and effects, what goes wrong with them, and a recording.
+
+    Attributes
+    ----------
+    name
+        The scene file's name without its ending.
+    members
+        The linkages; most scenes have one.
+    rate
+        Ticks a second, in [Hz]; 0 for one tick for every crank sample.
+    wrapped
+        Whether published angles are wrapped to (−π, π], or run on beyond a turn.
+    seed
+        From which everything random comes.
+    faults
+        What can be injected, by name.
+    record
+        How the run is recorded; absent for no bag.
+    files
+        The scene and linkage files as they stand, by a name for each.
+    folder
+        To which the paths in it are relative.
+
+    """
+
+    name: str
+    members: tuple[Member, ...]
     rate: float
     wrapped: bool
-    drive: TopicParameters
-    effects: Section
+    seed: int
+    faults: Mapping[str, Fault]
     record: RecordParameters | None
     files: Mapping[str, bytes]
+    folder: str = field(compare=False)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The names of all published joints, in their order."""
+        return tuple(joint for member in self.members for joint in member.joints)

@@ -180,12 +180,38 @@ class Section:
             )
         return [float(v) for v in value]
 
+    def rows(
+        self, key: str, columns: Sequence[str], *, most: float = inf
+    ) -> tuple[tuple[float, ...], ...]:
+        """Return a list of rows of finite numbers, of which none is beyond ±most."""
+        value = self._take(key, None, 'a list of rows of numbers')
+        row = f'[{", ".join(columns)}]'
+        if not isinstance(value, list) or not value:
+            raise self.error(key, f'{quoted(value)} is no list of rows', f'write [{row}, …]')
+        for number, found in enumerate(value, 1):
+            if (
+                not isinstance(found, list)
+                or len(found) != len(columns)
+                or any(
+                    isinstance(v, bool) or not isinstance(v, int | float) or not abs(v) <= most
+                    for v in found
+                )
+            ):
+                raise self.error(
+                    key, f'row {number}, {quoted(found)}, is not {row}', 'write finite numbers'
+                )
+        return tuple(tuple(map(float, found)) for found in value)
+
     def texts(self, key: str) -> list[str]:
         """Return a list of names; an empty one where the key is absent."""
         value = self._take(key, [], 'a list of names')
         if not isinstance(value, list) or any(not isinstance(v, str) or not v for v in value):
             raise self.error(key, f'{quoted(value)} is no list of names', 'write [one, other]')
         return list(value)
+
+    def taken(self, key: str) -> None:
+        """Take a key off that serves another section."""
+        self._taken.add(key)
 
     def finish(self, known: Sequence[str] = ()) -> None:
         """

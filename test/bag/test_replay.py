@@ -21,20 +21,20 @@ import json
 from math import tau
 from pathlib import Path
 
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.reader import read_bag, RUN_FILE
 from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.replay import recorded_scene, replay, RUN_FILE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import recorded_scene, replay
 import pytest
 
 SECOND = 1_000_000_000
 LINKAGE = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
 RUN = b'{"scene": "s", "crank_topic": "/crank", "joint_states_topic": "/joint_states"}'
-WITH_MOTION = RUN.replace(b'}', b', "motion_topic": "/motion"}')
+WITH_MOTION = RUN.replace(b'}', b', "extra_topics": ["/motion"]}')
 SHARED = RUN.replace(b'/crank', b'/joint_states')
 CRANK = JointStateWriter(['other', 'crank_joint'])
 
@@ -55,7 +55,9 @@ class Run:
     """A tick by hand: offers and ticks as the node's tick loop makes them, recorded."""
 
     def __init__(self, folder: Path, scene: str, run: bytes = RUN) -> None:
-        names = [name for key, name in json.loads(run).items() if key.endswith('_topic')]
+        said = json.loads(run)
+        names = [name for key, name in said.items() if key.endswith('_topic')]
+        names += said.get('extra_topics', [])
         topics = [Topic(name, 'sensor_msgs/msg/JointState', '', '') for name in names]
         self.recorder = Recorder(BagWriter(folder, topics, files(scene, run)))
         self.folder = folder
@@ -70,11 +72,11 @@ class Run:
         self.pipeline.offer(message, now)
 
     def tick(self, now: int, at: int, drop: str = '') -> None:
-        _, _, message, motion = self.pipeline.tick(at)
+        _, message, extras = self.pipeline.tick(at)
         if message and drop != 'joint state':
             self.recorder.offer(1, now, at, message)
             self.published.append(message)
-        if motion and drop != 'motion':
+        for motion in extras if drop != 'motion' else ():
             self.recorder.offer(2, now, at, motion)
             self.motions.append(motion)
 
@@ -149,8 +151,8 @@ def test_motions_replay_to_the_same_bytes_beside_their_joint_states(tmp_path: Pa
         run.pipeline = Pipeline(run.scene)
     assert run.replayed() == [(message, message) for message in run.published]
     again = list(replay(read_bag(run.folder), run.scene))
-    assert [each.recorded_motion for each in again] == run.motions
-    assert [each.tick.trajectory for each in again] == run.motions
+    assert [each.recorded_extras for each in again] == [(motion,) for motion in run.motions]
+    assert [each.tick.extras for each in again] == [(motion,) for motion in run.motions]
     assert len(run.motions) == 600
 
 
@@ -172,10 +174,11 @@ def test_what_the_recorder_had_to_drop_shifts_nothing(
     run.recorder.stop()
     again = list(replay(read_bag(run.folder), run.scene))
     assert [bool(each.recorded) for each in again] == [drop != 'joint state' for drop in drops]
-    assert [bool(each.recorded_motion) for each in again] == [drop != 'motion' for drop in drops]
+    motions = [each.recorded_extras != (b'',) for each in again]
+    assert motions == [drop != 'motion' for drop in drops]
     for each in again:
         assert each.recorded in (b'', each.tick.message)
-        assert each.recorded_motion in (b'', each.tick.trajectory)
+        assert each.recorded_extras in ((b'',), each.tick.extras)
 
 
 def test_crank_and_joint_states_on_one_topic_are_told_apart(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ import subprocess
 import sys
 
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.replay import recorded_scene
+from linkage_ros.replay import recorded_scene
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 import pytest
@@ -64,7 +64,7 @@ def test_a_run_is_remapped_recorded_and_drawn(
     )
     assert answer.returncode == 0, answer.stderr
     assert '/motor' in answer.stdout
-    proof = re.search(r'(\d+) of (\d+) joint states and (\d+) of (\d+) motions', answer.stdout)
+    proof = re.search(r'(\d+) of (\d+) joint states and (\d+) of (\d+) motion ', answer.stdout)
     assert len(set(proof.groups())) == 1
     assert int(proof.group(1)) > 100
     bag = read_bag(tmp_path / 'runs' / 'b 1')

@@ -26,7 +26,8 @@ from math import inf, nan
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.topic import CrankState, TopicDrive, TopicParameters
+from linkage_ros.drives.drive import CrankState
+from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.joint_state import CrankSample, Rejection
 import pytest
 
@@ -34,8 +35,8 @@ MS = 1_000_000
 SECOND = 1000 * MS
 NOW = 10 * SECOND
 
-CARRIED = TopicParameters(carry_forward=True, max_age=200 * MS, max_lead=100 * MS)
-HELD = TopicParameters(carry_forward=False, max_age=200 * MS, max_lead=100 * MS)
+CARRIED = TopicParameters(carry_forward=True, max_age=0.2, max_lead=0.1)
+HELD = TopicParameters(carry_forward=False, max_age=0.2, max_lead=0.1)
 
 SILENT = None
 GOOD = None

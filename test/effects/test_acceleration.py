@@ -21,12 +21,12 @@ from math import inf, isfinite, nan
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.topic import CrankState
+from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import acceleration, velocity
-from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS
-from linkage_ros.errors import FileError
+from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS, Reading
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
+from linkage_ros.parameters import declared
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
@@ -49,9 +49,10 @@ def moved(loop, angle, rate, alpha=0.0):
     """Return the motion that leaves velocity and acceleration."""
     position = loop.position(angle)
     crank = CrankState((angle,), (rate,), (alpha,), 0)
-    motion = Motion(crank, position, position.joints, (), (), None)
+    motion = Motion(crank, position, None, None, (), (), ())
+    context = Context(loop, 1000.0, True, 'seed', None, None)
     for effect in (velocity, acceleration):
-        motion = effect.build(effect.read(parse_yaml(b'{}', 'scene.yaml')), loop)(motion)
+        motion = effect.stage(effect.PARAMETERS(), context)(motion)
     return motion
 
 
@@ -61,40 +62,40 @@ def test_it_is_the_slope_of_the_rates(loop, angle, rate, alpha):
     # The crank's own motion: θ(t) = angle + rate·t + alpha·t²/2.
     step = 1e-5
     before, after = (
-        moved(loop, angle + rate * t + alpha * t * t / 2.0, rate + alpha * t).rates
+        moved(loop, angle + rate * t + alpha * t * t / 2.0, rate + alpha * t).velocity.joints
         for t in (-step, step)
     )
     slopes = [(a - b) / (2.0 * step) for a, b in zip(after, before, strict=True)]
     size = rate * rate + abs(alpha) + 1.0
-    found = moved(loop, angle, rate, alpha).accelerations
+    found = moved(loop, angle, rate, alpha).acceleration.joints
     assert list(found) == pytest.approx(slopes, abs=1e-6 * size)
 
 
 @given(st.floats(-10.0, 10.0))
 def test_a_crank_at_rest_has_joints_at_rest(angle):
-    assert all(value == 0.0 for value in moved(FOUR_BAR, angle, 0.0).accelerations)
+    assert all(value == 0.0 for value in moved(FOUR_BAR, angle, 0.0).acceleration.joints)
 
 
 @given(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
 def test_a_crank_at_a_constant_rate_still_has_it(angle, rate):
     # What the topic drive gives: the unknown acceleration of the crank is 0, not the joints'.
-    one, two = (moved(SLIDER, angle, r).accelerations for r in (rate, 2.0 * rate))
+    one, two = (moved(SLIDER, angle, r).acceleration.joints for r in (rate, 2.0 * rate))
     assert list(two) == pytest.approx([4.0 * value for value in one], rel=1e-12, abs=1e-300)
 
 
 def test_at_a_toggle_there_is_none():
     motion = moved(STRETCHED_AT_0, 0.0, 1.0)
     assert motion.position.status is Status.TOGGLE
-    assert len(motion.joints) == 2
-    assert motion.rates == motion.accelerations == ()
-    assert motion.velocity is None
+    assert len(motion.position.joints) == 2
+    assert motion.velocity is motion.acceleration is None
 
 
 @given(st.floats(-17.0, -1.0))
 def test_next_to_a_toggle_it_is_finite_or_none(exponent):
     angle = EVERY_OTHER.input_ranges[0].highest - 10.0**exponent
     if EVERY_OTHER.position(angle).joints:
-        assert all(map(isfinite, moved(EVERY_OTHER, angle, 1e10, 1e10).accelerations))
+        found = moved(EVERY_OTHER, angle, 1e10, 1e10).acceleration
+        assert found is None or all(map(isfinite, found.joints))
 
 
 @pytest.mark.parametrize('value', [inf, -inf, nan])
@@ -103,43 +104,43 @@ def test_what_is_no_number_is_left_out(value):
         def acceleration(self, *_):
             return FOUR_BAR.acceleration(POSITION, VELOCITY, 0.0)._replace(joints=(1.0, value))
 
-    stage = acceleration.build(acceleration.AccelerationParameters(), Overflowing())
-    motion = Motion(CRANK, POSITION, POSITION.joints, VELOCITY.joints, (), VELOCITY)
+    context = Context(Overflowing(), 1000.0, True, 'seed', None, None)
+    stage = acceleration.stage(acceleration.AccelerationParameters(), context)
+    motion = Motion(CRANK, POSITION, VELOCITY, None, (), (), ())
     assert stage(motion) == motion
 
 
 def test_the_rest_of_the_motion_is_passed_on():
     motion = moved(FOUR_BAR, 1.0, 2.0)
-    assert motion[:4] == (CRANK, POSITION, POSITION.joints, VELOCITY.joints)
-    assert motion.velocity == VELOCITY
+    assert motion[:3] == (CRANK, POSITION, VELOCITY)
 
 
 def test_the_message_is_the_motion_at_one_point():
-    motion = moved(FOUR_BAR, 1.0, 2.0)._replace(joints=(7.0, 8.0))  # as published: turns added
-    data = acceleration.writer(['coupler', 'rocker'])(3_000_000_004, motion)
+    motion = moved(FOUR_BAR, 1.0, 2.0)
+    rates, accelerations = motion.velocity.joints, motion.acceleration.joints
+    # Turns added, and whatever else sensors do: what is written is what is read.
+    reading = Reading(3_000_000_004, (7.0, 8.0), rates, accelerations, ())
+    context = Context(FOUR_BAR, 1000.0, True, 'seed', None, None, prefix='left_')
+    data = acceleration.writer(context)(motion, reading)
     message = STORE.deserialize_cdr(data, 'trajectory_msgs/msg/JointTrajectory')
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
-    assert message.joint_names == ['coupler', 'rocker']
+    assert message.joint_names == ['left_coupler_joint', 'left_rocker_joint']
     (point,) = message.points
     assert list(point.positions) == [7.0, 8.0]
-    assert tuple(point.velocities) == motion.rates
-    assert tuple(point.accelerations) == motion.accelerations
+    assert tuple(point.velocities) == rates
+    assert tuple(point.accelerations) == accelerations
     assert len(point.effort) == 0
     assert (point.time_from_start.sec, point.time_from_start.nanosec) == (0, 0)
 
 
 def test_it_has_no_parameters():
-    parameters = acceleration.read(parse_yaml(b'{}', 'scene.yaml'))
-    assert parameters == acceleration.AccelerationParameters()
-    with pytest.raises(FileError, match='gain: unknown key; leave it out'):
-        acceleration.read(parse_yaml(b'gain: 2', 'scene.yaml'))
+    assert declared(acceleration.PARAMETERS) == []
 
 
 def test_it_is_registered_behind_velocity_which_it_needs():
     assert EFFECTS['acceleration'] == acceleration.__name__
     assert list(EFFECTS).index('acceleration') > list(EFFECTS).index('velocity')
     assert NEEDS['acceleration'] == ('velocity',)
-    assert acceleration.NEEDS_CRANK_RATE
 
 
 CRANK = CrankState((1.0,), (2.0,), (0.0,), 0)

@@ -21,12 +21,12 @@ from math import isfinite, remainder, tau
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.drives.topic import CrankState
+from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import velocity
 from linkage_ros.effects.stage import EFFECTS, Motion
-from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
+from linkage_ros.parameters import declared
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
@@ -46,8 +46,9 @@ def moved(loop, angle, rate):
     """Return the motion that leaves the stage."""
     position = loop.position(angle)
     crank = CrankState((angle,), (rate,), (0.0,), 0)
-    motion = Motion(crank, position, position.joints, (), (), None)
-    return velocity.build(velocity.VelocityParameters(), loop)(motion)
+    motion = Motion(crank, position, None, None, (), (), ())
+    context = Context(loop, 1000.0, True, 'seed', None, None)
+    return velocity.stage(velocity.VelocityParameters(), context)(motion)
 
 
 @given(st.floats(-10.0, 10.0), st.floats(-100.0, 100.0))
@@ -61,19 +62,20 @@ def test_it_is_the_slope_of_the_position(loop, angle, rate):
         )
     ]
     expected = [slope * rate for slope in slopes]
-    assert list(moved(loop, angle, rate).rates) == pytest.approx(expected, abs=1e-6 * abs(rate))
+    assert list(moved(loop, angle, rate).velocity.joints) == pytest.approx(
+        expected, abs=1e-6 * abs(rate)
+    )
 
 
 @given(st.floats(-10.0, 10.0))
 def test_a_crank_at_rest_has_joints_at_rest(angle):
-    assert all(rate == 0.0 for rate in moved(FOUR_BAR, angle, 0.0).rates)
+    assert all(rate == 0.0 for rate in moved(FOUR_BAR, angle, 0.0).velocity.joints)
 
 
 def test_at_a_toggle_there_is_none():
     motion = moved(STRETCHED_AT_0, 0.0, 1.0)
     assert motion.position.status is Status.TOGGLE
-    assert len(motion.joints) == 2
-    assert motion.rates == ()
+    assert len(motion.position.joints) == 2
     assert motion.velocity is None
 
 
@@ -82,22 +84,20 @@ def test_next_to_a_toggle_rates_are_finite_or_none(exponent):
     limit = EVERY_OTHER.input_ranges[0].highest
     angle = limit - 10.0**exponent
     if EVERY_OTHER.position(angle).joints:
-        assert all(map(isfinite, moved(EVERY_OTHER, angle, 1e10).rates))
+        found = moved(EVERY_OTHER, angle, 1e10).velocity
+        assert found is None or all(map(isfinite, found.joints))
 
 
 def test_the_rest_of_the_motion_is_passed_on():
     position = FOUR_BAR.position(1.0)
     motion = moved(FOUR_BAR, 1.0, 2.0)
-    assert motion[:3] == (CrankState((1.0,), (2.0,), (0.0,), 0), position, position.joints)
+    assert motion[:2] == (CrankState((1.0,), (2.0,), (0.0,), 0), position)
     assert motion.velocity == FOUR_BAR.velocity(position, 2.0)
 
 
 def test_it_has_no_parameters():
-    assert velocity.read(parse_yaml(b'{}', 'scene.yaml')) == velocity.VelocityParameters()
-    with pytest.raises(FileError, match='gain: unknown key; leave it out'):
-        velocity.read(parse_yaml(b'gain: 2', 'scene.yaml'))
+    assert declared(velocity.PARAMETERS) == []
 
 
 def test_it_is_registered():
     assert EFFECTS['velocity'] == velocity.__name__
-    assert velocity.NEEDS_CRANK_RATE

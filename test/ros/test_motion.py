@@ -26,7 +26,7 @@ import time
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.replay import recorded_scene, replay
+from linkage_ros.replay import recorded_scene, replay
 import pytest
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
@@ -210,7 +210,7 @@ def test_the_bag_holds_it_and_replays_it(folder, write_scene, start, publisher, 
     again = list(replay(bag, recorded_scene(bag)))
     assert len(again) == len(bagged)
     assert all(each.recorded == each.tick.message for each in again)
-    assert all(each.recorded_motion == each.tick.trajectory for each in again)
+    assert all(each.recorded_extras == each.tick.extras for each in again)
 
 
 def topics(graph):

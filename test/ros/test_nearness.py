@@ -38,10 +38,11 @@ CYLINDER = Input('boom_cylinder', slider='bore')
 def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
     """Return the status of the loop closure of a linkage that is so near to trouble."""
     counts = Counts()
-    position = SimpleNamespace(status=None, gap=0.1)
-    motion = (SimpleNamespace(angles=(0.25,) * len(inputs)), position)
-    counts.last = SimpleNamespace(motion=_Motion(motion))
-    counts.last_unclosed = position
+    position = SimpleNamespace(status=None, gap=0.1, joints=(1.0,))
+    crank = SimpleNamespace(angles=(0.25,) * len(inputs))
+    look = (crank, position, None, None)
+    counts.last = SimpleNamespace(looks=(look,))
+    counts.last_unclosed = 0, position
     closure = SimpleNamespace(
         input_ranges=(),
         residual=lambda _: 0.0,
@@ -49,21 +50,20 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
             asked is position and SimpleNamespace(**dict(zip(LIMITS, nearness, strict=True)))
         ),
     )
+    member = SimpleNamespace(name='', linkage=SimpleNamespace(inputs=inputs))
+    pipeline = SimpleNamespace(
+        lines=[SimpleNamespace(member=member, closure=closure)], max_age=1, newest_stamp=0
+    )
+    loop = SimpleNamespace(
+        counts=counts, pipeline=pipeline, newest_stamp=0, recorder=None, injection=None
+    )
     health = Health(
-        'node', 'scene', inputs, 0.0, 0, 1, '/crank', (),
-        SimpleNamespace(counts=counts, closure=closure, newest_stamp=0, recorder=None),
+        'node', 'scene', 0.0, 0, '/crank', (),
+        loop,
         Snapshot(), Snapshot(unclosed=opened), '', limits,
     )  # fmt: skip
     _, _, found, _ = health.statuses()
     return found, {pair.key: pair.value for pair in found.values}
-
-
-class _Motion(tuple):
-    __slots__ = ()
-
-    @property
-    def crank(self):
-        return self[0]
 
 
 def test_the_values_are_told():

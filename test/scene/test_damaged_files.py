@@ -48,7 +48,7 @@ def either_runs_or_says_why(scene: bytes, linkage: bytes) -> None:
         assert is_one_line(refused), refused
         return
     for angle in (0.0, 1.0, -2.0, 1e9):
-        pipeline.closure.position(angle)
+        pipeline.closures[0].position(angle)
 
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])

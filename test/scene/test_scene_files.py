@@ -20,6 +20,7 @@ from __future__ import annotations
 from math import pi
 
 from linkage_ros.drives.topic import TopicParameters
+from linkage_ros.effects.velocity import VelocityParameters
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
@@ -35,7 +36,7 @@ ANGLES = [-7.0, -pi, -1.0, 0.0, 1e-9, 0.5, 2.0, 3.0, 100.0]
 def test_shipped_scene(file):
     scene = load_scene(file)
     assert scene.name == file.stem
-    closure = Pipeline(scene).closure
+    closure = Pipeline(scene).closures[0]
     assert all(closure.position(angle).joints for angle in ANGLES)
 
 
@@ -44,7 +45,7 @@ def test_shipped_scene(file):
 )
 def test_shipped_linkage(build, file):
     _, pipeline = build(SCENE, file.read_bytes())
-    closure = pipeline.closure
+    (closure,) = pipeline.closures
     if len(closure.linkage.inputs) == 1:
         for interval in closure.input_ranges:
             for i in range(1, 10):
@@ -58,10 +59,13 @@ def test_a_scene_that_says_nothing(build):
     scene, _ = build()
     assert scene.rate == 1000.0
     assert not scene.wrapped
-    assert scene.drive == TopicParameters(
-        carry_forward=True, max_age=200_000_000, max_lead=100_000_000
+    (member,) = scene.members
+    assert member.drive == (
+        'topic',
+        TopicParameters(carry_forward=True, max_age=0.2, max_lead=0.1),
     )
-    assert list(scene.effects) == []
+    assert member.effects == {}
+    assert (member.name, member.loads, scene.seed, scene.faults) == ('', None, 0, {})
     assert scene.record is None
     assert scene.files == {'scene.yaml': SCENE, 'linkage.yaml': FOUR_BAR}
 
@@ -79,8 +83,12 @@ record: {directory: bags, name: first, queue: 1000}
     )
     assert scene.rate == 0.0
     assert scene.wrapped
-    assert scene.drive == TopicParameters(carry_forward=False, max_age=500_000_000, max_lead=0)
-    assert list(scene.effects) == ['velocity']
+    (member,) = scene.members
+    assert member.drive == (
+        'topic',
+        TopicParameters(carry_forward=False, max_age=0.5, max_lead=0.0),
+    )
+    assert member.effects == {'velocity': VelocityParameters()}
     assert scene.record == RecordParameters(directory='bags', name='first', queue=1000)
 
 
@@ -105,7 +113,7 @@ def test_what_yaml_1_1_would_change_is_a_name(build, name):
     linkage = linkage.replace('rocker:', f'{name}:')
     linkage = linkage.replace('{parent: ground, child: rocker}', joint)
     scene, _ = build(SCENE, linkage.encode())
-    assert name in scene.linkage.links
+    assert name in scene.members[0].linkage.links
 
 
 @pytest.mark.parametrize(
@@ -119,7 +127,7 @@ def test_what_yaml_1_1_would_change_is_a_name(build, name):
     ids=['byte order mark', 'CRLF', 'document marks', 'flow style'],
 )
 def test_the_same_file_written_otherwise(build, rewrite):
-    assert build(rewrite(SCENE), rewrite(FOUR_BAR))[0].linkage == build()[0].linkage
+    assert build(rewrite(SCENE), rewrite(FOUR_BAR))[0].members == build()[0].members
 
 
 FOUR_BAR_WRITTEN_OUT = b"""
@@ -162,41 +170,46 @@ joints:
     ids=['four_bar', 'inverted_slider_crank'],
 )
 def test_a_shorthand_stands_for_the_file_written_out(build, shorthand, written_out, sides):
-    default = build(SCENE, shorthand)
+    default, _ = build(SCENE, shorthand)
     for side in sides:
-        short, short_pipeline = build(SCENE, shorthand.replace(b'}', b', assembly: %s}' % side))
-        full, full_pipeline = build(SCENE, written_out % side)
-        assert short.linkage.inputs == full.linkage.inputs
-        assert list(short.linkage.joints.items()) == list(full.linkage.joints.items())
-        assert short.linkage.assembly == full.linkage.assembly
+        short, loop = linkage_of(build(SCENE, shorthand.replace(b'}', b', assembly: %s}' % side)))
+        full, full_loop = linkage_of(build(SCENE, written_out % side))
+        assert short.inputs == full.inputs
+        assert list(short.joints.items()) == list(full.joints.items())
+        assert short.assembly == full.assembly
         for angle in ANGLES:
-            assert short_pipeline.closure.position(angle) == full_pipeline.closure.position(angle)
+            assert loop.position(angle) == full_loop.position(angle)
         if side == sides[0]:
-            assert default[0].linkage == short.linkage
+            assert default.members[0].linkage == short
+
+
+def linkage_of(built):
+    scene, pipeline = built
+    return scene.members[0].linkage, pipeline.closures[0]
 
 
 def test_joints_come_in_the_order_of_the_file(build):
     full = FOUR_BAR_WRITTEN_OUT % b'left'
     scene, pipeline = build(SCENE, full)
-    assert list(scene.linkage.joints) == ['coupler_joint', 'rocker_joint']
+    assert list(scene.members[0].linkage.joints) == ['coupler_joint', 'rocker_joint']
     lines = full.splitlines()
     swapped, other = build(SCENE, b'\n'.join([*lines[:-2], lines[-1], lines[-2]]))
-    assert list(swapped.linkage.joints) == ['rocker_joint', 'coupler_joint']
-    assert pipeline.closure.position(1.0).joints == other.closure.position(1.0).joints[::-1]
+    assert list(swapped.members[0].linkage.joints) == ['rocker_joint', 'coupler_joint']
+    one, two = (each.closures[0].position(1.0).joints for each in (pipeline, other))
+    assert one == two[::-1]
 
 
 def test_joints_turn_or_slide(build):
     scene, pipeline = build(SCENE, SLIDER_WRITTEN_OUT % b'ahead')
-    assert scene.linkage.joints == {
+    assert scene.members[0].linkage.joints == {
         'rod_joint': RevoluteJoint('crank', 'rod'),
         'rod_slide': SlideJoint('swivel'),
     }
-    assert pipeline.closure.turning == (True, False)
+    assert pipeline.closures[0].turning == (True, False)
 
 
 def test_a_bag_holds_enough_to_build_the_scene_again(build):
     scene, pipeline = build(SCENE + b'effects: {velocity: {}}')
     again = parse_scene(scene.name, 'a bag', scene.files)
-    assert again.linkage == scene.linkage
-    assert again.drive == scene.drive
-    assert Pipeline(again).closure.position(1.0) == pipeline.closure.position(1.0)
+    assert again == scene
+    assert Pipeline(again).closures[0].position(1.0) == pipeline.closures[0].position(1.0)

@@ -1,0 +1,55 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Broken link: the loop that it belongs to has no pose any more, so nothing is published.
+
+A mechanism with a link in two has one freedom more than it has inputs: where it goes, the crank
+does not say, and a pose would be invented.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.faults.fault import Switch
+from linkage_ros.kinematics.closure import Position
+from linkage_ros.kinematics.status import Status
+from linkage_ros.parameters import name
+
+
+@dataclass(frozen=True, slots=True)
+class BrokenLinkParameters:
+    """A link is in two: the linkage has no pose."""
+
+    link: str = name('which', 'link')
+
+
+PARAMETERS = BrokenLinkParameters
+
+
+def mechanism(
+    _parameters: BrokenLinkParameters, switch: Switch, _context: Context
+) -> Callable[[Position], Position]:
+    """Build what takes the pose away."""
+
+    def broken(position: Position) -> Position:
+        if not switch.on:
+            return position
+        return position._replace(status=Status.INDETERMINATE, gap=0.0, joints=())
+
+    return broken

@@ -1,0 +1,123 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+When faults are on: at the times that the scene sets, or when somebody asks.
+
+Time here is the true one: what a `time_jump` does to the clock does not change when it ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from linkage_ros.faults.fault import Fault, FAULTS, Switch
+
+
+class Change(NamedTuple):
+    """
+    That a fault has begun or ended.
+
+    Attributes
+    ----------
+    name
+        Of the fault, in the scene.
+    on
+        Whether it has begun.
+
+    """
+
+    name: str
+    on: bool
+
+
+class Injection:
+    """
+    The faults of a scene, each with its switch; it outlives a reset of the pipeline.
+
+    Parameters
+    ----------
+    faults
+        As the scene has them, by name.
+
+    """
+
+    def __init__(self, faults: Mapping[str, Fault]) -> None:
+        self.faults = faults
+        self.switches = {name: Switch() for name in faults}
+        self.injected = dict.fromkeys(faults, 0)
+        """How many times each has begun."""
+        self._begun: int | None = None
+        self._asked: list[Change] = []
+        windows = [
+            (round(at * 1e9), name, True) for name, fault in faults.items() for at in fault.at
+        ] + [
+            (round((at + fault.seconds) * 1e9), name, False)
+            for name, fault in faults.items()
+            for at in fault.at
+        ]
+        # An end before a beginning at the same instant: two windows that touch are two.
+        self._timeline = sorted(windows, key=lambda entry: (entry[0], entry[2]))
+        self._next = 0
+        self._clocks = [
+            import_module(FAULTS[fault.kind]).clock(fault.parameters, self.switches[name])
+            for name, fault in faults.items()
+            if fault.kind == 'time_jump'
+        ]
+
+    def ask(self, name: str, on: bool) -> None:
+        """Let a fault begin or end at the next tick; from any thread."""
+        self._asked.append(Change(name, on))
+
+    def advance(self, now: int) -> list[Change]:
+        """Set the switches for a time, in [ns]; return what has changed."""
+        if self._begun is None:
+            self._begun = now
+        due = []
+        timeline, since = self._timeline, now - self._begun
+        while self._next < len(timeline) and timeline[self._next][0] <= since:
+            _, name, on = timeline[self._next]
+            due.append(Change(name, on))
+            self._next += 1
+        while self._asked:
+            due.append(self._asked.pop(0))
+        return [change for change in due if self.set(*change)]
+
+    def set(self, name: str, on: bool) -> bool:
+        """Turn a fault on or off; return whether it was not so."""
+        switch = self.switches[name]
+        if switch.on == on:
+            return False
+        switch.on = on
+        self.injected[name] += on
+        return True
+
+    def clock(self, now: int) -> int:
+        """Return the time by which the tick goes, in [ns]."""
+        for clock in self._clocks:
+            now = clock(now)
+        return now
+
+    def build(self, function: str, *arguments: Any) -> list[Any]:
+        """Build what the faults do in one place of the pipeline: a function of their modules."""
+        built = []
+        for name, fault in self.faults.items():
+            module = import_module(FAULTS[fault.kind])
+            if hasattr(module, function):
+                build = getattr(module, function)
+                built.append(build(fault.parameters, self.switches[name], *arguments))
+        return built

@@ -1,0 +1,64 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Stuck: one joint's sensor stands still, the others go on.
+
+Its position is held where it was when the fault began, its rate and acceleration are read as 0.
+Where nothing was read before, nothing is published.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.faults.fault import Switch
+from linkage_ros.parameters import name
+from linkage_ros.tuples import new
+
+
+@dataclass(frozen=True, slots=True)
+class StuckParameters:
+    """The sensor of one joint stands still."""
+
+    joint: str = name('which', 'joint')
+
+
+PARAMETERS = StuckParameters
+
+
+def sensor(parameters: StuckParameters, switch: Switch, joints: Sequence[str]) -> Sensor:
+    """Build what holds the joint."""
+    held: float | None = None
+    place = joints.index(parameters.joint)
+    after = place + 1
+
+    def with_one(values: tuple[float, ...], value: float) -> tuple[float, ...]:
+        return (*values[:place], value, *values[after:]) if values else ()
+
+    def stuck(_now: int, reading: Reading) -> Reading | None:
+        nonlocal held
+        stamp, positions, rates, accelerations, efforts = reading
+        if not switch.on:
+            held = positions[place]
+            return reading
+        if held is None:
+            return None
+        read = with_one(positions, held), with_one(rates, 0.0), with_one(accelerations, 0.0)
+        return new(Reading, (stamp, *read, efforts))
+
+    return stuck

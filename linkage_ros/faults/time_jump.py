@@ -1,0 +1,49 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Time jump: the clock of the node steps, and steps back when the fault ends.
+
+Where it steps back, either when it begins or when it ends, the node builds its pipeline anew, as
+it does when the system's clock is set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from linkage_ros.faults.fault import Switch
+from linkage_ros.parameters import number
+
+
+@dataclass(frozen=True, slots=True)
+class TimeJumpParameters:
+    """The clock steps, and back when the fault ends."""
+
+    by: float = number('step; negative for back', unit='s', least=-1e6, most=1e6)
+
+
+PARAMETERS = TimeJumpParameters
+
+
+def clock(parameters: TimeJumpParameters, switch: Switch) -> Callable[[int], int]:
+    """Build the clock."""
+    step = round(parameters.by * 1e9)
+
+    def jumping(now: int) -> int:
+        return now + step if switch.on else now
+
+    return jumping

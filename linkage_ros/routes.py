@@ -1,0 +1,70 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Which of several receivers a message is for, by the joints that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Generic, TypeVar
+
+from linkage_ros.cdr import STAMP_END
+from linkage_ros.joint_state import head_of
+
+_MOST = 1000
+"""How many kinds of messages are remembered; a bound against one who sends ever new names."""
+
+Receiver = TypeVar('Receiver')
+
+
+class Routes(Generic[Receiver]):
+    """
+    Finds the receivers of messages; a message with the same names as one before is not parsed.
+
+    Parameters
+    ----------
+    wanted
+        For each receiver the joints of which it needs all.
+
+    """
+
+    __slots__ = ('_all', '_ends', '_found', '_wanted')
+
+    def __init__(self, wanted: Mapping[Receiver, Sequence[str]]) -> None:
+        self._all = tuple(wanted)
+        self._wanted = {to: {joint.encode() for joint in joints} for to, joints in wanted.items()}
+        self._ends: dict[int, list[int]] = {}
+        """For each length of a message where the names may end in it."""
+        self._found: dict[bytes, tuple[Receiver, ...]] = {}
+
+    def find(self, message: bytes) -> tuple[Receiver, ...]:
+        """Return the receivers of a JointState, serialized; of a malformed one all."""
+        for end in self._ends.get(len(message), ()):
+            known = self._found.get(message[STAMP_END:end])
+            if known is not None:
+                return known
+        head = head_of(message)
+        if head is None:
+            return self._all
+        names, end = head
+        found = tuple(to for to, joints in self._wanted.items() if joints <= names)
+        if len(self._found) >= _MOST:
+            self._ends.clear()
+            self._found.clear()
+        ends = self._ends.setdefault(len(message), [])
+        if end not in ends:
+            ends.append(end)
+        self._found[message[STAMP_END:end]] = found
+        return found

@@ -1,0 +1,199 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Faults, as timelines: what is published before, while and after, and when they begin and end.
+
+The crank turns at 1 rad/s from 0, so that the crank's joint is the time in seconds: a tick's
+position says of which instant it is.
+"""
+
+from __future__ import annotations
+
+from math import isnan
+
+from linkage_ros.errors import FileError
+from linkage_ros.faults.injection import Change, Injection
+from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
+from linkage_ros.kinematics.status import Status
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import parse_scene
+import pytest
+
+MS = 1_000_000
+BEGIN = 1_700_000_000_000_000_000
+LINKAGE = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
+TURNING = 'drive: {constant_rate: {rate: 1.0}}\neffects: {velocity: {}}\n'
+CRANK = JointStateReader(['crank_joint'])
+ROCKER = JointStateReader(['rocker_joint'])
+
+
+def scene(text):
+    files = {'scene.yaml': f'linkage: l.yaml\n{text}'.encode(), 'linkage.yaml': LINKAGE}
+    return parse_scene('test', 'test', files)
+
+
+def run(text, times, ask=None):
+    """
+    Tick at times, in [ms], as the tick loop does; return a message or nothing for each.
+
+    Parameters
+    ----------
+    ask
+        At which times somebody asks for what.
+
+    """
+    pipeline = Pipeline(scene(text))
+    injection = pipeline.injection
+    messages = []
+    for time in times:
+        for change in (ask or {}).get(time, ()):
+            injection.ask(*change)
+        injection.advance(BEGIN + time * MS)
+        now = injection.clock(BEGIN + time * MS)
+        messages.append(pipeline.tick(now).message)
+    return messages
+
+
+def angles(messages, reader=CRANK):
+    """Return the angle in each message, in [mrad]; nothing where there is no message."""
+    return [message and round(reader.read(message).angles[0] * 1e3, 6) for message in messages]
+
+
+def stamps(messages):
+    """Return the stamp in each message, in [ms] from the first tick; nothing for no message."""
+    return [message and (CRANK.read(message).stamp - BEGIN) // MS for message in messages]
+
+
+TIMES = [0, 10, 20, 30, 40, 50]
+NOTHING = b''
+
+
+def window(fault, at='[0.02]', seconds=0.02):
+    return f'{TURNING}faults: {{mine: {{{fault}, at: {at}, seconds: {seconds}}}}}'
+
+
+def test_silence():
+    assert angles(run(window('silence: {}'), TIMES)) == [0, 10, NOTHING, NOTHING, 40, 50]
+
+
+def test_freeze_repeats_the_last_reading_with_new_stamps():
+    messages = run(window('freeze: {}'), TIMES)
+    assert angles(messages) == [0, 10, 10, 10, 40, 50]
+    assert stamps(messages) == TIMES
+    assert [CRANK.read(message).rates for message in messages] == [(1.0,)] * 6
+
+
+def test_freeze_from_the_first_tick_on_has_nothing_to_repeat():
+    assert angles(run(window('freeze: {}', '[0]'), TIMES)) == [NOTHING, NOTHING, 20, 30, 40, 50]
+
+
+def test_a_stuck_joint_stands_still_and_the_others_go_on():
+    sound = run(f'{TURNING}faults: {{mine: {{silence: {{}}}}}}', TIMES)
+    messages = run(window('stuck: {joint: rocker_joint}'), TIMES)
+    assert angles(messages) == TIMES
+    true = angles(sound, ROCKER)
+    assert angles(messages, ROCKER) == [true[0], true[1], true[1], true[1], true[4], true[5]]
+    rates = [ROCKER.read(message).rates[0] for message in messages]
+    assert [rate == 0.0 for rate in rates] == [False, False, True, True, False, False]
+
+
+def test_a_broken_link_leaves_no_pose():
+    pipeline = Pipeline(scene(window('broken_link: {link: coupler}')))
+    looks = []
+    for time in TIMES:
+        pipeline.injection.advance(BEGIN + time * MS)
+        looks += pipeline.tick(BEGIN + time * MS).looks
+    assert [look.position.status for look in looks] == [
+        Status.CLOSED, Status.CLOSED, Status.INDETERMINATE, Status.INDETERMINATE,
+        Status.CLOSED, Status.CLOSED,
+    ]  # fmt: skip
+    assert [look.reading is None for look in looks] == [False, False, True, True, False, False]
+
+
+def test_not_a_number_is_refused_and_the_last_good_sample_carried_forward():
+    text = 'effects: {velocity: {}}\nfaults: {mine: {not_a_number: {}, at: [0.02], seconds: 0.02}}'
+    pipeline = Pipeline(scene(text))
+    writer = JointStateWriter(['crank_joint'])
+    refused, published = [], []
+    for time in TIMES:
+        now = BEGIN + time * MS
+        pipeline.injection.advance(now)
+        refused.append(pipeline.offer(writer.write(now, [2.0], [3.0]), now))
+        published.append(pipeline.tick(now).message)
+    why = Rejection.NOT_FINITE
+    assert refused == [None, None, why, why, None, None]
+    for message in published:
+        assert not any(map(isnan, ROCKER.read(message).angles))
+    crank = [look.crank.angles[0] for look in pipeline.tick(BEGIN + 60 * MS).looks]
+    assert crank == [pytest.approx(2.03)]
+
+
+def test_the_clock_jumps_and_jumps_back():
+    messages = run(window('time_jump: {by: 5.0}'), TIMES)
+    assert stamps(messages) == [0, 10, 5020, 5030, 40, 50]
+
+
+def test_faults_begin_and_end_at_the_first_tick_that_is_not_before_their_time():
+    injection = Injection(scene(window('silence: {}', '[0.0151, 0.04]', 0.01)).faults)
+    changes = {t: injection.advance(BEGIN + t * MS) for t in (0, 15, 16, 25, 26, 39, 40, 49, 50)}
+    on, off = [Change('mine', True)], [Change('mine', False)]
+    assert changes == {0: [], 15: [], 16: on, 25: [], 26: off, 39: [], 40: on, 49: [], 50: off}
+    assert injection.injected == {'mine': 2}
+
+
+def test_windows_that_touch_are_two():
+    injection = Injection(scene(window('silence: {}', '[0.01, 0.02]', 0.01)).faults)
+    assert injection.advance(BEGIN) == []
+    assert injection.advance(BEGIN + 10 * MS) == [Change('mine', True)]
+    both = [Change('mine', False), Change('mine', True)]
+    assert injection.advance(BEGIN + 20 * MS) == both
+    assert injection.injected == {'mine': 2}
+
+
+def test_somebody_asks():
+    text = f'{TURNING}faults: {{mine: {{silence: {{}}}}}}'
+    ask = {20: [('mine', True)], 30: [('mine', True)], 40: [('mine', False)]}
+    assert angles(run(text, TIMES, ask)) == [0, 10, NOTHING, NOTHING, 40, 50]
+
+
+def test_several_faults_at_once():
+    quiet = 'quiet: {silence: {}, at: [0.03], seconds: 0.01}'
+    late = 'late: {time_jump: {by: 1}, at: [0.01], seconds: 0.03}'
+    messages = run(f'{TURNING}faults: {{{quiet}, {late}}}', TIMES)
+    assert stamps(messages) == [0, 1010, 1020, NOTHING, 40, 50]
+
+
+@pytest.mark.parametrize(
+    ('faults', 'expected'),
+    [
+        ('{mine: {silense: {}}}', "faults.mine.silense: unknown key; did you mean 'silence'?"),
+        ('{mine: {}}', 'faults.mine: 0 kinds; name one of'),
+        ('{mine: {silence: {}, freeze: {}}}', 'faults.mine: 2 kinds; name one of'),
+        ('{mine: {stuck: {joint: rokker_joint}}}', "did you mean 'rocker_joint'?"),
+        ('{mine: {stuck: {}}}', "faults.mine.stuck: the key 'joint' is missing"),
+        ('{mine: {broken_link: {link: ground}}}', "there is no link 'ground'"),
+        ('{mine: {silence: {}, at: [-1], seconds: 1}}', 'begins before the first tick'),
+        ('{mine: {silence: {}, at: [1]}}', "the key 'seconds' is missing"),
+        ('{mine: {silence: {}, at: [1], seconds: 0}}', 'out of bounds'),
+        ('{mine: {time_jump: {by: 1e9}}}', 'out of bounds'),
+        ('{mine: {not_a_number: {}}}', 'not_a_number spoils messages, and constant_rate has none'),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_injected_is_refused_in_a_line(faults, expected):
+    with pytest.raises(FileError) as caught:
+        Pipeline(scene(f'{TURNING}faults: {faults}'))
+    assert expected in str(caught.value)
+    assert '\n' not in str(caught.value)

@@ -1,0 +1,212 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A scene of several linkages: each as it would be alone, and one joint state for all."""
+
+from __future__ import annotations
+
+from linkage_ros.errors import FileError
+from linkage_ros.joint_state import JointStateWriter, Rejection
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene, parse_scene
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+MS = 1_000_000
+BEGIN = 1_700_000_000_000_000_000
+FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
+HALF_OPEN = 'four_bar: {a: 1, b: 1, c: 1, d: 2.5}'  # reaches a part of the turn only
+TWO = """
+linkages:
+  - {name: left, linkage: four_bar.yaml}
+  - {name: right, linkage: half_open.yaml}
+effects: {velocity: {}}
+"""
+LEFT = ['left_coupler_joint', 'left_rocker_joint']
+RIGHT = ['right_coupler_joint', 'right_rocker_joint']
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Return a function that writes a scene and loads it."""
+    (tmp_path / 'four_bar.yaml').write_text(FOUR_BAR)
+    (tmp_path / 'half_open.yaml').write_text(HALF_OPEN)
+
+    def load(text):
+        (tmp_path / 'scene.yaml').write_text(text)
+        return load_scene(tmp_path / 'scene.yaml')
+
+    return load
+
+
+def alone(linkage, text='effects: {velocity: {}}'):
+    files = {'scene.yaml': f'linkage: l\n{text}'.encode(), 'linkage.yaml': linkage.encode()}
+    return Pipeline(parse_scene('alone', 'here', files))
+
+
+def read(message):
+    return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+
+
+def crank(now, **angles):
+    names = list(angles)
+    return JointStateWriter(names).write(now, list(angles.values()), [1.0] * len(names))
+
+
+def test_each_is_as_it_would_be_alone(load):
+    both = Pipeline(load(TWO))
+    left, right = alone(FOUR_BAR), alone(HALF_OPEN)
+    for number in range(200):
+        now = BEGIN + number * MS
+        one, two = 0.03 * number, 0.001 * number
+        assert both.offer(crank(now, right_crank_joint=two, left_crank_joint=one), now) is None
+        assert left.offer(crank(now, crank_joint=one), now) is None
+        assert right.offer(crank(now, crank_joint=two), now) is None
+        state = read(both.tick(now).message)
+        parts = [read(each.tick(now).message) for each in (left, right)]
+        assert state.name == LEFT + RIGHT
+        for field in ('position', 'velocity'):
+            assert list(getattr(state, field)) == [v for p in parts for v in getattr(p, field)]
+
+
+def test_who_has_no_crank_is_left_out(load):
+    both = Pipeline(load(TWO))
+    assert both.tick(BEGIN).message == b''
+    # Each crank may come in a message of its own.
+    assert both.offer(crank(BEGIN, right_crank_joint=0.1), BEGIN) is None
+    assert read(both.tick(BEGIN).message).name == RIGHT
+    assert both.offer(crank(BEGIN, left_crank_joint=0.1), BEGIN) is None
+    assert read(both.tick(BEGIN).message).name == LEFT + RIGHT
+    # The right one falls silent after max_age, the left one goes on.
+    now = BEGIN + 250 * MS
+    assert both.offer(crank(now, left_crank_joint=0.1), now) is None
+    assert read(both.tick(now).message).name == LEFT
+
+
+def test_who_does_not_close_is_left_out(load):
+    both = Pipeline(load(TWO))
+    both.offer(crank(BEGIN, left_crank_joint=0.1, right_crank_joint=3.0), BEGIN)
+    tick = both.tick(BEGIN)
+    assert read(tick.message).name == LEFT
+    assert [look.reading is None for look in tick.looks] == [False, True]
+
+
+def test_a_message_for_nobody_is_refused(load):
+    both = Pipeline(load(TWO))
+    for _ in range(2):  # the second time from memory
+        message = crank(BEGIN, middle_crank_joint=0.1)
+        assert both.offer(message, BEGIN) is Rejection.MISSING
+    assert both.offer(b'rubbish', BEGIN) is Rejection.MALFORMED
+
+
+def test_ever_new_names_do_not_fill_the_memory(load):
+    both = Pipeline(load(TWO))
+    for number in range(3000):
+        both.offer(crank(BEGIN, **{f'joint_{number}': 0.1}), BEGIN)
+    assert len(both._routes._found) <= 1000
+    assert both.offer(crank(BEGIN, left_crank_joint=0.1), BEGIN) is None
+
+
+def test_each_may_have_its_own_drive_and_effects(load):
+    text = """
+linkages:
+  - name: left
+    linkage: four_bar.yaml
+    drive: {constant_rate: {rate: 1.0}}
+    effects: {acceleration: {}}
+  - {name: right, linkage: half_open.yaml, publish_input: false}
+drive: {constant_rate: {rate: 2.0}}
+"""
+    both = Pipeline(load(text))
+    both.tick(BEGIN)
+    tick = both.tick(BEGIN + 100 * MS)
+    state = read(tick.message)
+    assert state.name == ['left_crank_joint', *LEFT, *RIGHT]
+    assert state.position[0] == pytest.approx(0.1, rel=1e-15)
+    # One has rates and the other does not: an array for some joints is none of JointState's.
+    assert len(state.velocity) == 0
+    assert [extra.topic for extra in both.extras] == ['~/left/motion']
+    motion = STORE.deserialize_cdr(tick.extras[0], 'trajectory_msgs/msg/JointTrajectory')
+    assert motion.joint_names == ['left_crank_joint', *LEFT]
+    assert tick.looks[1].crank.angles == (pytest.approx(0.2, rel=1e-15),)
+
+
+def test_random_effects_differ_from_linkage_to_linkage(load):
+    text = """
+linkages:
+  - {name: left, linkage: four_bar.yaml}
+  - {name: right, linkage: four_bar.yaml}
+drive: {constant_rate: {rate: 1.0}}
+effects: {noise: {joints: {rocker_joint: {white: 1.0e-3}}}}
+"""
+    both = Pipeline(load(text))
+    state = read(both.tick(BEGIN).message)
+    left, right = (state.position[state.name.index(f'{side}_rocker_joint')] for side in LR)
+    assert left != right
+    assert left == pytest.approx(right, abs=1e-2)
+
+
+LR = ('left', 'right')
+
+
+def test_a_bag_holds_enough_to_build_it_again(load):
+    scene = load(TWO)
+    assert list(scene.files) == ['scene.yaml', 'linkage_1.yaml', 'linkage_2.yaml']
+    again = parse_scene(scene.name, 'a bag', scene.files)
+    assert again == scene
+
+
+def test_a_hundred_of_them(load):
+    entries = '\n'.join(f'  - {{name: bar_{i}, linkage: four_bar.yaml}}' for i in range(100))
+    scene = Pipeline(load(f'linkages:\n{entries}'))
+    cranks = {f'bar_{i}_crank_joint': 0.01 * i for i in range(100)}
+    assert scene.offer(crank(BEGIN, **cranks), BEGIN) is None
+    state = read(scene.tick(BEGIN).message)
+    assert len(state.name) == len(state.position) == 200
+    one = alone(FOUR_BAR)
+    for i in (0, 17, 99):
+        one.offer(crank(BEGIN, crank_joint=0.01 * i), BEGIN)
+        found = [state.position[2 * i], state.position[2 * i + 1]]
+        assert found == list(read(one.tick(BEGIN).message).position)
+
+
+@pytest.mark.parametrize(
+    ('text', 'expected'),
+    [
+        ('linkages: []', 'linkages: the list is empty'),
+        ('linkages: [{linkage: four_bar.yaml}]', "the key 'name' is missing"),
+        ('linkages: [{name: a}]', "the key 'linkage' is missing"),
+        ('linkages: [{name: a, linkage: none.yaml}]', 'is not a file'),
+        (
+            'linkages: [{name: a, linkage: four_bar.yaml}, {name: a, linkage: four_bar.yaml}]',
+            "'a' is taken; give each its own",
+        ),
+        (
+            'linkage: four_bar.yaml\nlinkages: [{name: a, linkage: four_bar.yaml}]',
+            'linkage: stands beside linkages; write one of the two',
+        ),
+        ('linkages: [{name: a, linkage: four_bar.yaml, rate: 5}]', 'rate: unknown key'),
+        (
+            'linkages: [{name: a, linkage: four_bar.yaml, effects: {velosity: {}}}]',
+            "did you mean 'velocity'?",
+        ),
+    ],
+)
+def test_what_is_wrong_is_said_in_a_line(load, text, expected):
+    with pytest.raises(FileError) as caught:
+        load(text)
+    assert expected in str(caught.value)
+    assert '\n' not in str(caught.value)
