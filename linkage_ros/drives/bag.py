@@ -1,0 +1,190 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A crank that was recorded: the samples of a bag, at their times or one for every tick.
+
+What the `topic` drive would refuse of them is skipped, and counted: messages without the input
+joints, numbers that are not finite, stamps that go back. Only how far a stamp was ahead of the
+clock does not matter, since the first sample counts as taken at the first tick.
+
+A bag is read when the drive is built, so again at every reset.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.drives.bag_samples import read_samples, Samples
+from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.drives.topic import TopicDrive, TopicParameters
+from linkage_ros.errors import DefinitionError
+from linkage_ros.joint_state import CrankSample
+from linkage_ros.parameters import choice, file, flag, number, text
+from linkage_ros.tuples import new
+
+
+@dataclass(frozen=True, slots=True)
+class BagParameters:
+    """The crank samples of a recorded bag, from the first tick on."""
+
+    file: str = file("the bag's folder, or its MCAP file")
+    topic: str = text('topic of the samples; absent, that which holds the input joints', '')
+    pace: str = choice(
+        'recorded: samples follow each other as recorded; fast: one for every tick, as it is',
+        ('recorded', 'fast'),
+        'recorded',
+    )
+    carry_forward: bool = flag(
+        "at the recorded pace, carry the crank to the tick's time by its rate; else hold it", True
+    )
+    max_age: float = number(
+        'at the recorded pace, age of the newest sample beyond which there is no crank',
+        0.2,
+        unit='s',
+        least=1e-6,
+        most=3600.0,
+    )
+    repeat: bool = flag(
+        'after the last sample begin again, a mean interval later; else there is no crank', False
+    )
+    allow_truncated: bool = flag('take a bag whose recording was killed, as far as it goes', False)
+
+
+PARAMETERS = BagParameters
+
+
+def build(parameters: BagParameters, context: Context) -> RecordedPace | FastPace:
+    """
+    Read the bag and build the drive.
+
+    Raises
+    ------
+    BagError
+        Where it cannot be read, or no topic of it, or more than one, holds the input joints.
+    DefinitionError
+        Where it is to repeat and its samples take no time.
+
+    """
+    recorded = parameters.pace == 'recorded'
+    use = TopicParameters(
+        carry_forward=parameters.carry_forward and recorded, max_age=parameters.max_age
+    )
+    bag = read_bag(parameters.file, allow_truncated=parameters.allow_truncated)
+    samples = read_samples(
+        bag, parameters.topic, context.inputs_in_messages, use, context.needs_rate
+    )
+    if recorded:
+        return RecordedPace(samples, use, repeat=parameters.repeat)
+    return FastPace(samples, repeat=parameters.repeat)
+
+
+class RecordedPace:
+    """
+    The samples at their times: each comes as long after the first tick as after the first sample.
+
+    Between and after them it is the `topic` drive that makes the crank.
+
+    Parameters
+    ----------
+    samples
+        The samples.
+    use
+        How they are used.
+    repeat
+        Whether they begin again.
+
+    Raises
+    ------
+    DefinitionError
+        Where they are to begin again and take no time.
+
+    """
+
+    __slots__ = ('_newest', '_period', '_start', '_topic', 'max_age', 'samples')
+
+    max_age: int
+    """Age of the newest sample beyond which there is no crank, in [ns]."""
+
+    def __init__(self, samples: Samples, use: TopicParameters, *, repeat: bool) -> None:
+        self.samples = samples
+        self._topic = TopicDrive(use, needs_rate=False)
+        self.max_age = self._topic.max_age
+        self._start: int | None = None
+        self._newest = (-1, -1)
+        length, intervals = samples.offsets[-1], len(samples) - 1
+        if repeat and not length:
+            raise DefinitionError(
+                'drive.bag.repeat', 'the samples are of one instant', 'leave repeat out'
+            )
+        self._period = length + length // intervals if repeat else 0
+
+    @property
+    def stamp(self) -> int:
+        """Time at which the newest sample counts as taken, in [ns]; 0 before the first tick."""
+        return 0 if self._start is None else self._start + self._topic.stamp - 1
+
+    def state(self, now: int) -> CrankState | None:
+        """Return the crank at a time, in [ns]; nothing where the newest sample is too old."""
+        if self._start is None:
+            self._start = now
+        elapsed = time = now - self._start
+        rounds = 0
+        if self._period:
+            rounds, time = divmod(elapsed, self._period)
+        number = bisect_right(self.samples.offsets, time) - 1
+        # The inner drive's time begins at 1 ns, since a stamp of 0 would be none.
+        if self._newest != (rounds, number):
+            self._newest = (rounds, number)
+            stamp = elapsed - time + self.samples.offsets[number] + 1
+            self._topic.offer(new(CrankSample, (stamp, *self.samples[number])), elapsed + 1)
+        return self._topic.state(elapsed + 1)
+
+
+class FastPace:
+    """
+    The samples one by one: at each tick the next, as it was measured, whatever the time.
+
+    Parameters
+    ----------
+    samples
+        The samples.
+    repeat
+        Whether they begin again after the last.
+
+    """
+
+    __slots__ = ('_next', '_repeat', 'samples')
+
+    stamp = 0
+    max_age = 0
+
+    def __init__(self, samples: Samples, *, repeat: bool) -> None:
+        self.samples = samples
+        self._repeat = repeat
+        self._next = 0
+
+    def state(self, _now: int) -> CrankState | None:
+        """Return the next sample; nothing after the last."""
+        number = self._next
+        if number == len(self.samples):
+            if not self._repeat:
+                return None
+            number = 0
+        self._next = number + 1
+        angles, rates = self.samples[number]
+        return new(CrankState, (angles, rates, (0.0,) * len(angles), 0))

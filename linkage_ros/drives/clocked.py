@@ -1,0 +1,134 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What the drives that make the crank up have in common: a curve for each input, and one clock.
+
+A time is the whole number of nanoseconds since the tick that first asked. A curve takes it as that
+integer, so that nothing is lost of it before it is multiplied by a rate or a frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TypeVar
+
+from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.errors import DefinitionError
+from linkage_ros.tuples import new
+
+LARGEST = 1e10
+"""No value or rate of a machine's input is beyond this, in [rad], [m], [rad/s] or [m/s]."""
+
+Curve = Callable[[int], tuple[float, float, float]]
+"""
+Value, rate and acceleration of an input at a time since the first tick, in [ns].
+
+In [rad], [rad/s] and [rad/s²]; of an input that slides in [m], [m/s] and [m/s²]. Each is the
+derivative by time of the one before it.
+"""
+
+P = TypeVar('P')
+
+
+class ClockedDrive:
+    """
+    Inputs that follow curves, from the first tick on.
+
+    Parameters
+    ----------
+    curves
+        One for each input, in the order of the linkage.
+
+    """
+
+    __slots__ = ('_curve', '_curves', '_start')
+
+    stamp = 0
+    max_age = 0
+
+    def __init__(self, curves: tuple[Curve, ...]) -> None:
+        self._curves = curves
+        self._curve = curves[0] if len(curves) == 1 else None
+        self._start: int | None = None
+
+    def state(self, now: int) -> CrankState:
+        """Return the crank at a time, in [ns]; the first that is asked for is the curves' zero."""
+        if self._start is None:
+            self._start = now
+        if self._curve is not None:  # zip over one takes twice as long, in every tick
+            value, rate, acceleration = self._curve(now - self._start)
+            return new(CrankState, ((value,), (rate,), (acceleration,), 0))
+        elapsed = now - self._start
+        values, rates, accelerations = zip(*[c(elapsed) for c in self._curves], strict=True)
+        return new(CrankState, (values, rates, accelerations, 0))
+
+
+def build_clocked(
+    where: str,
+    common: P,
+    inputs: Mapping[str, P],
+    context: Context,
+    curve: Callable[[P, str], Curve],
+) -> ClockedDrive:
+    """
+    Build a drive of curves.
+
+    Parameters
+    ----------
+    where
+        Key of the drive, for messages.
+    common
+        What an input follows that has nothing of its own.
+    inputs
+        What single inputs follow, by their names.
+    context
+        What it is built for.
+    curve
+        Makes a curve of parameters, given their key for messages.
+
+    Raises
+    ------
+    DefinitionError
+        Where every input has something of its own, so that ``common`` would mean nothing.
+
+    """
+    names = [given.joint for given in context.closure.linkage.inputs]
+    if inputs and len(inputs) == len(names):
+        raise DefinitionError(
+            f'{where}.inputs',
+            f'names every input ({", ".join(names)}), so that what stands beside it has no part',
+            f'leave one of them out: it follows what stands beside {where}.inputs',
+        )
+    return ClockedDrive(
+        tuple(
+            curve(inputs[name], f'{where}.inputs.{name}')
+            if name in inputs
+            else curve(common, where)
+            for name in names
+        )
+    )
+
+
+def as_integers(*numbers: float) -> tuple[list[int], int]:
+    """
+    Return doubles as integers over one denominator, exactly: each is an integer over a power of 2.
+
+    Python divides integers of any length to the nearest double. A formula of products and sums
+    that is worked out in such integers, with the time as another, is therefore rounded once.
+    """
+    ratios = [number.as_integer_ratio() for number in numbers]
+    denominator = max(below for _, below in ratios)
+    return [above * (denominator // below) for above, below in ratios], denominator

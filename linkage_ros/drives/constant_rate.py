@@ -1,0 +1,72 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A crank at a constant rate: θ = θ₀ + ω·t.
+
+The sum is worked out in integers and rounded once, so that the angle is the double nearest to the
+exact one, after any time. Where an input leaves the range that the linkage can reach, it goes on:
+the loop is open from there, and said to be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from linkage_ros.drives.clocked import as_integers, build_clocked, ClockedDrive, Curve, LARGEST
+from linkage_ros.drives.drive import Context
+from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.parameters import each, number
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantRate:
+    """A constant rate of one input."""
+
+    rate: float = number('rate', unit='rad/s or m/s', least=-LARGEST, most=LARGEST)
+    start: float = number(
+        'value at the first tick', 0.0, unit='rad or m', least=-LARGEST, most=LARGEST
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantRateParameters(ConstantRate):
+    """A constant rate of the inputs, from the first tick on."""
+
+    inputs: Mapping[str, ConstantRate] = each(
+        'inputs that have a rate and a start of their own', 'input', ConstantRate
+    )
+
+
+PARAMETERS = ConstantRateParameters
+
+
+def build(parameters: ConstantRateParameters, context: Context) -> ClockedDrive:
+    """Build the drive."""
+    return build_clocked('drive.constant_rate', parameters, parameters.inputs, context, curve)
+
+
+def curve(parameters: ConstantRate, _where: str = '') -> Curve:
+    """Return value, rate and acceleration as a function of time, in [ns]."""
+    (start, per_second), below = as_integers(parameters.start, parameters.rate)
+    start *= NANOSECONDS
+    below *= NANOSECONDS
+    rate = parameters.rate
+
+    def constant_rate(time: int) -> tuple[float, float, float]:
+        return (start + per_second * time) / below, rate, 0.0
+
+    return constant_rate

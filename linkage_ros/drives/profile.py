@@ -1,0 +1,186 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A crank that follows a table of times and values.
+
+Between two rows the value is a polynomial of x, the part of the time between them that has passed:
+
+- ``linear``: a straight line. The rate jumps at each row, and the acceleration is 0.
+- ``cubic``: the cubic spline through all rows, with a continuous acceleration (de Boor, "A
+  Practical Guide to Splines", 1978, chapter IV). It is at rest in the first row and in the last;
+  with ``repeat`` it is periodic instead, and runs through them as through the others.
+- ``minimum_jerk``: at rest in every row, and from row to row by 10x³ − 15x⁴ + 6x⁵, of all such
+  ways that with the least jerk (Flash and Hogan, J. Neurosci. 5 (1985) 1688). Two rows of one
+  value are a dwell.
+
+Before the first row the input rests there, and after the last. With ``repeat`` the last row is the
+first once more: what the table gained from its first value to its last is kept, so that a table
+from 0 to 2π turns on and on, and one that comes back repeats exactly.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from linkage_ros.drives.clocked import build_clocked, ClockedDrive, Curve, LARGEST
+from linkage_ros.drives.drive import Context
+from linkage_ros.errors import DefinitionError
+from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.parameters import choice, each, flag, rows
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """A table of one input."""
+
+    table: tuple[tuple[float, float], ...] = rows(
+        'when it is where, counted from the first tick',
+        ('time [s]', 'value [rad or m]'),
+        most=LARGEST,
+    )
+    interpolation: str = choice(
+        'what leads from row to row', ('linear', 'cubic', 'minimum_jerk'), 'cubic'
+    )
+    repeat: bool = flag('go on with the first row after the last; else rest there', False)
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileParameters(Profile):
+    """A table of times and values that the inputs follow, from the first tick on."""
+
+    inputs: Mapping[str, Profile] = each('inputs that have a table of their own', 'input', Profile)
+
+
+PARAMETERS = ProfileParameters
+
+
+def build(parameters: ProfileParameters, context: Context) -> ClockedDrive:
+    """
+    Build the drive.
+
+    Raises
+    ------
+    DefinitionError
+        Where a table has less than two rows, or times that do not increase.
+
+    """
+    return build_clocked('drive.profile', parameters, parameters.inputs, context, curve)
+
+
+def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
+    """Return value, rate and acceleration as a function of time, in [ns]."""
+    times = _times(parameters.table, f'{where}.table')
+    values = [value for _, value in parameters.table]
+    begin, length = times[0], times[-1] - times[0]
+    starts = [time - begin for time in times[:-1]]
+    seconds = [(after - before) / NANOSECONDS for before, after in pairwise(times)]
+    steps = [after - before for before, after in pairwise(values)]
+    if parameters.interpolation == 'linear':
+        polynomials = [(step, 0.0, 0.0, 0.0, 0.0) for step in steps]
+    elif parameters.interpolation == 'cubic':
+        polynomials = _cubic(seconds, steps, periodic=parameters.repeat)
+    else:
+        polynomials = [(0.0, 0.0, 10 * step, -15 * step, 6 * step) for step in steps]
+    durations = [after - before for before, after in pairwise(times)]
+    pieces = list(zip(starts, durations, values, seconds, polynomials, strict=False))
+    before, after = (values[0], 0.0, 0.0), (values[-1], 0.0, 0.0)
+    gain = values[-1] - values[0] if parameters.repeat else None
+
+    def profile(time: int) -> tuple[float, float, float]:
+        time -= begin
+        gained = 0.0
+        if time < 0:
+            return before
+        if time >= length:
+            if gain is None:
+                return after
+            rounds, time = divmod(time, length)
+            gained = rounds * gain
+        start, duration, value, h, (c1, c2, c3, c4, c5) = pieces[bisect_right(starts, time) - 1]
+        x = (time - start) / duration
+        return (
+            value + gained + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * c5)))),
+            (c1 + x * (2 * c2 + x * (3 * c3 + x * (4 * c4 + x * 5 * c5)))) / h,
+            (2 * c2 + x * (6 * c3 + x * (12 * c4 + x * 20 * c5))) / (h * h),
+        )
+
+    return profile
+
+
+def _times(table: Sequence[tuple[float, float]], where: str) -> list[int]:
+    """Return the times of a table, in [ns]."""
+    if len(table) < 2:
+        raise DefinitionError(where, 'has one row', 'write two or more rows [time, value]')
+    first = table[0][0]
+    if first < 0.0:
+        raise DefinitionError(
+            where, f'row 1 is at {first!r} s, before the first tick', 'begin at 0 or later'
+        )
+    times = [round(time * NANOSECONDS) for time, _ in table]
+    for number, (before, after) in enumerate(pairwise(times), 2):
+        if after <= before:
+            raise DefinitionError(
+                where,
+                f'row {number} is at {table[number - 1][0]!r} s, not after row {number - 1} '
+                f'at {table[number - 2][0]!r} s',
+                'write times that increase, by 1 ns at least',
+            )
+    return times
+
+
+_Polynomial = tuple[float, float, float, float, float]
+
+
+def _cubic(
+    seconds: Sequence[float], steps: Sequence[float], *, periodic: bool
+) -> list[_Polynomial]:
+    """Return the coefficients of the spline, by its slopes at the rows."""
+    chords = [step / h for step, h in zip(steps, seconds, strict=True)]
+    slopes = _slopes(seconds, chords, 0.0)
+    if periodic:
+        # Linear in the slope at the seam, which is such that the acceleration is continuous there.
+        unit = _slopes(seconds, [0.0] * len(chords), 1.0)
+        h0, h1 = seconds[0], seconds[-1]
+        seam = (3.0 * (h0 * chords[-1] + h1 * chords[0]) - h0 * slopes[-2] - h1 * slopes[1]) / (
+            2.0 * (h0 + h1) + h0 * unit[-2] + h1 * unit[1]
+        )
+        slopes = [slope + seam * one for slope, one in zip(slopes, unit, strict=True)]
+    return [
+        (h * m0, 3.0 * step - h * (2.0 * m0 + m1), h * (m0 + m1) - 2.0 * step, 0.0, 0.0)
+        for h, step, (m0, m1) in zip(seconds, steps, pairwise(slopes), strict=True)
+    ]
+
+
+def _slopes(seconds: Sequence[float], chords: Sequence[float], ends: float) -> list[float]:
+    """
+    Return the slopes at the rows, given those at both ends, in [rad/s] or [m/s].
+
+    At each row between, h₀ and h₁ are the times before and after it, d₀ and d₁ the slopes of the
+    chords. The acceleration is continuous where h₁·m₋ + 2(h₀ + h₁)·m + h₀·m₊ = 3(h₁·d₀ + h₀·d₁).
+    """
+    slopes = [ends]
+    upper = [0.0]
+    for (h0, h1), (d0, d1) in zip(pairwise(seconds), pairwise(chords), strict=True):
+        pivot = 2.0 * (h0 + h1) - h1 * upper[-1]
+        slopes.append((3.0 * (h1 * d0 + h0 * d1) - h1 * slopes[-1]) / pivot)
+        upper.append(h0 / pivot)
+    slopes.append(ends)
+    for i in range(len(slopes) - 2, 0, -1):
+        slopes[i] -= upper[i] * slopes[i + 1]
+    return slopes

@@ -1,0 +1,275 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Hardware in the loop: a controller commands the effort of the input, and the linkage moves by it.
+
+Time is cut into steps of one length from the first tick on; a step is cut again where a command
+comes or runs out, since the force changes there. So the motion depends on the commands and their
+times alone, and not on when it is looked at: the state at a time between is a step of its own
+length, of the same method, that is not gone on from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from math import floor, inf, isfinite, tau
+
+from linkage_ros.drives.drive import Context, CrankState, Reader
+from linkage_ros.dynamics.integrators.method import METHODS
+from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
+from linkage_ros.errors import DefinitionError
+from linkage_ros.joint_effort import EffortCommand, JointEffortReader
+from linkage_ros.joint_state import NANOSECONDS, Rejection
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.ranges import describe
+from linkage_ros.parameters import choice, number
+from linkage_ros.tuples import new
+
+TOPIC = 'crank_commands'
+
+_MADE_UP = NANOSECONDS
+"""Time that a tick makes up for, at least, in [ns]; so are two ticks of a scene."""
+
+_NEVER = 1 << 63
+
+
+@dataclass(frozen=True, slots=True)
+class TorqueParameters:
+    """Hardware in the loop: the effort commanded on crank_commands moves the linkage's masses."""
+
+    start: float = number('input at the first tick', 0.0, unit='rad or m', least=-1e6, most=1e6)
+    rate: float = number('its rate then', 0.0, unit='rad/s or m/s', least=-1e6, most=1e6)
+    method: str = choice(
+        'integration: of order 1, 4 or 6, at about 1, 4 or 20 evaluations a step',
+        tuple(METHODS),
+        'rk4',
+    )
+    step: float = number('length of a step', 1e-3, unit='s', least=1e-6, most=0.1)
+    timeout: float = number(
+        'how long a command holds, unless another comes', 0.1, unit='s', least=1e-6, most=3600.0
+    )
+    on_timeout: str = choice(
+        'what acts while no command holds: nothing, or a brake', ('zero', 'brake'), 'zero'
+    )
+    brake: float = number('what the brake holds', 0.0, unit='N·m or N', least=0.0, most=LARGEST)
+    restitution: float = number(
+        'rate after an impact on a stop, by that before', 0.0, least=0.0, most=1.0
+    )
+    stop_margin: float = number(
+        'how far within the ends of its range the input is stopped, as a share of the range: at '
+        'the end, a toggle, the inertia is without bounds',
+        1e-3,
+        above=0.0,
+        most=0.49,
+    )
+
+
+PARAMETERS = TorqueParameters
+
+
+def reader(context: Context) -> Reader:
+    """Build what reads the messages."""
+    return JointEffortReader(context.inputs_in_messages[0]).read
+
+
+def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
+    """
+    Build the drive.
+
+    Raises
+    ------
+    DefinitionError
+        Where the linkage has several inputs or lacks masses, no motion starts where it should, or
+        the brake is not said.
+
+    """
+    closure = context.closure
+    n_inputs = len(closure.linkage.inputs)
+    if n_inputs > 1:
+        raise DefinitionError(
+            'drive.torque',
+            f'the linkage has {n_inputs} inputs, and a torque moves one',
+            'use a linkage with one input, or another drive',
+        )
+    brakes = parameters.on_timeout == 'brake'
+    if brakes and parameters.brake == 0.0:
+        raise DefinitionError(
+            'drive.torque.brake',
+            'a brake that holds nothing',
+            'say what it holds, in [N·m] or [N]',
+        )
+    if parameters.brake and not brakes:
+        raise DefinitionError(
+            'drive.torque.brake', 'a brake that is never set', 'add on_timeout: brake'
+        )
+    terms, position = context.mechanics.terms, closure.position
+    motion = OneFreedom(
+        lambda value: terms(position(value)),
+        import_module(METHODS[parameters.method]).step,
+        _stops(closure, parameters.start, parameters.stop_margin),
+        parameters.restitution,
+    )
+    start = motion.at(parameters.start, parameters.rate)
+    if start is None:
+        raise DefinitionError(
+            'drive.torque.start',
+            f'at {parameters.start:g} nothing can be moved: a toggle, or no inertia',
+            'start elsewhere',
+        )
+    # A scene with slow ticks does not lose time between them.
+    period = round(NANOSECONDS / context.rate) if context.rate else 0
+    return TorqueDrive(motion, start, parameters, max(_MADE_UP, 2 * period))
+
+
+def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]:
+    """Return where the input is stopped, in [rad] or [m]."""
+    for each in closure.input_ranges:
+        if each.whole:
+            return -inf, inf
+        turns = floor((start - each.lowest) / tau) * tau if each.turning else 0.0
+        low, high = each.lowest + turns, each.highest + turns
+        within = margin * (high - low)
+        low, high = (
+            end + inwards if limited else copy
+            for end, inwards, copy, limited in zip(
+                (low, high), (within, -within), (-inf, inf), each.limited, strict=True
+            )
+        )
+        if low <= start <= high:
+            return low, high
+    raise DefinitionError(
+        'drive.torque.start',
+        f'{start:g} is not between the stops; reachable: {describe(closure.input_ranges)}',
+        f'start there, {margin:g} of the range or more from its ends',
+    )
+
+
+class TorqueDrive:
+    """
+    A mechanism that commands move.
+
+    What a tick makes up for is limited, so that one that comes late is not later still for it:
+    of the time beyond it, whole steps are left out, as if the mechanism had stood still.
+
+    Parameters
+    ----------
+    mechanism
+        How it moves.
+    start
+        Its state at the first tick.
+    use
+        Step, and what holds while no command does.
+    made_up
+        The longest time that a tick makes up for, in [ns].
+
+    """
+
+    __slots__ = (
+        '_boundary',
+        '_force',
+        '_idle',
+        '_made_up',
+        '_mechanism',
+        '_motion',
+        '_step',
+        '_time',
+        '_until',
+        'lost',
+        'max_age',
+        'stamp',
+    )
+
+    stamp: int
+    """When the newest good command came, in [ns]; 0 before the first."""
+    max_age: int
+    """How long a command holds, in [ns]."""
+    lost: int
+    """Time that was left out, in [ns]."""
+
+    def __init__(
+        self, mechanism: OneFreedom, start: Motion, use: TorqueParameters, made_up: int
+    ) -> None:
+        self._mechanism = mechanism
+        self._motion = start
+        self._step = round(use.step * NANOSECONDS)
+        self._made_up = made_up
+        self._idle = self._force = (0.0, use.brake)
+        self._time = self._boundary = -1
+        self._until = _NEVER
+        self.max_age = round(use.timeout * NANOSECONDS)
+        self.stamp = self.lost = 0
+
+    def offer(self, command: EffortCommand, now: int) -> Rejection | None:
+        """
+        Take a command from now on, or say why not; one that is not taken changes nothing.
+
+        Parameters
+        ----------
+        command
+            The command.
+        now
+            The time, in [ns].
+
+        """
+        effort = command.effort
+        if not -LARGEST <= effort <= LARGEST:
+            if isfinite(effort):
+                return Rejection.EFFORT_TOO_LARGE
+            return Rejection.EFFORT_NOT_FINITE
+        force = (effort, 0.0)
+        if self._time >= 0:
+            self._advance(now)
+            if force != self._force and now > self._time:
+                self._go_to(now)
+        self._force = force
+        self._until = now + self.max_age
+        self.stamp = now
+        return None
+
+    def state(self, now: int) -> CrankState:
+        """Return the crank at a time, in [ns]; at an earlier one than the last, as it was last."""
+        if self._time < 0:
+            self._time = now
+            self._boundary = now + self._step
+        self._advance(now)
+        motion, force = self._motion, self._force
+        if now > self._time:
+            motion = self._mechanism.advance(motion, (now - self._time) * 1e-9, *force)
+        acceleration = self._mechanism.acceleration(motion, *force)
+        return new(CrankState, ((motion.value,), (motion.rate,), (acceleration,), 0))
+
+    def _advance(self, now: int) -> None:
+        """Do all steps that end by now."""
+        late = now - self._time - self._made_up
+        if late > 0:
+            left_out = -(-late // self._step) * self._step
+            self._time += left_out
+            self._boundary += left_out
+            self.lost += left_out
+        while (end := min(self._boundary, self._until)) <= now:
+            self._go_to(end)
+            if end == self._until:
+                self._force, self._until = self._idle, _NEVER
+            if end == self._boundary:
+                self._boundary += self._step
+
+    def _go_to(self, end: int) -> None:
+        """Do a step, or what is left of one."""
+        if end > self._time:
+            seconds = (end - self._time) * 1e-9
+            self._motion = self._mechanism.advance(self._motion, seconds, *self._force)
+            self._time = end

@@ -1,0 +1,74 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What drives are built for in these tests: linkages of one input and of two, and a scene."""
+
+from __future__ import annotations
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.load import parse_scene
+from linkage_ros.scene.yaml_file import parse_yaml
+
+
+def _context(linkage: str, *, needs_rate: bool) -> Context:
+    closure = Closure(read_linkage(parse_yaml(linkage.encode(), 'linkage.yaml')))
+    return Context(closure, 1000.0, needs_rate, 'seed', None, None)
+
+
+def one_input(*, needs_rate: bool = True) -> Context:
+    """Return a four-bar's: its input is ``crank_joint``."""
+    return _context('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}', needs_rate=needs_rate)
+
+
+def two_inputs(*, needs_rate: bool = True) -> Context:
+    """Return a five-bar's: its inputs are ``left_crank`` and ``right_crank``."""
+    return _context(
+        """
+links:
+  ground: {O1: [0, 0], O2: [0.1, 0]}
+  left: {O1: [0, 0], A: [0.04, 0]}
+  right: {O2: [0, 0], C: [0.05, 0]}
+  upper: {A: [0, 0], B: [0.12, 0]}
+  lower: {C: [0, 0], B: [0.11, 0]}
+input:
+  - {joint: left_crank, parent: ground, child: left}
+  - {joint: right_crank, parent: ground, child: right}
+assembly: {B: left}
+joints:
+  upper_joint: {parent: ground, child: upper}
+""",
+        needs_rate=needs_rate,
+    )
+
+
+def pipeline(drive: str) -> Pipeline:
+    """Return a four-bar's, of a scene with rates and this drive, as a scene file says it."""
+    scene = f'linkage: linkage.yaml\neffects: {{velocity: {{}}}}\ndrive: {{{drive}}}\n'
+    linkage = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
+    files = {'scene.yaml': scene.encode(), 'linkage.yaml': linkage.encode()}
+    return Pipeline(parse_scene('test', 'here', files))
+
+
+def readings(built: Pipeline, *times: int) -> list[tuple[float, float]]:
+    """Return value and rate of the input, which is published first, at times in [ns]."""
+    found = []
+    for time in times:
+        reading = built.tick(time).looks[0].reading
+        assert reading is not None
+        found.append((reading.joints[0], reading.rates[0]))
+    return found

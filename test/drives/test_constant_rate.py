@@ -1,0 +1,138 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A constant rate: the double nearest to θ₀ + ω·t, t from the first tick on, of each input."""
+
+from __future__ import annotations
+
+from math import ulp
+
+from hypothesis import given
+from hypothesis import strategies as st
+from linkage_ros.drives.constant_rate import build, ConstantRate, ConstantRateParameters, curve
+from linkage_ros.drives.drive import CrankState
+from linkage_ros.errors import DefinitionError, FileError
+from mpmath import mp
+import pytest
+
+from .contexts import one_input, pipeline, readings, two_inputs
+
+SECOND = 1_000_000_000
+DAY = 86_400 * SECOND
+BEGIN = 1_700_000_000_123_456_789
+
+
+def exact(start, rate, time):
+    """Return start + rate·t to 60 digits."""
+    with mp.workdps(60):
+        return mp.mpf(start) + mp.mpf(rate) * time / SECOND
+
+
+@pytest.mark.parametrize(
+    ('start', 'rate', 'time', 'angle'),
+    [
+        (0.0, 2.0, 0, 0.0),
+        (0.5, 2.0, 250_000_000, 1.0),
+        (0.5, -2.0, SECOND, -1.5),
+        (0.5, 0.0, DAY, 0.5),
+        (0.0, 100.0, 1_000_000 * SECOND, 1e8),
+        (0.0, 100.0, 1_000_000 * SECOND + 1, 1e8 + 1e-7),
+        (0.1, 0.1, 3 * SECOND, 0.4),  # as doubles 0.1 + 0.1·3 is 0.4 + 5.6e-17
+    ],
+)
+def test_by_hand(start, rate, time, angle):
+    assert curve(ConstantRate(rate, start))(time) == (angle, rate, 0.0)
+
+
+@given(st.floats(-1e3, 1e3), st.floats(-1e4, 1e4), st.integers(0, 1000 * DAY))
+def test_after_any_time_the_angle_is_rounded_once(start, rate, time):
+    angle, same_rate, acceleration = curve(ConstantRate(rate, start))(time)
+    assert abs(angle - exact(start, rate, time)) <= 0.500001 * mp.mpf(ulp(angle))
+    assert (same_rate, acceleration) == (rate, 0.0)
+
+
+def test_the_first_tick_is_time_zero():
+    drive = build(ConstantRateParameters(rate=4.0, start=1.0), one_input())
+    assert (drive.stamp, drive.max_age) == (0, 0)
+    assert drive.state(BEGIN) == CrankState((1.0,), (4.0,), (0.0,), 0)
+    assert drive.state(BEGIN + SECOND // 4) == CrankState((2.0,), (4.0,), (0.0,), 0)
+    assert drive.state(BEGIN + SECOND // 4) == CrankState((2.0,), (4.0,), (0.0,), 0), 'once more'
+
+
+def test_a_first_tick_at_zero_is_time_zero_too():
+    drive = build(ConstantRateParameters(rate=4.0), one_input())
+    assert [drive.state(time).angles for time in (0, SECOND)] == [(0.0,), (4.0,)]
+
+
+def test_several_inputs_turn_alike_or_as_they_are_told():
+    alike = build(ConstantRateParameters(rate=4.0, start=1.0), two_inputs())
+    alike.state(BEGIN)
+    assert alike.state(BEGIN + SECOND) == CrankState((5.0, 5.0), (4.0, 4.0), (0.0, 0.0), 0)
+    own = ConstantRateParameters(rate=4.0, start=1.0, inputs={'right_crank': ConstantRate(-2.0)})
+    drive = build(own, two_inputs())
+    drive.state(BEGIN)
+    assert drive.state(BEGIN + SECOND) == CrankState((5.0, -2.0), (4.0, -2.0), (0.0, 0.0), 0)
+
+
+@pytest.mark.parametrize(
+    ('context', 'inputs'),
+    [(one_input(), ('crank_joint',)), (two_inputs(), ('left_crank', 'right_crank'))],
+    ids=['one input', 'two inputs'],
+)
+def test_a_rate_that_no_input_follows_is_refused(context, inputs):
+    own = {name: ConstantRate(1.0) for name in inputs}
+    with pytest.raises(DefinitionError, match=r'names every input') as caught:
+        build(ConstantRateParameters(rate=4.0, inputs=own), context)
+    assert caught.value.where == 'drive.constant_rate.inputs'
+    assert '\n' not in str(caught.value)
+
+
+def test_in_a_scene_the_input_is_published_as_it_is_driven():
+    built = pipeline('constant_rate: {rate: 2.5, start: 0.5}')
+    times = (BEGIN, BEGIN + SECOND // 2, BEGIN + SECOND // 2 + 40_000_000)
+    assert readings(built, *times) == [(0.5, 2.5), (1.75, 2.5), (1.85, 2.5)]
+
+
+@pytest.mark.parametrize(
+    ('drive', 'said'),
+    [
+        (
+            'constant_rate: {}',
+            "drive.constant_rate: the key 'rate' is missing; add rate: a number in [rad/s or m/s]",
+        ),
+        ('constant_rate: {rate: .inf}', 'drive.constant_rate.rate: inf is out of bounds'),
+        (
+            'constant_rate: {rate: 2e10}',
+            'drive.constant_rate.rate: 20000000000.0 is out of bounds',
+        ),
+        (
+            'constant_rate: {rate: 1, begin: 2}',
+            'drive.constant_rate.begin: unknown key; known: inputs, rate, start',
+        ),
+        (
+            'constant_rate: {rate: 1, inputs: {crank: {rate: 2}}}',
+            "there is no input 'crank'; did you mean 'crank_joint'?",
+        ),
+        (
+            'constant_rate: {rate: 1, inputs: {crank_joint: {rate: 2}}}',
+            'drive.constant_rate.inputs: names every input',
+        ),
+    ],
+)
+def test_what_a_scene_cannot_say(drive, said):
+    with pytest.raises(FileError) as caught:
+        pipeline(drive)
+    assert said in str(caught.value)
+    assert '\n' not in str(caught.value)

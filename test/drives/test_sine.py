@@ -1,0 +1,128 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A sine against 60 digits: value, and its derivatives as mpmath differentiates them."""
+
+from __future__ import annotations
+
+from math import pi
+
+from hypothesis import given
+from hypothesis import strategies as st
+from linkage_ros.drives.drive import CrankState
+from linkage_ros.drives.sine import build, curve, Sine, SineParameters
+from linkage_ros.errors import FileError
+from mpmath import mp
+import pytest
+
+from .contexts import pipeline, readings, two_inputs
+
+SECOND = 1_000_000_000
+DAY = 86_400 * SECOND
+ROUNDING = 8e-15
+"""Of the sine and cosine of an angle of up to two turns, a few roundings of 2e-16 each."""
+
+
+def check(parameters, time):
+    """Check a sine at a time, in [ns]."""
+    with mp.workdps(60):
+        A, f, mean, phase = map(
+            mp.mpf,
+            (parameters.amplitude, parameters.frequency, parameters.mean, parameters.phase),
+        )
+
+        def position(t):
+            return mean + A * mp.sin(2 * mp.pi * f * t + phase)
+
+        expected = [mp.diff(position, mp.mpf(time) / SECOND, n) for n in range(3)]
+        w = 2 * mp.pi * f
+        found = curve(parameters)(time)
+        limits = (ROUNDING * A + abs(mean) * 2e-16, ROUNDING * A * w, ROUNDING * A * w * w)
+        for value, wanted, limit in zip(found, expected, limits, strict=True):
+            assert abs(value - wanted) <= limit
+
+
+@pytest.mark.parametrize('time', [0, 1, SECOND // 7, SECOND, 30 * DAY + 7, 3000 * DAY + 123_457])
+@pytest.mark.parametrize(
+    'parameters',
+    [
+        Sine(amplitude=1.0, frequency=1.0),
+        Sine(amplitude=0.3, frequency=0.7, mean=-2.0, phase=1.1),
+        Sine(amplitude=1e-6, frequency=987.654321, mean=0.04),
+        Sine(amplitude=20.0, frequency=1e-7, phase=-pi),
+        Sine(amplitude=0.0, frequency=3.0, mean=0.25),
+    ],
+    ids=lambda p: f'{p.amplitude:g} at {p.frequency:g} Hz',
+)
+def test_position_rate_and_acceleration(parameters, time):
+    check(parameters, time)
+
+
+@given(
+    st.floats(1e-9, 100.0), st.floats(1e-6, 1e4), st.floats(-6.0, 6.0), st.integers(0, 1000 * DAY)
+)
+def test_however_late_it_is(amplitude, frequency, phase, time):
+    check(Sine(amplitude, frequency, phase=phase), time)
+
+
+@pytest.mark.parametrize('periods', [1, 10**6, 10**12 + 1])
+def test_whole_periods_repeat_to_the_last_bit(periods):
+    sine = curve(Sine(amplitude=0.5, frequency=125.0, mean=0.1, phase=0.3))  # a period is 8 ms
+    for time in range(0, 8_000_000, 999_983):
+        assert sine(time + periods * 8_000_000) == sine(time)
+
+
+def test_of_several_inputs_each_has_its_own():
+    own = {'left_crank': Sine(amplitude=0.5, frequency=0.25, mean=2.0)}
+    drive = build(
+        SineParameters(amplitude=1.0, frequency=0.25, inputs=own),
+        two_inputs(),
+    )
+    assert (drive.stamp, drive.max_age) == (0, 0)
+    rate = pi / 2
+    state = drive.state(5 * SECOND)
+    assert state == CrankState((2.0, 0.0), (0.5 * rate, rate), (0.0, 0.0), 0)
+    angles, rates, accelerations, age = drive.state(6 * SECOND)
+    assert angles == (2.5, 1.0)
+    assert rates == pytest.approx((0.0, 0.0), abs=1e-15)
+    assert accelerations == pytest.approx((-0.5 * rate**2, -(rate**2)))
+    assert age == 0
+
+
+def test_in_a_scene():
+    built = pipeline('sine: {amplitude: 0.5, frequency: 0.25, mean: 1}')
+    assert readings(built, SECOND, 2 * SECOND) == [(1.0, 0.25 * pi), (1.5, pytest.approx(0.0))]
+
+
+@pytest.mark.parametrize(
+    ('drive', 'said'),
+    [
+        ('sine: {frequency: 1}', "drive.sine: the key 'amplitude' is missing"),
+        (
+            'sine: {amplitude: -1, frequency: 1}',
+            'drive.sine.amplitude: -1 is out of bounds; write a finite number, at least 0',
+        ),
+        (
+            'sine: {amplitude: 1, frequency: 0}',
+            'drive.sine.frequency: 0 is out of bounds; write a finite number, more than 0',
+        ),
+        ('sine: {amplitude: 1, frequency: 1, phase: 90}', 'drive.sine.phase: 90 is out of bounds'),
+    ],
+)
+def test_what_a_scene_cannot_say(drive, said):
+    with pytest.raises(FileError) as caught:
+        pipeline(drive)
+    assert said in str(caught.value)
+    assert '\n' not in str(caught.value)
