@@ -25,13 +25,14 @@ import sys
 from tempfile import TemporaryDirectory
 import time
 
+from bench.empty_scene import EmptyPlan, measure_empty_scene
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
 from bench.machine import describe_machine
 from bench.processes import BenchError, Graph
 from bench.report import say, show, Table
 from bench.tick_tables import cost_table, lateness_table
-from bench.ticks import bare, idiomatic, measure_ticks, ours, TickPlan
+from bench.ticks import bare, idiomatic, many, measure_ticks, ours, TickPlan
 
 SLOW, FAST = 1000.0, 10_000.0
 
@@ -39,6 +40,8 @@ _TICKS = TickPlan(rounds=5, warm_up=0.7, window=1.7)
 _TICKS_QUICK = TickPlan(rounds=1, warm_up=0.2, window=0.6)
 _LATENCY = LatencyPlan(rate=1000.0, size=500, parts=12)
 _LATENCY_QUICK = LatencyPlan(rate=1000.0, size=200, parts=3)
+_EMPTY = EmptyPlan(rounds=31, ticks=5000)
+_EMPTY_QUICK = EmptyPlan(rounds=3, ticks=1000)
 _SPEED = SpeedPlan(rounds=11, states=5000, batch=1_000_000)
 _SPEED_QUICK = SpeedPlan(rounds=3, states=1000, batch=100_000)
 
@@ -48,13 +51,16 @@ def main() -> int:
     parser = argparse.ArgumentParser('python -m bench', description=__doc__)
     parser.add_argument('--quick', action='store_true', help='less than half a minute, rougher')
     parser.add_argument(
-        '--only', choices=('a', 'b', 'c', 'kinematics'), help='only one of the comparisons'
+        '--only',
+        choices=('a', 'b', 'c', 'many', 'empty', 'kinematics'),
+        help='only one of the comparisons',
     )
     parser.add_argument(
         '--runs', type=Path, default=Path('runs'), help='where the tables are kept'
     )
     arguments = parser.parse_args()
-    wanted = '' if arguments.only == 'kinematics' else arguments.only or 'abc'
+    parts = {'kinematics': '', 'empty': '', 'many': ''}
+    wanted = parts.get(arguments.only, arguments.only or 'abc')
     started = time.monotonic()
     begin = datetime.now().astimezone()
     tables = [Table('machine', ('', ''), [*describe_machine(), ('begun', f'{begin:%F %T}')])]
@@ -68,6 +74,11 @@ def main() -> int:
                 tables.append(measure_latency(graph, folder, plan))
             if wanted not in ('', 'c'):
                 tables += _ticks(graph, folder, wanted, arguments.quick)
+            if arguments.only in (None, 'many'):
+                tables.append(_many(graph, folder, arguments.quick))
+            if arguments.only in (None, 'empty'):
+                say('a tick of the empty scene')
+                tables.append(measure_empty_scene(_EMPTY_QUICK if arguments.quick else _EMPTY))
             if arguments.only in (None, 'kinematics'):
                 say('kinematics: linkages solved with acceleration')
                 tables.append(measure_speed(folder, _SPEED_QUICK if arguments.quick else _SPEED))
@@ -119,6 +130,13 @@ def _ticks(graph: Graph, folder: Path, wanted: str, quick: bool) -> list[Table]:
         ]
     late = [c for c in (slow, fast, slow_recording, fast_recording) if c in found]
     return [*tables, lateness_table(late, found)]
+
+
+def _many(graph: Graph, folder: Path, quick: bool) -> Table:
+    hundred = many(folder, SLOW, 100)
+    say(f'{hundred.name} at {SLOW:g} Hz')
+    found = measure_ticks(graph, [hundred], _TICKS_QUICK if quick else _TICKS)
+    return lateness_table([hundred], found)
 
 
 if __name__ == '__main__':

@@ -17,18 +17,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import tau
 from pathlib import Path
-import time
 
+from bench.in_turn import compare, in_turn
 from bench.kinematics_compiled import compiled, compiler
 from bench.kinematics_pylinkage import AVAILABLE, HAS_NUMBA, stepping
 from bench.kinematics_straight import straight_line
 from bench.processes import BenchError, ROOT
 from bench.report import say, Table
-from bench.spread import ratios, spread
 from linkage_ros.kinematics.batch.solve import Batch
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.diagonal import margin
@@ -113,7 +112,7 @@ def _one_at_a_time(plan: SpeedPlan, table: Table) -> None:
         say('  pylinkage is not installed: left out')
     times = {
         name: [1e6 * seconds / plan.states for seconds in found]
-        for name, found in _in_turn(contenders, plan.rounds).items()
+        for name, found in in_turn(contenders, plan.rounds).items()
     }
     for first, second, target in (
         ('four-bar', 'straight line', '≤ 2'),
@@ -121,7 +120,7 @@ def _one_at_a_time(plan: SpeedPlan, table: Table) -> None:
         ('Jansen leg', 'four-bar', '≤ 6'),
     ):
         if first in times:
-            _compare(table, 'µs a state', first, second, times, target)
+            compare(table, 'µs a state', first, second, times, target)
 
 
 def _batches(folder: Path, plan: SpeedPlan, table: Table) -> None:
@@ -153,11 +152,11 @@ def _batches(folder: Path, plan: SpeedPlan, table: Table) -> None:
         _, contenders['pylinkage'] = stepping(*LENGTHS, counts['pylinkage'], RATE, ACCELERATION)
     speeds = {
         name: [counts[name] / seconds / 1e6 for seconds in found]
-        for name, found in _in_turn(contenders, plan.rounds).items()
+        for name, found in in_turn(contenders, plan.rounds).items()
     }
     for second, target in (('C', '≥ 0.5'), ('pylinkage', '≥ 6')):
         if second in speeds:
-            _compare(table, 'Mstates/s', 'numpy', second, speeds, target)
+            compare(table, 'Mstates/s', 'numpy', second, speeds, target)
 
 
 def _closure(name: str) -> Closure:
@@ -181,43 +180,7 @@ def _walk(closure: Closure, angles: Sequence[float]) -> None:
         solve_acceleration(position, velocity, ACCELERATION)
 
 
-def _in_turn(
-    contenders: Mapping[str, Callable[[], object]], rounds: int
-) -> dict[str, list[float]]:
-    """Return for each how long it took, in [s], round by round."""
-    found: dict[str, list[float]] = {name: [] for name in contenders}
-    for run in contenders.values():
-        run()
-    for number in range(rounds):
-        # There and back again, so that a drift of the machine favours no one.
-        for name in found if number % 2 == 0 else reversed(found):
-            begun = time.perf_counter()
-            contenders[name]()
-            found[name].append(time.perf_counter() - begun)
-    say('  ' + ', '.join(f'{name} {min(times):.3g} s' for name, times in found.items()))
-    return found
-
-
 def _agree(name: str, one: ArrayLike, other: ArrayLike) -> None:
     difference = float(np.max(np.abs(np.remainder(np.subtract(one, other) + 1.0, tau) - 1.0)))
     if not difference < _AGREEMENT:
         raise BenchError(f'{name}: differs by {difference:.2g}')
-
-
-def _compare(
-    table: Table,
-    what: str,
-    first: str,
-    second: str,
-    found: Mapping[str, Sequence[float]],
-    target: str,
-) -> None:
-    table.rows.append(
-        (
-            f'{what}: {first} / {second}',
-            spread(found[first], 2),
-            spread(found[second], 2),
-            spread(ratios(found[first], found[second]), 2),
-            target,
-        )
-    )

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The scenes that are measured: a four-bar with rates, at any rate, recorded or not."""
+"""The scenes that are measured: a four-bar with rates, recorded or not, or a hundred of them."""
 
 from __future__ import annotations
 
@@ -45,5 +45,32 @@ def write_scene(folder: Path, rate: float, record: bool = False) -> Path:
     ]
     if record:
         lines.append(f'record: {{directory: {folder / "bags"}}}')
+    file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    return file
+
+
+def write_many(folder: Path, rate: float, count: int) -> Path:
+    """
+    Write a scene of several four-bars that turn by themselves, each at a speed of its own.
+
+    Parameters
+    ----------
+    folder
+        Where to.
+    rate
+        Ticks a second.
+    count
+        How many.
+
+    """
+    file = folder / f'{count}_four_bars.yaml'
+    linkage = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
+    lines = [f'rate: {rate:g}', 'effects: {velocity: {}}', 'linkages:']
+    for number in range(count):
+        lines += [
+            f'  - name: bar_{number}',
+            f'    linkage: {linkage}',
+            f'    drive: {{constant_rate: {{rate: {1.0 + 0.01 * number:g}}}}}',
+        ]
     file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
     return file

@@ -25,7 +25,7 @@ import time
 from bench.machine import cpu_time
 from bench.processes import BenchError, Graph, Process
 from bench.report import say
-from bench.scenes import write_scene
+from bench.scenes import write_many, write_scene
 
 _APPEARING = 15.0
 """How long a node may take to publish its first joint state, in [s]."""
@@ -106,6 +106,17 @@ def ours(folder: Path, rate: float, record: bool = False) -> Contender:
     scene = write_scene(folder, rate, record)
     return Contender(
         'linkage_node + bag' if record else 'linkage_node',
+        rate,
+        'linkage_ros.ros.linkage_node',
+        ('--ros-args', '-p', f'scene:={scene}'),
+    )
+
+
+def many(folder: Path, rate: float, count: int) -> Contender:
+    """Return our node with many linkages in one scene, at a rate, in [Hz]."""
+    scene = write_many(folder, rate, count)
+    return Contender(
+        f'{count} four-bars in one node',
         rate,
         'linkage_ros.ros.linkage_node',
         ('--ros-args', '-p', f'scene:={scene}'),
