@@ -29,6 +29,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, DRIVES
 from linkage_ros.effects.stage import (
+    Begin,
     EFFECTS,
     LOADED,
     Motion,
@@ -180,12 +181,15 @@ class Line:
         sensors = _sensors(scene, self.closure, [*built('sensor'), *faulty])
         stages = built('stage')
         drive_stages = built('drive_stage')
+        (begin,) = built('begin') or [_at_rest]
         state, close = self.drive.state, self.closure.position
         self.look: Callable[[int], Look]
         """Returns what the linkage comes to at a time, in [ns]."""
-        if stages or drive_stages or mechanism:
+        if begin is not _at_rest or drive_stages or mechanism:
             observe = _observer(named, len(self.closure.linkage.joints))
-            self.look = _look(state, drive_stages, close, mechanism, stages, observe, sensors)
+            self.look = _look(
+                state, drive_stages, close, mechanism, begin, stages, observe, sensors
+            )
         else:
             self.look = _plain_look(state, close, sensors)
         self.extras = [
@@ -277,6 +281,7 @@ def _look(
     drive_stages: list[Any],
     close: Callable[..., Position],
     mechanism: list[Any],
+    begin: Begin,
     stages: list[Any],
     observe: Callable[[int, Motion], Reading],
     sensors: tuple[Sensor, ...],
@@ -295,7 +300,7 @@ def _look(
             position = harm(position)
         if not position[2]:
             return new(Look, (crank, position, None, None))
-        motion = new(Motion, (crank, position, None, None, (), (), ()))
+        motion = begin(crank, position)
         for stage in stages:
             motion = stage(motion)
         reading = first(now, observe(now, motion))
@@ -306,6 +311,11 @@ def _look(
         return new(Look, (crank, position, motion, reading))
 
     return look
+
+
+def _at_rest(crank: CrankState, position: Position) -> Motion:
+    """Return the motion of which only the pose is asked for."""
+    return new(Motion, (crank, position, None, None, (), (), ()))
 
 
 def _observer(named: set[str], joints: int) -> Callable[[int, Motion], Reading]:
@@ -325,8 +335,8 @@ def _positions(now: int, motion: Motion) -> Reading:
 
 
 def _positions_and_rates(now: int, motion: Motion) -> Reading:
-    _, position, velocity, _, _, _, _ = motion
-    return new(Reading, (now, position[2], velocity[0] if velocity else (), (), ()))
+    velocity = motion[2]
+    return new(Reading, (now, motion[1][2], velocity[0] if velocity else (), (), ()))
 
 
 class _Observer:

@@ -156,7 +156,7 @@ class Pipeline:
         message = write(stamp, joints, rates, efforts)
         if not extras or motion is None:
             return new(Tick, ((look,), message, ()))
-        written = tuple([write_extra(motion, reading) for write_extra in extras])
+        written = tuple([write_extra(now, motion, reading) for write_extra in extras])
         return new(Tick, ((look,), message, written))
 
     def _tick_many(self, now: int) -> Tick:
@@ -171,7 +171,7 @@ class Pipeline:
         stamp = max(reading.stamp for reading in readings)
         message = writer.write(stamp, *_joined(readings))
         extras = tuple(
-            extra.write(motion, reading) if motion is not None and reading is not None else b''
+            extra.write(now, motion, reading) if motion is not None and reading is not None else b''
             for line, (_, _, motion, reading) in zip(self.lines, looks, strict=True)
             for extra in line.extras
         )

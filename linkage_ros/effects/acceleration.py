@@ -66,7 +66,7 @@ def writer(context: Context) -> Writer:
 
     write = JointTrajectoryWriter(context.joints_in_messages).write
 
-    def write_motion(_motion: Motion, reading: Reading) -> bytes:
+    def write_motion(_now: int, _motion: Motion, reading: Reading) -> bytes:
         stamp, positions, rates, accelerations, _ = reading
         return write(stamp, positions, rates, accelerations)
 

@@ -28,7 +28,8 @@ and with what builds its part of the tick; which, says where in the tick it stan
 ``drive_stage(parameters, context) -> Callable[[CrankState], CrankState]``
     Between the drive and the crank.
 ``stage(parameters, context) -> Callable[[Motion], Motion]``
-    In the mechanism, once its loops are closed.
+    In the mechanism, once its loops are closed. All of these start from rates, so that `velocity`
+    stands before them and has ``begin`` instead, which makes the motion that they change.
 ``sensor(parameters, context) -> Callable[[int, Reading], Reading | None]``
     Between the mechanism and the message: given the time of the tick, in [ns], and what is read
     so far, return what is read; None where nothing is.
@@ -37,8 +38,9 @@ An effect that publishes a message of its own has also
 
 ``TOPIC``, ``MESSAGE``
     The topic, and the type of the message: package/msg/Type.
-``writer(context) -> Callable[[Motion, Reading], bytes]``
-    Build what writes the message.
+``writer(context) -> Callable[[int, Motion, Reading], bytes]``
+    Build what writes the message, given the time of the tick, in [ns]; b'' where there is nothing
+    to publish. It is asked only where there is a reading.
 """
 
 from __future__ import annotations
@@ -151,6 +153,7 @@ class Reading(NamedTuple):
 
 
 DriveStage = Callable[[CrankState], CrankState]
+Begin = Callable[[CrankState, Position], Motion]
 Stage = Callable[[Motion], Motion]
 Sensor = Callable[[int, Reading], Reading | None]
-Writer = Callable[[Motion, Reading], bytes]
+Writer = Callable[[int, Motion, Reading], bytes]

@@ -23,8 +23,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Motion, Stage
+from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.effects.stage import Begin, Motion
+from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.tuples import new
 
@@ -37,15 +38,12 @@ class VelocityParameters:
 PARAMETERS = VelocityParameters
 
 
-def stage(_parameters: VelocityParameters, context: Context) -> Stage:
-    """Build the stage."""
+def begin(_parameters: VelocityParameters, context: Context) -> Begin:
+    """Build what begins a motion."""
     toggle, velocity_of = Status.TOGGLE, context.closure.velocity
 
-    def velocity(motion: Motion) -> Motion:
-        crank, position, _, _, _, _, _ = motion
-        if position.status is toggle:
-            return motion
-        found = velocity_of(position, *crank.rates)
+    def velocity(crank: CrankState, position: Position) -> Motion:
+        found = None if position[0] is toggle else velocity_of(position, *crank[1])
         return new(Motion, (crank, position, found, None, (), (), ()))
 
     return velocity

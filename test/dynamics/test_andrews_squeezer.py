@@ -18,7 +18,8 @@ Andrews' squeezing mechanism under its spring and its motor, as all multibody so
 
 E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., VII.7; reference
 solution: Test Set for IVP Solvers, Bari, "Andrews' squeezing mechanism": the seven angles after
-0.03 s. It is met to 1.2e-9 rad, at any smaller step too.
+0.03 s, quoted from memory. With 3,000 steps of RK4 it was met to 1.4e-9 rad, with 12,000 to
+1.1e-9: what is left is not that of the steps.
 """
 
 from __future__ import annotations

@@ -49,11 +49,9 @@ def moved(loop, angle, rate, alpha=0.0):
     """Return the motion that leaves velocity and acceleration."""
     position = loop.position(angle)
     crank = CrankState((angle,), (rate,), (alpha,), 0)
-    motion = Motion(crank, position, None, None, (), (), ())
     context = Context(loop, 1000.0, True, 'seed', None, None)
-    for effect in (velocity, acceleration):
-        motion = effect.stage(effect.PARAMETERS(), context)(motion)
-    return motion
+    motion = velocity.begin(velocity.PARAMETERS(), context)(crank, position)
+    return acceleration.stage(acceleration.PARAMETERS(), context)(motion)
 
 
 @given(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0), st.floats(-10.0, 10.0))
@@ -121,7 +119,7 @@ def test_the_message_is_the_motion_at_one_point():
     # Turns added, and whatever else sensors do: what is written is what is read.
     reading = Reading(3_000_000_004, (7.0, 8.0), rates, accelerations, ())
     context = Context(FOUR_BAR, 1000.0, True, 'seed', None, None, prefix='left_')
-    data = acceleration.writer(context)(motion, reading)
+    data = acceleration.writer(context)(9, motion, reading)
     message = STORE.deserialize_cdr(data, 'trajectory_msgs/msg/JointTrajectory')
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
     assert message.joint_names == ['left_coupler_joint', 'left_rocker_joint']

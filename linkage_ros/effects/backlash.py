@@ -1,0 +1,136 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Backlash: the play between motor and crank, which follows the motor with hysteresis.
+
+The crank is held back by friction and stays where it is until the motor comes to one end of the
+play b and pushes it (the play operator; A. Visintin, Differential Models of Hysteresis, 1994; for
+gears: M. Nordin and P.-O. Gutman, Controlling mechanical systems with backlash, a survey,
+Automatica 38, 2002)::
+
+    θ(t) = min(max(θ(t−), φ − b/2), φ + b/2)    θ of the crank, φ of the motor
+
+Where the motor touches an end and its rate pushes on, the crank has the motor's rate and
+acceleration; else it rests. It does not fly ahead of a motor that slows down: that would take its
+inertia. At the first tick it stands in the middle of the play.
+
+The model depends on the path and not on the speed, so what happens between two ticks is lost: a
+motor that turns back and forth between them has moved nothing. A turning motor may come wrapped:
+between two ticks it turns by less than half a turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi, tau
+
+from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.effects.stage import DriveStage
+from linkage_ros.parameters import each, Number, number
+from linkage_ros.tuples import new
+
+_LARGEST = 6.0
+
+
+@dataclass(frozen=True, slots=True)
+class BacklashParameters:
+    """Play between motor and crank: the crank stays until the motor has passed it."""
+
+    play: float = number(
+        'from one end to the other, of every input', unit='rad or m', least=0.0, most=_LARGEST
+    )
+    inputs: Mapping[str, float] = each(
+        'of inputs that have another one',
+        'input',
+        Number('from one end to the other', 'rad or m', least=0.0, most=_LARGEST),
+    )
+
+
+PARAMETERS = BacklashParameters
+
+
+def drive_stage(parameters: BacklashParameters, context: Context) -> DriveStage:
+    """Build the stage; it remembers where the cranks are."""
+    linkage = context.closure.linkage
+    plays = tuple(
+        Play(parameters.inputs.get(given.joint, parameters.play), turns=not given.slider)
+        for given in linkage.inputs
+    )
+    if len(plays) == 1:  # a loop over one takes three times as long, in every tick
+        follow = plays[0].follow
+
+        def backlash(motor: CrankState) -> CrankState:
+            (angle,), (rate,), (acceleration,), age = motor
+            angle, rate, acceleration = follow(angle, rate, acceleration)
+            return new(CrankState, ((angle,), (rate,), (acceleration,), age))
+
+        return backlash
+
+    def backlash_of_all(motor: CrankState) -> CrankState:
+        *motion, age = motor
+        moved = [
+            play.follow(*values)
+            for play, values in zip(plays, zip(*motion, strict=True), strict=True)
+        ]
+        return new(CrankState, (*zip(*moved, strict=True), age))
+
+    return backlash_of_all
+
+
+class Play:
+    """
+    What one crank does between the ends of its play.
+
+    Parameters
+    ----------
+    play
+        From one end to the other, in [rad] or [m].
+    turns
+        Whether it is an angle, which may come wrapped.
+
+    """
+
+    __slots__ = ('_crank', '_half', '_motor', '_turns')
+
+    def __init__(self, play: float, turns: bool) -> None:
+        self._half = 0.5 * play
+        self._turns = turns
+        self._crank: float | None = None
+        self._motor = 0.0
+
+    def follow(self, motor: float, rate: float, acceleration: float) -> tuple[float, float, float]:
+        """
+        Return position, rate and acceleration of the crank.
+
+        Parameters
+        ----------
+        motor, rate, acceleration
+            Of the motor, in [rad] or [m], by [s] and [s²].
+
+        """
+        crank = self._crank
+        if crank is None:
+            crank = motor
+        elif self._turns and not -pi < motor - self._motor < pi:
+            crank += round((motor - self._motor) / tau) * tau
+        low, high = motor - self._half, motor + self._half
+        self._crank = crank = min(max(crank, low), high)
+        self._motor = motor
+        pushed = (crank <= low and (rate > 0.0 or (rate == 0.0 and acceleration > 0.0))) or (
+            crank >= high and (rate < 0.0 or (rate == 0.0 and acceleration < 0.0))
+        )
+        return (crank, rate, acceleration) if pushed else (crank, 0.0, 0.0)

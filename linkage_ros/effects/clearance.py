@@ -1,0 +1,115 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Clearance: a pin is smaller than its hole, and leans on that side where the force presses it.
+
+While the two touch, pin and hole are joined as by a massless link as long as the radial play c,
+between their centres, which lies along the force that it carries (S. W. E. Earles and C. L. S. Wu,
+Motion analysis of a rigid-link mechanism with clearance at a bearing, using Lagrangian mechanics
+and digital computation, 1973; P. Flores, J. Ambrósio, J. C. P. Claro and H. M. Lankarani,
+Kinematics and Dynamics of Multibody Systems with Imperfect Joints, 2008). It is pulled: the
+centre of the hole or pin of ``link`` lies beside that of ``to`` by::
+
+    δ = −c·F/|F|              F: the force that ``to`` exerts on ``link``
+
+so that a link that hangs in its pin hangs lower by c. Of a pin of three links or more each leans
+so against the first one that ``links`` names it on.
+
+The force is that of the linkage without play, and what the leaning does to the published joints is
+worked out to first order, with the inputs held: wrong by the square of the play. Contact is
+never lost: where a force turns round, the pin is on the other side at once. Quasi-static: the
+rates stay those of the linkage without play. A pin without a force, below 1e-12 of the largest
+in the linkage, leans nowhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import hypot
+from operator import add
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Motion, Stage
+from linkage_ros.errors import DefinitionError
+from linkage_ros.parameters import each, Number
+from linkage_ros.tuples import new
+
+_SMALLEST = 1e-12
+"""A force below this part of the largest one is rounding, and has no direction."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClearanceParameters:
+    """Pins that lean by their radial play along the force that they carry."""
+
+    pins: Mapping[str, float] = each(
+        'radial play of each pin, half of what hole and pin differ by in diameter',
+        'pin',
+        Number('radial play', 'm', least=0.0, most=1e6),
+        required=True,
+    )
+
+
+PARAMETERS = ClearanceParameters
+
+
+def stage(parameters: ClearanceParameters, context: Context) -> Stage:
+    """
+    Build the stage.
+
+    Raises
+    ------
+    DefinitionError
+        Where a slider is named.
+
+    """
+    joints = context.closure.structure.joints
+    pins = {joint.name for joint in joints if joint.kind == 'R'}
+    for name in parameters.pins:
+        if name not in pins:
+            raise DefinitionError(
+                f'effects.clearance.pins.{name}',
+                f'{name!r} is a slider, and what leans is a pin in its hole',
+                f'name pins: {", ".join(sorted(pins))}',
+            )
+    plays = tuple(
+        (number, parameters.pins[joint.name])
+        for number, joint in enumerate(joints)
+        if joint.kind == 'R' and joint.name in parameters.pins
+    )
+    centred = (0j,) * len(joints)
+    shift_of = context.reactions.shift
+
+    def clearance(motion: Motion) -> Motion:
+        crank, position, velocity, acceleration, efforts, reactions, shift = motion
+        if not reactions:
+            return motion
+        sizes = [hypot(fx, fy) for fx, fy, _ in reactions]
+        smallest = _SMALLEST * max(sizes)
+        offsets = list(centred)
+        for joint, play in plays:
+            size = sizes[joint]
+            if size > smallest:
+                fx, fy, _ = reactions[joint]
+                offsets[joint] = complex(-play * (fx / size), -play * (fy / size))
+        moved = shift_of(position, offsets)
+        if moved is None:
+            return motion
+        shift = tuple(map(add, shift, moved)) if shift else moved
+        return new(Motion, (crank, position, velocity, acceleration, efforts, reactions, shift))
+
+    return clearance

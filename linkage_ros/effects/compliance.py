@@ -1,0 +1,164 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Compliance: links stretch under the axial force that they carry.
+
+A link between two pins P and Q is a bar of axial stiffness k = E·A/L: with the axial force N,
+positive in tension, it is longer by N/k (Hooke's law; S. P. Timoshenko, Strength of Materials, ch.
+I). With u the unit vector from P to Q, and F the force on the link in each of its pins, which
+contains what its inertia takes::
+
+    N = ½·(F_Q − F_P)·u
+
+What acts on the link between its pins, its weight, its inertia and springs, is borne half by each
+end so. The force is that of the rigid linkage; what the longer links do to the published joints
+is worked out to first order, with the inputs held: right for stretches that are small against the
+links, and wrong by their square. The links have no mass to swing by: quasi-static, and the rates
+stay those of the rigid linkage.
+"""
+
+from __future__ import annotations
+
+from cmath import rect
+from collections.abc import Mapping
+from dataclasses import dataclass
+from operator import add
+from typing import NamedTuple
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Motion, Stage
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.groups import Joint
+from linkage_ros.parameters import each, Number
+from linkage_ros.tuples import new
+
+_STIFFEST = 1e15
+
+
+@dataclass(frozen=True, slots=True)
+class ComplianceParameters:
+    """Links that stretch under their axial force."""
+
+    links: Mapping[str, float] = each(
+        'axial stiffness of links that lie between two pins; the others are rigid',
+        'link',
+        Number('axial stiffness E·A/L', 'N/m', above=0.0, most=_STIFFEST),
+        required=True,
+    )
+
+
+PARAMETERS = ComplianceParameters
+
+
+class _Bar(NamedTuple):
+    """
+    A link between two pins, near and far.
+
+    Attributes
+    ----------
+    coordinate
+        Which of the closure's turns it.
+    axis
+        Unit vector from the near pin to the far one where that coordinate is 0.
+    halves
+        Joints by number, with what their force times it is half of the tension.
+    far
+        Joints of the far pin by number; 1 where the link is the joint's ``link``, −1 where ``to``.
+    compliance
+        1/k, in [m/N].
+
+    """
+
+    coordinate: int
+    axis: complex
+    halves: tuple[tuple[int, float], ...]
+    far: tuple[tuple[int, float], ...]
+    compliance: float
+
+
+def stage(parameters: ComplianceParameters, context: Context) -> Stage:
+    """
+    Build the stage.
+
+    Raises
+    ------
+    DefinitionError
+        Where a link has not just two pins.
+
+    """
+    bars = tuple(_bar(context, link, k) for link, k in parameters.links.items())
+    rigid = (0j,) * len(context.closure.structure.joints)
+    shift_of = context.reactions.shift
+
+    def compliance(motion: Motion) -> Motion:
+        crank, position, velocity, acceleration, efforts, reactions, shift = motion
+        if not reactions:
+            return motion
+        x = position[3][0]
+        offsets = list(rigid)
+        for coordinate, axis, halves, far, softness in bars:
+            along = rect(1.0, x[coordinate]) * axis
+            tension = 0.0
+            for joint, half in halves:
+                fx, fy, _ = reactions[joint]
+                tension += half * (fx * along.real + fy * along.imag)
+            stretch = tension * softness * along
+            # What the drawing has for the far pin lies short of where the pin is.
+            for joint, sign in far:
+                offsets[joint] -= sign * stretch
+        moved = shift_of(position, offsets)
+        if moved is None:
+            return motion
+        shift = tuple(map(add, shift, moved)) if shift else moved
+        return new(Motion, (crank, position, velocity, acceleration, efforts, reactions, shift))
+
+    return compliance
+
+
+def _bar(context: Context, link: str, stiffness: float) -> _Bar:
+    closure = context.closure
+    ends: dict[str, list[tuple[int, float]]] = {}
+    for number, joint in enumerate(closure.structure.joints):
+        if link in (joint.link, joint.to):
+            _check(link, joint)
+            ends.setdefault(joint.name, []).append((number, 1.0 if joint.link == link else -1.0))
+    if len(ends) != 2:
+        raise _error(link, f'has the pins {", ".join(ends)}')
+    near, far = ends
+    points = closure.linkage.links[link]
+    between = complex(*points[far]) - complex(*points[near])
+    angle = closure.angles[link]
+    return _Bar(
+        angle.coordinate,
+        angle.unit * between / abs(between),
+        tuple((number, -0.5 * sign) for number, sign in ends[near])
+        + tuple((number, 0.5 * sign) for number, sign in ends[far]),
+        tuple(ends[far]),
+        1.0 / stiffness,
+    )
+
+
+def _check(link: str, joint: Joint) -> None:
+    if joint.kind != 'R':
+        raise _error(link, f'has the slider {joint.name!r}')
+
+
+def _error(link: str, reason: str) -> DefinitionError:
+    return DefinitionError(
+        f'effects.compliance.links.{link}',
+        f'{link!r} {reason}, and is no bar between two',
+        'leave it out; what stretches is a link with two pins and nothing else',
+    )

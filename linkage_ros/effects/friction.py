@@ -1,0 +1,68 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Friction: what pins and sliders resist their motion with.
+
+It has no part of the tick of its own: whatever works with forces takes it into account, the
+efforts, the forces in the pins, how the mechanism yields, and the torque drive. Of a pin::
+
+    T = −viscous·ω − coulomb·sign(ω)          ω: rate of one of its links against the other
+
+and of a slider likewise, with its slide's rate. The Coulomb part does not depend on the force that
+the joint carries (for this and better models: H. Olsson, K. J. Åström, C. Canudas de Wit, M.
+Gäfvert and P. Lischinsky, Friction models and friction compensation, European Journal of Control
+4, 1998). At rest it is 0 in an effort; under the torque drive it sticks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from linkage_ros.dynamics.loads import Friction, JointFriction
+from linkage_ros.parameters import each, number
+
+_STRONGEST = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class OneJoint:
+    """Friction of one pin or slider."""
+
+    viscous: float = number(
+        'for each unit of rate', 0.0, unit='N·m·s/rad or N·s/m', least=0.0, most=_STRONGEST
+    )
+    coulomb: float = number('at any rate', 0.0, unit='N·m or N', least=0.0, most=_STRONGEST)
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionParameters:
+    """Friction in pins and sliders, for all that works with forces."""
+
+    joints: Mapping[str, OneJoint] = each('of each pin or slider', 'pin', OneJoint, required=True)
+
+
+PARAMETERS = FrictionParameters
+
+
+def friction(parameters: FrictionParameters) -> Friction:
+    """Return the friction as the mechanics take it."""
+    return Friction(
+        {
+            name: JointFriction(joint.viscous, joint.coulomb)
+            for name, joint in parameters.joints.items()
+        }
+    )

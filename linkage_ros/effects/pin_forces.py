@@ -1,0 +1,74 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Pin forces: what the links of a linkage exert on each other in their pins and sliders.
+
+They are those of the rigid linkage, by Newton's and Euler's equations of every link; see
+`linkage_ros.dynamics.reactions`. All of an instant come in one message, which is why they are
+``sensor_msgs/MultiDOFJointState`` and not a ``geometry_msgs/WrenchStamped`` for each pin: that
+would be a topic for each, to be matched by stamp, and each with a frame that nobody broadcasts.
+``wrench`` holds for each of ``joint_names`` the force (x, y) and the moment about z, in the frame
+of the ground; ``transforms`` and ``twist`` are empty. Where no forces exist, at a toggle, there is
+no message.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Motion, Reading, Stage, Writer
+from linkage_ros.tuples import new
+
+TOPIC = '~/pin_forces'
+MESSAGE = 'sensor_msgs/msg/MultiDOFJointState'
+
+
+@dataclass(frozen=True, slots=True)
+class PinForcesParameters:
+    """Forces in pins and sliders, on ~/pin_forces."""
+
+
+PARAMETERS = PinForcesParameters
+
+
+def stage(_parameters: PinForcesParameters, context: Context) -> Stage:
+    """Build the stage."""
+    solve = context.reactions.solve
+
+    def pin_forces(motion: Motion) -> Motion:
+        crank, position, velocity, acceleration, efforts, _, shift = motion
+        if velocity is None or acceleration is None:
+            return motion
+        reactions = solve(position, velocity, acceleration)
+        if reactions is None:
+            return motion
+        return new(Motion, (crank, position, velocity, acceleration, efforts, reactions, shift))
+
+    return pin_forces
+
+
+def writer(context: Context) -> Writer:
+    """Build what writes the message; nothing where there are no forces."""
+    from linkage_ros.multi_dof_joint_state import PlanarWrenchWriter  # local import: if published
+
+    write = PlanarWrenchWriter([context.prefix + name for name in context.reactions.names]).write
+
+    def write_forces(now: int, motion: Motion, _reading: Reading) -> bytes:
+        reactions = motion[5]
+        return write(now, reactions) if reactions else b''
+
+    return write_forces

@@ -1,0 +1,118 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Tolerance: the linkage as it was made, whose points do not lie where the drawing has them.
+
+Each link is a part of its own, with holes of its own: of a pin's two holes, one in each link, each
+deviates by itself, in both coordinates, and so do the pivots of the ground. What matters of a link
+with two pins is its length, which deviates by √2 of the deviation of a coordinate.
+
+A deviation is normal and cut off at three standard deviations, so that ±t on a drawing is a
+standard deviation of t/3: limits that hold 99.73 % of a normal distribution (JCGM 100:2008, Guide
+to the expression of uncertainty in measurement, 4.3.9); the parts beyond them are not delivered.
+
+All coordinates are drawn, link by link and point by point in the order of the linkage file, x
+before y, and then scaled. So neither the deviation nor the choice of links changes what the others
+draw, and twice the deviation is the same mechanism, twice as badly made. The direction of a slider
+does not deviate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from random import Random
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.parameters import each, names, number, Point
+
+TRUNCATED = 3.0
+"""A deviation is at most this many standard deviations."""
+
+_KEY = 'effects.tolerance'
+_FARTHEST = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class ToleranceParameters:
+    """Points of links, pivots among them, that lie beside where the linkage file has them."""
+
+    standard_deviation: float = number(
+        'of each coordinate of each point, drawn from the seed and cut off at three times it',
+        0.0,
+        unit='m',
+        least=0.0,
+        most=_FARTHEST,
+    )
+    links: tuple[str, ...] = names('links that deviate so, the ground among them', 'body')
+    given: Mapping[str, tuple[float, float]] = each(
+        'deviations that are known, in the frame of the link; they take the place of those drawn',
+        'point',
+        Point('from where it is drawn to where it is', 'm', _FARTHEST),
+    )
+
+
+PARAMETERS = ToleranceParameters
+
+
+def alter(parameters: ToleranceParameters, linkage: Linkage, random: Random) -> Linkage:
+    """
+    Return the linkage as it was made.
+
+    Raises
+    ------
+    DefinitionError
+        Where it does not close.
+
+    """
+    deviating = parameters.links or tuple(linkage.links)
+    links = {}
+    for link, points in linkage.links.items():
+        scale = parameters.standard_deviation if link in deviating else 0.0
+        made = {}
+        for point, (x, y) in points.items():
+            drawn = scale * _normal(random), scale * _normal(random)
+            dx, dy = parameters.given.get(f'{link}.{point}', drawn)
+            made[point] = (x + dx, y + dy)
+        links[link] = made
+    altered = replace(linkage, links=links)
+    _check(altered)
+    return altered
+
+
+def _normal(random: Random) -> float:
+    """Draw from the normal distribution that is cut off."""
+    while True:
+        value = random.gauss(0.0, 1.0)
+        if abs(value) <= TRUNCATED:
+            return value
+
+
+def _check(linkage: Linkage) -> None:
+    reason = 'at no value of the input'
+    try:
+        closure = Closure(linkage)
+        if len(linkage.inputs) > 1 or closure.input_ranges:
+            return
+    except DefinitionError as error:
+        reason = f'{error.where}: {error.reason}'
+    raise DefinitionError(
+        _KEY,
+        f'with its deviations the linkage does not close: {reason}',
+        'let it deviate less, or by another seed',
+    )

@@ -1,0 +1,258 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Clearance: pins that lean along their force, against the exact massless-clearance-link model."""
+
+from __future__ import annotations
+
+from cmath import rect
+from math import hypot, sqrt
+
+from linkage_ros.effects import clearance
+from linkage_ros.effects.clearance import ClearanceParameters
+from linkage_ros.effects.stage import EFFECTS, NEEDS
+from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import parse_scene
+from linkage_ros.scene.read import parts_of, read_parameters
+from linkage_ros.scene.yaml_file import parse_yaml
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+from .four_bar_by_hand import FourBar
+from .loaded import context, GRAVITY, linkage, linkage_of, LINKAGES, moved, SINGULAR
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+FOUR_BAR, SLIDER_CRANK = linkage('four_bar'), linkage('slider_crank')
+PINS = ('O2', 'A', 'B', 'O4')
+MOTIONS = [(1.0, 0.0, 0.0), (0.4, 0.0, 20.0), (2.5, -6.0, 30.0), (-1.2, 12.0, -80.0)]
+
+
+def shift(within, motion, pins):
+    return moved(within, motion, {'pin_forces': (), 'clearance': (pins,)}).shift
+
+
+@pytest.mark.parametrize(
+    'plays',
+    [(0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 0, 0), (0.5, 1, 0.25, 0.75)],
+    ids=['A', 'B', 'O4', 'O2', 'all'],
+)
+@pytest.mark.parametrize('motion', MOTIONS)
+def test_the_exact_model_differs_by_the_square_of_the_play(motion, plays):
+    # Exact: pose and forces of the leaning linkage, in balance with each other.
+    by_hand = FourBar(FOUR_BAR, motion, GRAVITY)
+    _, *ideal = by_hand.angles(0)
+    errors = []
+    for play in (2e-5, 1e-5):
+        sizes = [play * each for each in plays]
+        phi, psi, _ = by_hand.balance(sizes)
+        exact = [float(phi - ideal[0]), float(psi - ideal[1])]
+        found = shift(context(FOUR_BAR), motion, dict(zip(PINS, sizes, strict=True)))
+        assert found == pytest.approx(exact, abs=0.02 * max(map(abs, exact)))
+        errors.append(max(abs(a - b) for a, b in zip(found, exact, strict=True)))
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_a_link_that_hangs_in_its_pins_hangs_lower():
+    # A swing, its ropes straight down: with play at both ends of the seat that comes down, and
+    # nothing turns. With play at one end only it tilts, by that over its length.
+    swing = linkage_of("""
+links:
+  ground: {O: [0, 0], D: [0.3, 0]}
+  crank: {O: [0, 0], A: [0.1, 0]}
+  seat: {A: [0, 0], B: [0.3, 0]}
+  rope: {D: [0, 0], B: [0.1, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {B: left}
+joints: {seat_joint: {parent: ground, child: seat}, rope_joint: {parent: ground, child: rope}}
+masses:
+  crank: {mass: 0.1, center: [0.05, 0], inertia: 1.0e-5}
+  seat: {mass: 1, center: [0.15, 0], inertia: 1.0e-2}
+  rope: {mass: 0.1, center: [0.05, 0], inertia: 1.0e-5}
+""")
+    within, down, play = context(swing), (-1.5707963267948966, 0.0, 0.0), 1e-5
+    seat, rope = shift(within, down, {'A': play, 'B': play})
+    assert (seat, rope) == pytest.approx((0.0, 0.0), abs=1e-18)
+    for pin, tilt in (('A', 1.0), ('B', -1.0), ('D', -1.0), ('O', 1.0)):
+        seat, rope = shift(within, down, {pin: play})
+        assert seat == pytest.approx(tilt * play / 0.3, rel=1e-9)
+        assert rope == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_slide_moves_as_a_pin_of_its_rod_leans():
+    # The piston's pin lies where a circle about A meets its line: in closed form, with A beside
+    # where it was by the play, against the force.
+    within, motion = context(SLIDER_CRANK), (1.0, 20.0, 0.0)
+    before = moved(within, motion, {'pin_forces': ()})
+    index = within.reactions.names.index('A')
+    assert within.closure.structure.joints[index].link == 'connecting_rod'
+    fx, fy, _ = before.reactions[index]
+    errors = []
+    for play in (2e-5, 1e-5):
+        lean = -play * complex(fx, fy) / hypot(fx, fy)
+
+        def slide(at):
+            return at.real + sqrt(0.14**2 - (at.imag - 0.01) ** 2)
+
+        pin = rect(0.04, 1.0)
+        found = shift(within, motion, {'A': play})[1]
+        exact = slide(pin + lean) - slide(pin)
+        assert found == pytest.approx(exact, rel=1e-2)
+        errors.append(abs(found - exact))
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_a_pin_in_a_slot_has_its_play_too():
+    # The block has no mass, so that its pin carries what the cylinder's wall presses it with.
+    within, motion, play = context(SLIDER_CRANK), (1.0, 20.0, 0.0), 1e-6
+    index = within.reactions.names.index('B')
+    fx, fy, _ = moved(within, motion, {'pin_forces': ()}).reactions[index]
+    assert fx == pytest.approx(0.0, abs=1e-9 * abs(fy))
+    _, slid = shift(within, motion, {'B': play})
+    # The rod's pin leaves the line by the play, as if that lay so much higher or lower.
+    joint = within.closure.structure.joints[index]
+    assert (joint.link, joint.to) == ('block of cylinder', 'connecting_rod')
+    off, height = play * (1.0 if fy > 0.0 else -1.0), 0.04 * rect(1.0, 1.0).imag - 0.01
+    exact = sqrt(0.14**2 - (height - off) ** 2) - sqrt(0.14**2 - height**2)
+    assert slid == pytest.approx(exact, rel=1e-4)
+
+
+def test_it_leans_by_the_play_and_not_by_the_force():
+    # Ten times the weight presses the pins no farther.
+    light, heavy = (
+        shift(context(FOUR_BAR, gravity=(0.0, -g)), (1.0, 0.0, 0.0), {'A': 1e-5, 'B': 1e-5})
+        for g in (1.0, 10.0)
+    )
+    assert light == pytest.approx(heavy, rel=1e-12)
+
+
+def test_without_a_force_nothing_leans():
+    weightless = context(FOUR_BAR, gravity=(0.0, 0.0))
+    assert shift(weightless, (1.0, 0.0, 0.0), dict.fromkeys(PINS, 1e-5)) == (0.0, 0.0)
+
+
+def test_a_force_that_is_rounding_leans_nothing():
+    # Forces of 1e-13 of the largest have no direction that means anything.
+    within = context(FOUR_BAR)
+    before = moved(within, (1.0, 0.0, 0.0), {'pin_forces': ()})
+    tiny = tuple(
+        reaction._replace(fx=1e-13 * reaction.fx, fy=1e-13 * reaction.fy) if i else reaction
+        for i, reaction in enumerate(before.reactions)
+    )
+    stage = clearance.stage(ClearanceParameters({'A': 1e-5, 'B': 1e-5, 'O4': 1e-5}), within)
+    names = within.reactions.names
+    assert names[0] == 'O2'
+    assert stage(before._replace(reactions=tiny)).shift == (0.0, 0.0)
+    assert stage(before).shift != (0.0, 0.0)
+
+
+def test_at_a_toggle_nothing_leans():
+    within = context(linkage_of(SINGULAR))
+    assert shift(within, (0.0, 1.0, 0.0), {'A': 1e-5}) == ()
+
+
+def test_it_is_added_to_what_the_links_yield_and_the_rest_is_passed_on():
+    within = context(FOUR_BAR)
+    before = moved(within, MOTIONS[2], {'pin_forces': ()})
+    stage = clearance.stage(ClearanceParameters({'A': 1e-5}), within)
+    alone = stage(before)
+    assert alone == before._replace(shift=alone.shift)
+    further = stage(before._replace(shift=(0.5, -0.25)))
+    expected = (0.5 + alone.shift[0], -0.25 + alone.shift[1])
+    assert further == before._replace(shift=expected)
+
+
+def test_of_a_pin_of_three_links_two_lean_against_the_third():
+    # Rocker and lever have the pin D of the ground, each its own hole.
+    pair = linkage_of("""
+links:
+  ground: {O: [0, 0], D: [0.1, 0]}
+  crank: {O: [0, 0], A: [0.05, 0]}
+  coupler: {A: [0, 0], B: [0.1, 0]}
+  rocker: {D: [0, 0], B: [0.07, 0]}
+  rod: {B: [0, 0], C: [0.09, 0]}
+  lever: {D: [0, 0], C: [0.06, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {B: left, C: right}
+joints:
+  rocker_joint: {parent: ground, child: rocker}
+  lever_joint: {parent: ground, child: lever}
+masses:
+  crank: {mass: 0.1, center: [0.02, 0], inertia: 1.0e-5}
+  coupler: {mass: 0.1, center: [0.05, 0], inertia: 1.0e-5}
+  rocker: {mass: 0.1, center: [0.03, 0], inertia: 1.0e-5}
+  rod: {mass: 0.1, center: [0.04, 0], inertia: 1.0e-5}
+  lever: {mass: 0.1, center: [0.03, 0], inertia: 1.0e-5}
+""")
+    within, motion, play = context(pair), (1.0, 0.0, 0.0), 1e-6
+    before = moved(within, motion, {'pin_forces': ()})
+    offsets = [0j] * len(within.reactions.names)
+    for name in ('D/rocker', 'D/lever'):
+        number = within.reactions.names.index(name)
+        fx, fy, _ = before.reactions[number]
+        offsets[number] = -play * complex(fx, fy) / hypot(fx, fy)
+    expected = within.reactions.shift(before.position, offsets)
+    assert shift(within, motion, {'D': play}) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize('name', ['cylinder'])
+def test_a_slider_is_refused(name):
+    with pytest.raises(
+        DefinitionError,
+        match=f"^effects.clearance.pins.{name}: '{name}' is a slider, and what leans is a pin in "
+        'its hole; name pins: A, B, O2$',
+    ):
+        clearance.stage(ClearanceParameters({name: 1e-5}), context(SLIDER_CRANK))
+
+
+def test_it_is_read_from_a_scene():
+    def read(text):
+        section = parse_yaml(text.encode(), 'scene.yaml')
+        return read_parameters(section, ClearanceParameters, parts_of(SLIDER_CRANK))
+
+    assert read('pins: {A: 2.0e-5, B: 0}') == ClearanceParameters({'A': 2e-5, 'B': 0.0})
+    for text, message in (
+        ('{}', "the key 'pins' is missing"),
+        ('pins: {A: -1}', 'pins.A: -1 is out of bounds; .*at least 0'),
+        ('pins: {G: 1}', "pins.G: there is no pin 'G'; there are: "),
+    ):
+        with pytest.raises(FileError, match=message):
+            read(text)
+
+
+def test_a_scene_publishes_the_leaning_joints_and_the_rates_without_play():
+    def tick(effects):
+        files = {
+            'scene.yaml': b'linkage: l\ndrive: {constant_rate: {rate: -6, start: 2.5}}\n'
+            + effects,
+            'linkage.yaml': (LINKAGES / 'four_bar.yaml').read_bytes(),
+        }
+        message = Pipeline(parse_scene('scene', 'here', files)).tick(10**9).message
+        return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+
+    loads = b'\nloads: {gravity: [0, -9.81]}'
+    worn = tick(b'effects: {velocity: {}, clearance: {pins: {A: 1.0e-5, B: 2.0e-5}}}' + loads)
+    tight = tick(b'effects: {velocity: {}}')
+    expected = (0.0, *shift(context(FOUR_BAR), (2.5, -6.0, 0.0), {'A': 1e-5, 'B': 2e-5}))
+    assert list(worn.position - tight.position) == pytest.approx(expected, abs=1e-15)
+    assert max(map(abs, expected)) > 1e-5
+    assert list(worn.velocity) == list(tight.velocity)
+
+
+def test_it_is_registered_behind_the_forces_that_it_needs():
+    assert EFFECTS['clearance'] == clearance.__name__
+    assert NEEDS['clearance'] == ('velocity', 'acceleration', 'pin_forces')
+    order = list(EFFECTS)
+    assert order.index('clearance') > order.index('compliance') > order.index('pin_forces')

@@ -1,0 +1,224 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Compliance: a link that is pulled is longer, against the linkage with that length."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from linkage_ros.effects import compliance
+from linkage_ros.effects.compliance import ComplianceParameters
+from linkage_ros.effects.stage import EFFECTS, NEEDS
+from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import parse_scene
+from linkage_ros.scene.read import parts_of, read_parameters
+from linkage_ros.scene.yaml_file import parse_yaml
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+from .four_bar_by_hand import FourBar, mp, turn
+from .loaded import context, GRAVITY, linkage, linkage_of, LINKAGES, moved, SINGULAR
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+FOUR_BAR, SLIDER_CRANK, WATT = (linkage(name) for name in ('four_bar', 'slider_crank', 'watt_1'))
+SHARED_PIN = linkage_of("""
+links:
+  ground: {O: [0, 0], D: [0.1, 0], E: [0.2, 0.02]}
+  crank: {O: [0, 0], A: [0.04, 0]}
+  coupler: {A: [0, 0], B: [0.12, 0]}
+  rocker: {D: [0, 0], B: [0.08, 0]}
+  rod: {B: [0, 0], C: [0.09, 0]}
+  lever: {E: [0, 0], C: [0.07, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {B: left, C: left}
+joints:
+  rocker_joint: {parent: ground, child: rocker}
+  lever_joint: {parent: ground, child: lever}
+masses:
+  crank: {mass: 0.1, center: [0.02, 0], inertia: 1.0e-5}
+  coupler: {mass: 0.2, center: [0.06, 0.01], inertia: 1.0e-4}
+  rocker: {mass: 0.1, center: [0.04, 0], inertia: 1.0e-5}
+  rod: {mass: 0.1, center: [0.045, 0], inertia: 1.0e-5}
+  lever: {mass: 0.3, center: [0.03, 0], inertia: 1.0e-4}
+""")
+"""Three links share the pin B."""
+
+MOTIONS = [(1.0, 0.0, 0.0), (0.4, 0.0, 20.0), (2.5, -6.0, 30.0), (-1.2, 12.0, -80.0)]
+
+
+def shift(within, motion, links):
+    return moved(within, motion, {'pin_forces': (), 'compliance': (links,)}).shift
+
+
+def tensions_by_hand(motion):
+    """Return the mean axial force of coupler and rocker, from the balance of every link."""
+    phi, psi, (_, at_a, at_b, at_d) = FourBar(FOUR_BAR, motion, GRAVITY).balance()
+    along, arm = turn(phi), turn(psi)
+    coupler = ((-at_b - at_a) / 2 * mp.conj(along)).real
+    rocker = ((at_b - at_d) / 2 * mp.conj(arm)).real
+    return {'coupler': float(coupler), 'rocker': float(rocker)}
+
+
+def lengthened(of, link, pin, stretch):
+    """Return a linkage with a link longer along its x axis."""
+    x, y = of.links[link][pin]
+    points = {**of.links[link], pin: (x + stretch, y)}
+    return replace(of, links={**of.links, link: points})
+
+
+@pytest.mark.parametrize('link', ['coupler', 'rocker'])
+@pytest.mark.parametrize('motion', MOTIONS)
+def test_the_joints_are_those_of_the_longer_link_and_the_error_falls_with_the_square(motion, link):
+    within, tension = context(FOUR_BAR), tensions_by_hand(motion)[link]
+    rigid = within.closure.position(motion[0]).joints
+    errors = []
+    for stretch in (1e-4, 5e-5):
+        longer = Closure(lengthened(FOUR_BAR, link, 'B', stretch)).position(motion[0]).joints
+        exact = [a - b for a, b in zip(longer, rigid, strict=True)]
+        sign = 1.0 if tension > 0.0 else -1.0
+        # A stiffness at which it is that much longer, or shorter.
+        found = [sign * value for value in shift(within, motion, {link: abs(tension) / stretch})]
+        assert found == pytest.approx(exact, abs=0.05 * max(map(abs, exact)))
+        errors.append(max(abs(a - b) for a, b in zip(found, exact, strict=True)))
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+
+
+def pulled(within, motion, link, pins):
+    """Return the mean tension of a link from the reactions, the far pin's less the near one's."""
+    closure = within.closure
+    motion = moved(within, motion, {'pin_forces': ()})
+    points = closure.points(motion.position)
+    between = points[link, pins[1]] - points[link, pins[0]]
+    force = 0j
+    for joint, reaction in zip(closure.structure.joints, motion.reactions, strict=True):
+        if joint.name in pins and link in (joint.link, joint.to):
+            sign = (1.0 if joint.link == link else -1.0) * (1.0 if joint.name == pins[1] else -1.0)
+            force += sign * complex(reaction.fx, reaction.fy)
+    return (0.5 * force * between.conjugate()).real / abs(between)
+
+
+@pytest.mark.parametrize(
+    ('of', 'link', 'pins'),
+    [
+        (FOUR_BAR, 'crank', ('O2', 'A')),
+        (SLIDER_CRANK, 'connecting_rod', ('A', 'B')),
+        (WATT, 'upper_link', ('C', 'E')),
+        (SHARED_PIN, 'coupler', ('A', 'B')),
+        (SHARED_PIN, 'rod', ('B', 'C')),
+    ],
+    ids=['crank', 'rod of a slider', 'six-bar', 'first of a shared pin', 'last of a shared pin'],
+)
+def test_any_bar_between_two_pins_may_stretch(of, link, pins):
+    within, motion, stretch = context(of), (1.0, 5.0, 3.0), 1e-6
+    tension = pulled(within, motion, link, pins)
+    longer = Closure(lengthened(of, link, pins[1], stretch)).position(motion[0]).joints
+    exact = [a - b for a, b in zip(longer, within.closure.position(1.0).joints, strict=True)]
+    found = shift(within, motion, {link: tension / stretch if tension > 0 else -tension / stretch})
+    sign = 1.0 if tension > 0.0 else -1.0
+    assert [sign * value for value in found] == pytest.approx(
+        exact, rel=1e-3, abs=1e-4 * max(map(abs, exact))
+    )
+
+
+def test_two_links_stretch_as_each_of_them_does():
+    within, motion = context(FOUR_BAR), MOTIONS[2]
+    one, other = ({'coupler': 2e4}, {'rocker': 1e4})
+    alone = [shift(within, motion, links) for links in (one, other)]
+    both = shift(within, motion, one | other)
+    assert both == pytest.approx([a + b for a, b in zip(*alone, strict=True)], rel=1e-12)
+
+
+def test_twice_as_stiff_is_half_the_shift():
+    within, motion = context(FOUR_BAR), MOTIONS[2]
+    soft, stiff = (shift(within, motion, {'coupler': k}) for k in (1e4, 2e4))
+    assert soft == pytest.approx([2.0 * value for value in stiff], rel=1e-12)
+
+
+def test_at_a_toggle_nothing_yields():
+    within = context(linkage_of(SINGULAR))
+    assert shift(within, (0.0, 1.0, 0.0), {'coupler': 1e4}) == ()
+
+
+def test_it_is_added_to_a_shift_and_the_rest_is_passed_on():
+    within = context(FOUR_BAR)
+    before = moved(within, MOTIONS[2], {'pin_forces': ()})
+    stage = compliance.stage(ComplianceParameters({'coupler': 1e4}), within)
+    alone = stage(before)
+    assert alone == before._replace(shift=alone.shift)
+    further = stage(before._replace(shift=(0.5, -0.25)))
+    expected = (0.5 + alone.shift[0], -0.25 + alone.shift[1])
+    assert further == before._replace(shift=expected)
+
+
+@pytest.mark.parametrize(
+    ('of', 'link', 'reason'),
+    [
+        (WATT, 'coupler', "'coupler' has the pins A, B, C, and is no bar between two"),
+        (linkage('excavator_bucket'), 'cylinder_rod', "has the slider 'bore', and is no bar"),
+        (linkage('excavator_bucket'), 'cylinder_tube', "has the slider 'bore', and is no bar"),
+    ],
+)
+def test_what_is_no_bar_between_two_pins_is_refused(of, link, reason):
+    with pytest.raises(DefinitionError, match=f'^effects.compliance.links.{link}: .*{reason}'):
+        compliance.stage(ComplianceParameters({link: 1e4}), context(of))
+
+
+def test_it_is_read_from_a_scene():
+    def read(text):
+        section = parse_yaml(text.encode(), 'scene.yaml')
+        return read_parameters(section, ComplianceParameters, parts_of(FOUR_BAR))
+
+    assert read('links: {coupler: 2.0e6}') == ComplianceParameters({'coupler': 2e6})
+    for text, message in (
+        ('{}', "the key 'links' is missing"),
+        ('links: {coupler: 0}', 'links.coupler: 0 is out of bounds; .*more than 0'),
+        ('links: {ground: 1}', "links.ground: there is no link 'ground'; there are: crank, "),
+        ('links: {copler: 1}', r"links.copler: there is no link 'copler'; did you mean 'coupler'"),
+    ):
+        with pytest.raises(FileError, match=message):
+            read(text)
+
+
+def test_a_scene_publishes_the_shifted_joints_and_not_what_they_come_from():
+    def tick(effects):
+        files = {
+            'scene.yaml': b'linkage: l\ndrive: {constant_rate: {rate: -6, start: 2.5}}\n'
+            + effects,
+            'linkage.yaml': (LINKAGES / 'four_bar.yaml').read_bytes(),
+        }
+        return Pipeline(parse_scene('scene', 'here', files)).tick(10**9)
+
+    loads = b'\nloads: {gravity: [0, -9.81]}'
+    soft = tick(b'effects: {compliance: {links: {coupler: 1.0e4}}}' + loads)
+    rigid = tick(b'effects: {}')
+    assert soft.extras == ()
+    one, other = (
+        STORE.deserialize_cdr(each.message, 'sensor_msgs/msg/JointState') for each in (soft, rigid)
+    )
+    assert len(one.velocity) == len(one.effort) == 0
+    # The crank is held, and published first.
+    expected = (0.0, *shift(context(FOUR_BAR), (2.5, -6.0, 0.0), {'coupler': 1e4}))
+    assert list(one.position - other.position) == pytest.approx(expected, abs=1e-15)
+    assert max(map(abs, expected)) > 1e-6
+
+
+def test_it_is_registered_behind_the_forces_that_it_needs():
+    assert EFFECTS['compliance'] == compliance.__name__
+    assert NEEDS['compliance'] == ('velocity', 'acceleration', 'pin_forces')
+    order = list(EFFECTS)
+    assert all(order.index(need) < order.index('compliance') for need in NEEDS['compliance'])

@@ -1,0 +1,117 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Friction: parameters that everything with forces takes into account, and no stage of its own."""
+
+from __future__ import annotations
+
+from linkage_ros.dynamics.loads import Friction, JointFriction
+from linkage_ros.effects import friction
+from linkage_ros.effects.friction import FrictionParameters, OneJoint
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.errors import FileError
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import parse_scene
+from linkage_ros.scene.read import parts_of, read_parameters
+from linkage_ros.scene.yaml_file import parse_yaml
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+from .loaded import context, linkage, LINKAGES, moved
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+SLIDER_CRANK = linkage('slider_crank')
+
+
+def read(text):
+    section = parse_yaml(text.encode(), 'scene.yaml')
+    return read_parameters(section, FrictionParameters, parts_of(SLIDER_CRANK))
+
+
+def test_a_scene_names_pins_and_sliders():
+    # B is a pin too: of the rod and the block that the slot in the cylinder stands for.
+    parameters = read(
+        'joints: {A: {viscous: 0.002}, B: {coulomb: 0.1}, cylinder: {viscous: 3, coulomb: 4}}'
+    )
+    assert parameters == FrictionParameters(
+        {'A': OneJoint(viscous=0.002), 'B': OneJoint(coulomb=0.1), 'cylinder': OneJoint(3.0, 4.0)}
+    )
+    assert friction.friction(parameters) == Friction(
+        {
+            'A': JointFriction(0.002, 0.0),
+            'B': JointFriction(0.0, 0.1),
+            'cylinder': JointFriction(3.0, 4.0),
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('{}', "the key 'joints' is missing"),
+        ('joints: {cylindr: {}}', r"there is no pin 'cylindr'; did you mean 'cylinder'\?"),
+        ('joints: {A: {viscous: -1}}', 'joints.A.viscous: -1 is out of bounds; .*at least 0'),
+        ('joints: {A: 0.1}', 'joints.A: 0.1 is not a mapping'),
+        ('joints: {A: {coulmb: 1}}', r"joints.A.coulmb: unknown key; did you mean 'coulomb'\?"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(text, message):
+    with pytest.raises(FileError, match=message):
+        read(text)
+
+
+@pytest.mark.parametrize('rate', [5.0, -5.0])
+def test_a_cylinder_that_rubs_takes_that_much_more_power(rate):
+    # The piston's rate is the slope of its place over time: the rod's pin on its line.
+    rubbing = friction.friction(read('joints: {cylinder: {viscous: 3, coulomb: 4}}'))
+    with_it, without = (
+        moved(context(SLIDER_CRANK, by), (1.0, rate, 7.0), {'effort': ()})
+        for by in (rubbing, None)
+    )
+    step = 1e-6
+    closure = context(SLIDER_CRANK).closure
+    before, after = (closure.position(1.0 + rate * t).joints[1] for t in (-step, step))
+    slide = (after - before) / (2.0 * step)
+    more = (with_it.efforts[0] - without.efforts[0]) * rate
+    assert more == pytest.approx(3.0 * slide**2 + 4.0 * abs(slide), rel=1e-7)
+
+
+def efforts_of(effects):
+    files = {
+        'scene.yaml': b'linkage: l.yaml\ndrive: {constant_rate: {rate: 3}}\n' + effects,
+        'linkage.yaml': (LINKAGES / 'slider_crank.yaml').read_bytes(),
+    }
+    pipeline = Pipeline(parse_scene('scene', 'here', files))
+    ticks = [pipeline.tick(10**9 + i * 10**6) for i in range(50)]
+    messages = [STORE.deserialize_cdr(t.message, 'sensor_msgs/msg/JointState') for t in ticks]
+    return [message.effort[0] for message in messages]
+
+
+def test_a_scene_with_friction_says_so_in_the_effort():
+    dry = efforts_of(b'effects: {effort: {}, friction: {joints: {O2: {coulomb: 0.5}}}}')
+    bare = efforts_of(b'effects: {effort: {}}')
+    assert dry == pytest.approx([effort + 0.5 for effort in bare], abs=1e-12)
+
+
+def test_where_nothing_asks_for_forces_it_is_refused():
+    with pytest.raises(FileError, match=r'effects\.friction: acts on nothing here'):
+        efforts_of(b'effects: {velocity: {}, friction: {joints: {O2: {coulomb: 0.5}}}}')
+
+
+def test_it_is_registered_and_has_no_stage():
+    assert EFFECTS['friction'] == friction.__name__
+    assert friction.PARAMETERS is FrictionParameters
+    for part in ('alter', 'drive_stage', 'stage', 'sensor', 'writer'):
+        assert not hasattr(friction, part)

@@ -1,0 +1,152 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Pin forces: the balance of every link, published as one message of one instant."""
+
+from __future__ import annotations
+
+from cmath import rect
+
+from hypothesis import given
+from hypothesis import strategies as st
+from linkage_ros.effects import pin_forces
+from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS, Reading
+from linkage_ros.kinematics.status import Status
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import parse_scene
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+from .four_bar_by_hand import FourBar
+from .loaded import context, GRAVITY, linkage, linkage_of, LINKAGES, moved, SINGULAR
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+TYPE = 'sensor_msgs/msg/MultiDOFJointState'
+FOUR_BAR = linkage('four_bar')
+PENDULUM = linkage_of("""
+links:
+  ground: {O: [0, 0], X: [1, 0]}
+  crank: {O: [0, 0], end: [0.5, 0]}
+input: {joint: drive_joint, parent: ground, child: crank}
+joints: {crank_joint: {parent: ground, child: crank}}
+masses: {crank: {mass: 2, center: [0.3, 0], inertia: 0.05}}
+""")
+numbers = st.floats(-10.0, 10.0)
+
+
+def reactions(within, *crank):
+    return moved(within, crank, {'pin_forces': ()}).reactions
+
+
+@given(numbers, numbers, numbers)
+def test_the_pin_of_a_pendulum_bears_weight_and_inertia(angle, rate, acceleration):
+    # m·(a + g), with a = r·(iα − ω²)·e^{iθ}.
+    (found,) = reactions(context(PENDULUM), angle, rate, acceleration)
+    pull = 0.3 * (1j * acceleration - rate * rate) * rect(1.0, angle)
+    force = 2.0 * (pull + 1j * GRAVITY)
+    assert found == pytest.approx((force.real, force.imag, 0.0), abs=1e-11)
+
+
+@pytest.mark.parametrize(
+    'motion', [(1.0, 0.0, 0.0), (0.4, 0.0, 20.0), (2.5, -6.0, 30.0), (-1.2, 12.0, -80.0)]
+)
+def test_those_of_a_four_bar_are_in_balance(motion):
+    within = context(FOUR_BAR)
+    _, _, forces = FourBar(FOUR_BAR, motion, GRAVITY).balance()
+    found = dict(zip(within.reactions.names, reactions(within, *motion), strict=True))
+    # By hand the force on the link that stands later in the file, as there.
+    assert set(found) == {'O2', 'A', 'B', 'O4'}
+    for name, force in zip(('O2', 'A', 'B', 'O4'), forces, strict=True):
+        expected = (float(force.real), float(force.imag), 0.0)
+        assert found[name] == pytest.approx(expected, rel=1e-10, abs=1e-12)
+
+
+def test_at_a_toggle_there_are_none_and_no_message():
+    within = context(linkage_of(SINGULAR))
+    motion = moved(within, (0.0, 1.0, 0.0), {'pin_forces': ()})
+    assert motion.position.status is Status.TOGGLE
+    assert motion.reactions == ()
+    reading = Reading(7, motion.position.joints, (), (), ())
+    assert pin_forces.writer(within)(9, motion, reading) == b''
+
+
+def test_where_the_balance_has_no_solution_there_are_none():
+    within = context(FOUR_BAR)
+    vars(within)['reactions'] = type('Singular', (), {'solve': lambda *_: None})()
+    assert moved(within, (1.0, 1.0, 1.0), {'pin_forces': ()}).reactions == ()
+
+
+def test_the_rest_of_the_motion_is_passed_on():
+    within = context(FOUR_BAR)
+    before = moved(within, (1.0, 2.0, 3.0), {'effort': ()})._replace(shift=(0.5, 0.5))
+    found = pin_forces.stage(pin_forces.PARAMETERS(), within)(before)
+    assert found == before._replace(reactions=found.reactions)
+    assert isinstance(found, Motion)
+    assert len(found.reactions) == 4
+
+
+def pipeline(effects, linkages=b'linkage: l.yaml'):
+    four_bar = (LINKAGES / 'four_bar.yaml').read_bytes()
+    scene = linkages + b'\ndrive: {constant_rate: {rate: 9, start: 1}}\neffects: ' + effects
+    names = ['one.yaml', 'two.yaml'] if linkages.startswith(b'linkages') else ['linkage.yaml']
+    files = {'scene.yaml': scene, **dict.fromkeys(names, four_bar)}
+    return Pipeline(parse_scene('scene', 'here', files))
+
+
+def test_they_are_published_beside_the_joint_states():
+    at_work = pipeline(b'{pin_forces: {}}\nloads: {gravity: [0, -9.81]}')
+    assert [(each.topic, each.message) for each in at_work.extras] == [('~/pin_forces', TYPE)]
+    begin = 1_700_000_000_000_000_000
+    for i in range(10):
+        now = begin + i * 10_000_000
+        tick = at_work.tick(now)
+        state = STORE.deserialize_cdr(tick.message, 'sensor_msgs/msg/JointState')
+        (extra,) = tick.extras
+        message = STORE.deserialize_cdr(extra, TYPE)
+        assert message.header == state.header
+        assert message.joint_names == list(context(FOUR_BAR).reactions.names)
+        assert len(message.transforms) == len(message.twist) == 0
+        expected = reactions(context(FOUR_BAR), 1.0 + 0.09 * i, 9.0, 0.0)
+        for wrench, one in zip(message.wrench, expected, strict=True):
+            found = wrench.force.x, wrench.force.y, wrench.torque.z
+            assert found == pytest.approx(one, rel=1e-9, abs=1e-12)
+            assert wrench.force.z == wrench.torque.x == wrench.torque.y == 0.0
+        # What they start from is computed, and not published.
+        assert len(state.velocity) == len(state.effort) == 0
+
+
+def test_of_several_linkages_each_has_its_topic_and_its_names():
+    both = pipeline(
+        b'{pin_forces: {}}', b'linkages: [{name: one, linkage: l}, {name: two, linkage: l}]'
+    )
+    assert [each.topic for each in both.extras] == ['~/one/pin_forces', '~/two/pin_forces']
+    for name, extra in zip(('one', 'two'), both.tick(10**9).extras, strict=True):
+        names = STORE.deserialize_cdr(extra, TYPE).joint_names
+        assert names == [f'{name}_{pin}' for pin in context(FOUR_BAR).reactions.names]
+
+
+@pytest.mark.parametrize('effects', [b'{}', b'{effort: {}}', b'{velocity: {}, acceleration: {}}'])
+def test_without_it_no_forces_are_computed(effects):
+    at_work = pipeline(effects)
+    at_work.tick(10**9)
+    assert all('reactions' not in vars(line.context) for line in at_work.lines)
+    assert '~/pin_forces' not in [each.topic for each in at_work.extras]
+
+
+def test_it_is_registered_behind_what_it_needs():
+    assert EFFECTS['pin_forces'] == pin_forces.__name__
+    assert NEEDS['pin_forces'] == ('velocity', 'acceleration')
+    order = list(EFFECTS)
+    assert all(order.index(need) < order.index('pin_forces') for need in NEEDS['pin_forces'])

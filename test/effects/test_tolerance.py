@@ -1,0 +1,253 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Tolerance: points lie elsewhere, by a seed or as given, and what does not close is refused."""
+
+from __future__ import annotations
+
+from cmath import phase, pi
+from itertools import pairwise
+from math import erf, hypot, sqrt
+from pathlib import Path
+from random import Random
+
+from linkage_ros.effects import tolerance
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.effects.tolerance import alter, ToleranceParameters
+from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.load import parse_scene
+from linkage_ros.scene.read import parts_of, read_parameters
+from linkage_ros.scene.yaml_file import parse_yaml
+import pytest
+
+GALLERY = sorted((Path(__file__).parents[2] / 'config' / 'linkages').glob('*.yaml'))
+
+
+def linkage(text):
+    return read_linkage(parse_yaml(text.encode(), 'linkage.yaml'))
+
+
+FOUR_BAR = linkage('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
+
+
+def made(parameters, seed='seed', drawn=FOUR_BAR):
+    return alter(parameters, drawn, Random(seed))
+
+
+def deviations(altered, drawn=FOUR_BAR):
+    """Return what each coordinate is off by, by link.point."""
+    return {
+        f'{link}.{point}': tuple(
+            a - b for a, b in zip(altered.links[link][point], place, strict=True)
+        )
+        for link, points in drawn.links.items()
+        for point, place in points.items()
+    }
+
+
+def read(text, drawn=FOUR_BAR):
+    return read_parameters(
+        parse_yaml(text.encode(), 'scene.yaml'), ToleranceParameters, parts_of(drawn)
+    )
+
+
+def test_the_same_seed_makes_the_same_linkage_and_another_one_another():
+    parameters = ToleranceParameters(1e-4)
+    assert made(parameters) == made(parameters)
+    assert made(parameters, 'other') != made(parameters)
+
+
+def test_every_point_deviates_those_of_the_ground_too():
+    assert all(dx and dy for dx, dy in deviations(made(ToleranceParameters(1e-4))).values())
+
+
+def test_nothing_else_than_the_points_changes():
+    altered = made(ToleranceParameters(1e-4))
+    for name in FOUR_BAR.__slots__:
+        assert (getattr(altered, name) == getattr(FOUR_BAR, name)) is (name != 'links')
+
+
+@pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
+def test_without_a_deviation_the_linkage_is_the_drawn_one(file):
+    drawn = read_linkage(parse_yaml(file.read_bytes(), file.name))
+    assert made(ToleranceParameters(), drawn=drawn) == drawn
+
+
+def test_what_is_drawn_is_normal_and_cut_off_at_three_standard_deviations():
+    sigma = 1e-5
+    values = sorted(
+        value / sigma
+        for seed in range(1000)
+        for pair in deviations(made(ToleranceParameters(sigma), str(seed))).values()
+        for value in pair
+    )
+    assert max(map(abs, values)) <= 3.0 + 1e-9
+    # Kolmogorov and Smirnov: beyond 1.95/√n in one of a thousand samples.
+    inside = erf(3.0 / sqrt(2.0))
+    n = len(values)
+    assert n == 16_000
+    distance = max(
+        abs(0.5 * (1.0 + erf(v / sqrt(2.0)) / inside) - (i + 0.5) / n)
+        for i, v in enumerate(values)
+    )
+    assert distance < 1.95 / sqrt(n)
+
+
+def test_a_length_deviates_by_the_root_of_two():
+    sigma = 1e-5
+    off = []
+    for seed in range(2000):
+        coupler = made(ToleranceParameters(sigma), str(seed)).links['coupler']
+        off.append(hypot(*(b - a for a, b in zip(*coupler.values(), strict=True))) - 0.12)
+    # Of the variance of a normal deviation, cut off at three, 0.97334 is left.
+    found = sum(value * value for value in off) / len(off) / (2.0 * 0.97334 * sigma**2)
+    # The variance of a variance is below 2/n here; four times its root.
+    assert found == pytest.approx(1.0, abs=4.0 * sqrt(2.0 / len(off)))
+
+
+def test_twice_the_deviation_is_the_same_mechanism_twice_as_badly_made():
+    one, two = (deviations(made(ToleranceParameters(s))) for s in (1e-4, 2e-4))
+    for point, pair in one.items():
+        assert two[point] == pytest.approx([2.0 * value for value in pair], abs=1e-16)
+
+
+def test_links_that_are_not_named_stay_and_those_that_are_draw_what_they_drew():
+    every = made(ToleranceParameters(1e-4))
+    some = made(ToleranceParameters(1e-4, links=('rocker', 'ground')))
+    for link in FOUR_BAR.links:
+        deviating = link in ('rocker', 'ground')
+        assert some.links[link] == (every if deviating else FOUR_BAR).links[link]
+
+
+def test_what_is_given_takes_the_place_of_what_is_drawn():
+    every = deviations(made(ToleranceParameters(1e-4)))
+    given = {'coupler.B': (1e-4, 0.0), 'ground.O4': (0.0, -2e-4)}
+    some = deviations(made(ToleranceParameters(1e-4, given=given)))
+    for point, pair in every.items():
+        assert some[point] == pytest.approx(given.get(point, pair), abs=1e-16)
+
+
+def test_given_lengths_are_those_of_a_linkage_written_so():
+    # The coupler 0.1 mm longer, the ground 0.2 mm shorter.
+    altered = made(ToleranceParameters(given={'coupler.B': (1e-4, 0), 'ground.O4': (-2e-4, 0)}))
+    written = linkage('four_bar: {a: 0.04, b: 0.1201, c: 0.08, d: 0.0998}')
+    for crank in (0.0, 1.0, 2.5, 4.0):
+        found, expected = (Closure(each).position(crank).joints for each in (altered, written))
+        assert found == pytest.approx(expected, abs=1e-13)
+
+
+def test_a_pin_beside_the_axis_of_its_link_turns_what_is_published():
+    # The rocker's frame stays that of the drawing: its pin lies 1 mm to the left of its axis.
+    altered = made(ToleranceParameters(given={'rocker.B': (0.0, 1e-3)}))
+    straight = linkage(f'four_bar: {{a: 0.04, b: 0.12, c: {hypot(0.08, 1e-3)!r}, d: 0.1}}')
+    coupler, rocker = Closure(altered).position(1.0).joints
+    expected_coupler, expected_rocker = Closure(straight).position(1.0).joints
+    assert coupler == pytest.approx(expected_coupler, abs=1e-13)
+    assert rocker == pytest.approx(expected_rocker - phase(0.08 + 1e-3j), abs=1e-13)
+
+
+@pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
+def test_a_linkage_of_the_gallery_closes_as_it_was_made(file):
+    drawn = read_linkage(parse_yaml(file.read_bytes(), file.name))
+    closure = Closure(made(ToleranceParameters(1e-6), drawn=drawn))
+    if len(drawn.inputs) > 1:
+        inputs = (1.5,) * len(drawn.inputs)
+    else:
+        widest = max(closure.input_ranges, key=lambda r: r.highest - r.lowest)
+        inputs = (widest.lowest + 0.4 * (widest.highest - widest.lowest),)
+    position = closure.position(*inputs)
+    assert position.joints
+    assert closure.residual(position) < 1e-12
+
+
+def test_a_parallelogram_as_it_was_made_is_none_any_more():
+    # A change point is a matter of exact lengths: the two assemblies no longer meet there.
+    drawn = linkage('four_bar: {a: 0.3, b: 1.6, c: 0.3, d: 1.6}')
+    follower = [Closure(drawn).position(pi * i / 50).joints[1] for i in range(101)]
+    assert all(b > a for a, b in pairwise(follower[:50]))
+    altered = Closure(made(ToleranceParameters(given={'coupler.B': (1e-3, 0.0)}), drawn=drawn))
+    gaps = [altered.position(pi * i / 1000).gap for i in range(2001)]
+    assert max(gaps) > 0.0
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'reason'),
+    [
+        (ToleranceParameters(given={'coupler.B': (0.2, 0.0)}), 'at no value of the input'),
+        (ToleranceParameters(given={'coupler.B': (-0.12, 0.0)}), r"links.coupler.B: lies on 'A'"),
+    ],
+)
+def test_what_does_not_close_any_more_is_refused(parameters, reason):
+    with pytest.raises(
+        DefinitionError,
+        match=f'^effects.tolerance: with its deviations the linkage does not close: {reason}; '
+        'let it deviate less, or by another seed$',
+    ):
+        made(parameters)
+
+
+def test_it_is_read_from_a_scene():
+    assert read('{}') == ToleranceParameters()
+    assert read(
+        '{standard_deviation: 2.0e-5, links: [ground, coupler], given: {coupler.B: [0.0001, 0]}}'
+    ) == ToleranceParameters(2e-5, ('ground', 'coupler'), {'coupler.B': (1e-4, 0.0)})
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('standard_deviation: -1', r'1: standard_deviation: -1 is out of bounds; .*at least 0'),
+        ('links: [couplr]', r"1: links: there is no body 'couplr'; did you mean 'coupler'\?"),
+        ('given: {coupler.C: [0, 0]}', r"1: given.coupler.C: there is no point 'coupler.C'; did"),
+        ('given: {coupler.B: 0.1}', r'1: given.coupler.B: 0.1 is not a point; write two finite'),
+        ('given: {coupler.B: [0, 2e9]}', r'1: given.coupler.B: \[0, 2000000000.0\] is out of'),
+        ('sigma: 1', r'1: sigma: unknown key; known: given, links, standard_deviation'),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(text, message):
+    with pytest.raises(FileError, match=message):
+        read(text)
+
+
+def published(scene):
+    files = {
+        'scene.yaml': b'linkage: l.yaml\ndrive: {constant_rate: {rate: 3}}\n' + scene.encode(),
+        'linkage.yaml': b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}',
+    }
+    pipeline = Pipeline(parse_scene('scene', 'here', files))
+    return [pipeline.tick(10**9 + i * 10**6).message for i in range(10)]
+
+
+def test_a_scene_draws_it_from_its_seed():
+    worn = 'effects: {tolerance: {standard_deviation: 1.0e-5}}'
+    assert published(f'seed: 1\n{worn}') == published(f'seed: 1\n{worn}')
+    assert published(f'seed: 1\n{worn}') != published(f'seed: 2\n{worn}')
+    assert published(f'seed: 1\n{worn}') != published('seed: 1')
+
+
+def test_a_scene_that_does_not_close_says_file_and_line():
+    with pytest.raises(
+        FileError, match=r'^here: scene.yaml:3: effects.tolerance: with its deviations the linkage'
+    ):
+        published('effects: {tolerance: {given: {coupler.B: [0.2, 0]}}}')
+
+
+def test_it_is_registered_before_all_that_move():
+    assert next(iter(EFFECTS)) == 'tolerance'
+    assert EFFECTS['tolerance'] == tolerance.__name__
+    assert tolerance.PARAMETERS is ToleranceParameters
