@@ -228,9 +228,10 @@ def test_it_tells_when_a_command_came_and_how_long_one_holds():
 
 def test_it_tells_what_time_was_lost():
     turned = wheel(rate=1.0)
-    for time in (0, 900, 1900, 2901, 7901):
-        turned.state(BEGIN + time * MS)
-    assert turned.lost == 1 * MS + 4000 * MS
+    for time in (0, 900, 1900, 2901.3, 7901.3):
+        turned.state(BEGIN + round(time * MS))
+    assert turned.lost == 2 * MS + 4001 * MS, 'whole steps, so that they go on at the same times'
+    assert turned.state(BEGIN + 7902 * MS).angles == pytest.approx((7.902 - 4.003,))
 
 
 def test_slow_ticks_lose_no_time():
