@@ -131,7 +131,7 @@ class JointStateReader:
         return self.read(data)
 
 
-def _arrays(data: bytes) -> tuple[str, list[bytes], list[tuple[int, int, int]]] | Rejection:
+def arrays_of(data: bytes) -> tuple[str, list[bytes], list[tuple[int, int, int]]] | Rejection:
     """
     Return byte order, names, and where the arrays of numbers stand.
 
@@ -169,7 +169,7 @@ def _arrays(data: bytes) -> tuple[str, list[bytes], list[tuple[int, int, int]]] 
 
 
 def _find(data: bytes, joints: Sequence[bytes]) -> _Layout | Rejection:
-    found = _arrays(data)
+    found = arrays_of(data)
     if isinstance(found, Rejection):
         return found
     order, names, arrays = found
@@ -284,7 +284,7 @@ class JointStateWriter:
 
 def head_of(data: bytes) -> tuple[set[bytes], int] | None:
     """Return the names in a message and where they end; nothing of a malformed one."""
-    found = _arrays(data)
+    found = arrays_of(data)
     if isinstance(found, Rejection):
         return None
     _, names, arrays = found
@@ -293,7 +293,7 @@ def head_of(data: bytes) -> tuple[set[bytes], int] | None:
 
 def with_every_number(data: bytes, value: float) -> bytes:
     """Return a message with every position, rate and effort replaced; a malformed one as it is."""
-    found = _arrays(data)
+    found = arrays_of(data)
     if isinstance(found, Rejection):
         return data
     order, _, arrays = found

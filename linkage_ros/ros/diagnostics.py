@@ -156,10 +156,17 @@ class Health:
             }
         values |= {
             'Joint states published': self.loop.counts.published,
+            **self._lost_time(),
             'Clock jumps back': self.loop.counts.clock_jumps,
             'Resets': self.loop.counts.resets,
         }
         return self._status('tick', level, message, values)
+
+    def _lost_time(self) -> dict[str, object]:
+        """Return the time that drives which integrate have left out, since they could not follow."""
+        drives = [line.drive for line in self.loop.pipeline.lines]
+        lost = [drive.lost for drive in drives if hasattr(drive, 'lost')]
+        return {'Time not integrated (s)': f'{sum(lost) / NANOSECONDS:.3f}'} if lost else {}
 
     def _crank(self) -> DiagnosticStatus:
         counts = self.loop.counts

@@ -1,0 +1,221 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Each method has the order that it says, measured as the slope of its error over its step."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from itertools import pairwise
+from math import log2, sin, sqrt
+
+from linkage_ros.dynamics.integrators import gauss_legendre, rk4
+from linkage_ros.dynamics.integrators.method import METHODS
+from linkage_ros.dynamics.loads import Loads
+from linkage_ros.dynamics.mechanics import Mechanics
+from linkage_ros.dynamics.motion import OneFreedom
+from linkage_ros.kinematics.closure import Closure
+import mpmath
+import numpy as np
+import pytest
+
+from .loaded import shipped
+
+STEP = {name: import_module(module).step for name, module in METHODS.items()}
+ORDER = {'semi_implicit_euler': 1, 'rk4': 4, 'gauss_legendre': 6}
+
+
+def slopes(errors):
+    """Return by which power of the step errors fall, each at half the step of the one before."""
+    return [log2(before / after) for before, after in pairwise(errors)]
+
+
+def test_the_methods_say_their_order():
+    assert {name: import_module(module).ORDER for name, module in METHODS.items()} == ORDER
+
+
+# A pendulum, θ̈ = −ω²·sin θ, let go at an angle: sin(θ/2) = k·cd(ω·t, k), with k = sin(θ₀/2).
+OMEGA = 3.0
+LET_GO = 2.0
+
+
+def weight(angle, _rate):
+    return -OMEGA * OMEGA * sin(angle)
+
+
+def swung(method, seconds, steps):
+    """Return the states of the pendulum at the end of each step."""
+    state, length = (LET_GO, 0.0), seconds / steps
+    states = [state]
+    for _ in range(steps):
+        state = STEP[method](weight, *state, weight(*state), length)
+        states.append(state)
+    return states
+
+
+def swung_exactly(seconds):
+    with mpmath.workdps(40):
+        k = mpmath.sin(mpmath.mpf(LET_GO) / 2)
+        u, m = OMEGA * mpmath.mpf(seconds), k * k
+        angle = 2 * mpmath.asin(k * mpmath.ellipfun('cd', u, m=m))
+        # d cd/du = −(1 − m)·sn/dn²
+        slope = -(1 - m) * mpmath.ellipfun('sn', u, m=m) / mpmath.ellipfun('dn', u, m=m) ** 2
+        return float(angle), float(2 * k * OMEGA * slope / mpmath.cos(angle / 2))
+
+
+STEPS = {
+    'semi_implicit_euler': (4000, 8000, 16000),
+    'rk4': (200, 400, 800),
+    'gauss_legendre': (40, 80, 160),
+}
+
+
+@pytest.mark.parametrize('method', METHODS)
+def test_a_pendulum_errs_by_the_order(method):
+    angle, rate = swung_exactly(2.5)
+    errors = []
+    for steps in STEPS[method]:
+        found_angle, found_rate = swung(method, 2.5, steps)[-1]
+        errors.append(max(abs(found_angle - angle), abs(found_rate - rate)))
+    assert slopes(errors) == pytest.approx([ORDER[method]] * 2, abs=0.15)
+    assert errors[-1] < {1: 1e-2, 4: 1e-6, 6: 1e-9}[ORDER[method]]
+
+
+@pytest.mark.parametrize('method', METHODS)
+def test_the_energy_of_a_pendulum_errs_by_the_order(method):
+    def energy(angle, rate):
+        return 0.5 * rate * rate + 2.0 * (OMEGA * sin(0.5 * angle)) ** 2
+
+    whole = energy(LET_GO, 0.0)
+    drifts = [
+        max(abs(energy(*state) / whole - 1.0) for state in swung(method, 2.5, steps))
+        for steps in STEPS[method]
+    ]
+    assert slopes(drifts) == pytest.approx([ORDER[method]] * 2, abs=0.3)
+
+
+@pytest.fixture(scope='module')
+def four_bar():
+    """Return the shipped four-bar under gravity."""
+    return Mechanics(Closure(shipped('four_bar')), Loads(gravity=(0.0, -9.81)))
+
+
+BEGIN = 0.5
+SPEED = 40.0
+
+
+def turned(loaded, method, seconds, steps):
+    """Return the states of a crank that turns freely, at the end of each step."""
+    position, terms = loaded.closure.position, loaded.terms
+    crank = OneFreedom(lambda angle: terms(position(angle)), STEP[method])
+    motion = crank.at(BEGIN, SPEED)
+    motions = [motion]
+    for _ in range(steps):
+        motion = crank.advance(motion, seconds / steps, 0.0)
+        motions.append(motion)
+    return motions
+
+
+def time_to(loaded, end):
+    """
+    Return when the crank comes to an angle, by the energy integral and not by steps.
+
+    t = ∫ √(I/(2·(E − V))) dq, by Gauss's rule on short pieces.
+    """
+    position = loaded.closure.position
+    whole = loaded.energy(position(BEGIN), SPEED)
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    edges = np.linspace(BEGIN, end, 60)
+    seconds = 0.0
+    for low, high in pairwise(edges):
+        half = 0.5 * (high - low)
+        for node, share in zip(nodes, weights, strict=True):
+            at = position(float(0.5 * (low + high) + half * node))
+            energy = whole - loaded.potential(at)
+            # At a rate of 1, twice the kinetic energy is the inertia.
+            inertia = 2.0 * (loaded.energy(at, 1.0) - loaded.potential(at))
+            seconds += half * share * sqrt(inertia / (2.0 * energy))
+    return seconds
+
+
+@pytest.mark.parametrize(
+    ('method', 'steps'),
+    [
+        ('semi_implicit_euler', (1000, 2000, 4000)),
+        ('rk4', (250, 500, 1000)),
+        ('gauss_legendre', (160, 320, 640)),
+    ],
+)
+def test_a_four_bar_errs_by_the_order(four_bar, method, steps):
+    seconds = 0.4
+    errors, drifts = [], []
+    energy = four_bar.energy(four_bar.closure.position(BEGIN), SPEED)
+    for n in steps:
+        motions = turned(four_bar, method, seconds, n)
+        errors.append(abs(time_to(four_bar, motions[-1].value) - seconds))
+        drifts.append(
+            max(
+                abs(four_bar.energy(four_bar.closure.position(m.value), m.rate) / energy - 1.0)
+                for m in motions
+            )
+        )
+    assert motions[-1].value > 7.0, 'more than a whole turn'
+    assert slopes(errors)[-1] == pytest.approx(ORDER[method], abs=0.5)
+    assert slopes(drifts)[-1] == pytest.approx(ORDER[method], abs=0.5)
+
+
+@pytest.mark.parametrize('steps', [2000, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_the_best_keeps_the_energy_of_an_undamped_linkage(four_bar, steps):
+    motions = turned(four_bar, 'gauss_legendre', steps * 5e-4, steps)
+    position = four_bar.closure.position
+    whole = four_bar.energy(position(BEGIN), SPEED)
+    drift = max(
+        abs(four_bar.energy(position(m.value), m.rate) / whole - 1.0) for m in motions[::7]
+    )
+    assert drift < 1e-9
+    assert motions[-1].value > steps * 5e-4 * 20.0, 'it has gone round all the time'
+
+
+def test_the_coefficients_of_gauss_integrate_polynomials():
+    # Collocation: Σ a_ij·c_jᵏ⁻¹ = c_iᵏ/k for k ≤ 3, Σ b_j·c_jᵏ⁻¹ = 1/k for k ≤ 6.
+    nodes, weights = gauss_legendre.NODES, gauss_legendre.WEIGHTS
+    for k in (1, 2, 3):
+        for c, row in zip(nodes, gauss_legendre.MATRIX, strict=True):
+            total = sum(a * d ** (k - 1) for a, d in zip(row, nodes, strict=True))
+            assert total == pytest.approx(c**k / k, abs=1e-16)
+    for k in range(1, 7):
+        total = sum(b * c ** (k - 1) for b, c in zip(weights, nodes, strict=True))
+        assert total == pytest.approx(1 / k, abs=1e-16)
+
+
+def test_gauss_goes_back_the_way_it_came():
+    there = gauss_legendre.step(weight, 1.0, 2.0, weight(1.0, 2.0), 0.05)
+    back = gauss_legendre.step(weight, *there, weight(*there), -0.05)
+    assert back == pytest.approx((1.0, 2.0), abs=1e-15)
+
+
+def test_gauss_does_not_answer_where_it_does_not_converge():
+    stiff = lambda value, _rate: -1e9 * value  # noqa: E731
+    assert gauss_legendre.step(stiff, 1.0, 0.0, -1e9, 1e-2) is None
+    assert gauss_legendre.step(stiff, 1.0, 0.0, -1e9, 1e-6) is not None
+
+
+@pytest.mark.parametrize('method', [rk4, gauss_legendre])
+def test_where_a_stage_has_no_motion_there_is_no_step(method):
+    def ends(value, _rate):
+        return 0.0 if value < 1.0 else None
+
+    assert method.step(ends, 0.0, 1.0, 0.0, 0.5) == pytest.approx((0.5, 1.0))
+    assert method.step(ends, 0.0, 1.0, 0.0, 1.5) is None
