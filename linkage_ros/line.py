@@ -178,7 +178,11 @@ class Line:
                 raise DefinitionError(
                     'faults', f'not_a_number spoils messages, and {drive} has none', 'leave it out'
                 )
-        sensors = _sensors(scene, self.closure, [*built('sensor'), *faulty])
+        sensing: list[Any] = built('sensor')
+        if 'delay' in modules:
+            *before, delay = sensing
+            sensing = [_delayed(before, delay)]
+        sensors = _sensors(scene, self.closure, [*sensing, *faulty])
         stages = built('stage')
         drive_stages = built('drive_stage')
         (begin,) = built('begin') or [_at_rest]
@@ -248,6 +252,21 @@ def _sensors(scene: Scene, closure: Closure, sensors: list[Sensor]) -> tuple[Sen
         wrapped = Wrapped(closure.turning)
         return (Continuous(closure.turning), *sensors, wrapped) if sensors else (wrapped,)
     return (Continuous(closure.turning), *sensors)
+
+
+def _delayed(sensors: list[Sensor], delay: Any) -> Sensor:
+    """Return the sensors with the delay behind them, which is told their silence too."""
+
+    def late(now: int, reading: Reading) -> Reading | None:
+        found: Reading | None = reading
+        for sensor in sensors:
+            if found is None:
+                break
+            found = sensor(now, found)
+        arrived: Reading | None = delay(now, found)
+        return arrived
+
+    return late
 
 
 def _plain_look(

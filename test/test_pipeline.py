@@ -319,3 +319,14 @@ def test_a_linkage_of_the_gallery_moves_as_its_rates_and_accelerations_say(file)
     ):
         slope = (after.velocities - before.velocities) / (2 * step)
         assert point.accelerations == pytest.approx(slope, rel=1e-4, abs=1e-4)
+
+
+def test_a_delay_delays_the_silence_of_slow_and_lossy_sensors_too():
+    # Samples at 0, 10 and 20 ms; each arrives with the first tick that is 2.5 ms later.
+    slow = pipeline(
+        b'drive: {constant_rate: {rate: 1.0}}\n'
+        b'effects: {rate_limit: {rate: 100, hold: silent}, '
+        b'delay: {seconds: 0.0025, between: sampled}}'
+    )
+    heard = [time for time in range(30) if slow.tick(BEGIN + time * MS).message]
+    assert heard == [3, 13, 23]

@@ -1,0 +1,63 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Bias: a sensor's zero lies beside that of the joint.
+
+What is read of a joint is off by a constant (instrumental bias: JCGM 200:2012, International
+vocabulary of metrology, 4.20)::
+
+    y = x + b
+
+Rates, accelerations and efforts have none: they are derivatives of y, and other sensors' values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from operator import add
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.parameters import each, Number
+from linkage_ros.tuples import new
+
+
+@dataclass(frozen=True, slots=True)
+class BiasParameters:
+    """What is read of a joint is off by a constant."""
+
+    joints: Mapping[str, float] = each(
+        'what is added to the position of a joint',
+        'joint',
+        Number('added to the position', 'rad or m', -1e6, 1e6),
+        required=True,
+    )
+
+
+PARAMETERS = BiasParameters
+
+
+def sensor(parameters: BiasParameters, context: Context) -> Sensor:
+    """Build the sensor."""
+    biases = tuple(parameters.joints.get(joint, 0.0) for joint in context.joints)
+
+    def bias(_now: int, reading: Reading) -> Reading:
+        stamp, joints, rates, accelerations, efforts = reading
+        joints = tuple(map(add, joints, biases))
+        return new(Reading, (stamp, joints, rates, accelerations, efforts))
+
+    return bias

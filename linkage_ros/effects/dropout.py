@@ -1,0 +1,143 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Dropout: samples are lost, one by one or in bursts.
+
+The line is a Markov chain of two states: in the good one every sample arrives, in the bad one none
+does (E. N. Gilbert, Capacity of a burst-noise channel, Bell System Technical Journal 39, 1960;
+with a chance of loss in either: E. O. Elliott, Estimates of error rates for codes on burst-noise
+channels, ibid. 42, 1963). From one sample to the next it goes with the chances::
+
+    good → bad    p = L/(B·(1 − L))
+    bad → good    r = 1/B
+
+Then a stay in the bad state has the mean of B samples, ``burst``, and a part p/(p + r) = L of
+all samples is lost, ``probability``. Between two bursts at least one sample arrives: p ≤ 1, so B
+is at least L/(1 − L). Losses are independent of each other where p = 1 − r = L, at B = 1/(1 − L);
+that is what ``burst: 0`` stands for. The first state is drawn with the chance L, so that all
+samples are alike.
+
+One draw is made for each sample, whatever becomes of it. A sample is what a tick has to publish:
+what a slower sensor repeats is lost or not each time; where it is silent there is none to lose.
+
+``hold: silent`` publishes nothing in the place of a lost sample; ``repeat`` the last one that
+arrived, with the stamp of the tick, and nothing before the first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from random import Random
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Reading
+from linkage_ros.errors import DefinitionError
+from linkage_ros.parameters import choice, number
+from linkage_ros.tuples import new
+
+
+@dataclass(frozen=True, slots=True)
+class DropoutParameters:
+    """Samples are lost, one by one or in bursts."""
+
+    probability: float = number('part of all samples that is lost', least=0.0, most=1.0)
+    burst: float = number(
+        'mean length of a burst, 1 or more; 0: each is lost independently',
+        0.0,
+        unit='samples',
+        least=0.0,
+        most=1e9,
+    )
+    hold: str = choice(
+        'in the place of a lost sample: be silent, or repeat the last one that arrived',
+        ('silent', 'repeat'),
+        'silent',
+    )
+
+
+PARAMETERS = DropoutParameters
+
+
+def sensor(parameters: DropoutParameters, context: Context) -> Dropout:
+    """
+    Build the sensor.
+
+    Raises
+    ------
+    DefinitionError
+        Where so much cannot be lost in bursts so short.
+
+    """
+    return Dropout(parameters, context.random('dropout'))
+
+
+def _chances(loss: float, burst: float) -> tuple[float, float]:
+    """Return the chance that a sample is lost after one that was not, and after one that was."""
+    if burst == 0.0:
+        return loss, loss
+    if burst < 1.0:
+        raise DefinitionError(
+            'effects.dropout.burst',
+            f'{burst:g} is less than a sample',
+            'write 1 or more [samples], or 0 for losses that are independent',
+        )
+    if loss > burst * (1.0 - loss):
+        remedy = 'write 0'
+        if loss < 1.0:
+            remedy = f'write {loss / (1.0 - loss):.6g} or more [samples], or a lower probability'
+        raise DefinitionError(
+            'effects.dropout.burst',
+            f'with a mean of {burst:g} no {loss:g} of all samples can be lost, since between two '
+            'bursts one arrives',
+            remedy,
+        )
+    return loss / (burst * (1.0 - loss)), 1.0 - 1.0 / burst
+
+
+class Dropout:
+    """
+    A line that loses samples.
+
+    Parameters
+    ----------
+    use
+        What it does.
+    random
+        What decides.
+
+    """
+
+    __slots__ = ('_begins', '_chance', '_goes_on', '_last', '_random', '_repeat')
+
+    def __init__(self, use: DropoutParameters, random: Random) -> None:
+        self._begins, self._goes_on = _chances(use.probability, use.burst)
+        self._chance = use.probability
+        self._repeat = use.hold == 'repeat'
+        self._random = random.random
+        self._last: Reading | None = None
+
+    def __call__(self, _now: int, reading: Reading) -> Reading | None:
+        """Return what arrives; None where nothing does."""
+        if self._random() >= self._chance:
+            self._chance = self._begins
+            self._last = reading
+            return reading
+        self._chance = self._goes_on
+        last = self._last
+        if last is None or not self._repeat:
+            return None
+        _, joints, rates, accelerations, efforts = last
+        return new(Reading, (reading[0], joints, rates, accelerations, efforts))

@@ -1,0 +1,198 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Encoder: a joint is read in whole counts.
+
+With n ``counts`` a turn (a metre, for a slide), θ₀ the ``offset`` at which count 0 begins, and
+q = 2π/n the resolution (1/n for a slide)::
+
+    k = ⌊(θ − θ₀)/q⌋        y = θ₀ + k·q
+
+so that y ≤ θ < y + q: a reading is half a count low in the mean, and off from that by up to half a
+count (P. R. Bélanger, Estimation of angular velocity and acceleration from shaft encoder
+measurements, ICRA 1992). k is a whole number of any size and k·q is worked out anew each time: no
+error adds up over turns.
+
+``incremental``: the encoder counts from where it was switched on, at the first tick, and reads
+y = (k − k₀)·q, until it passes its index mark: that lies where count 0 begins, on every turn. From
+then on it knows k. A mark is passed where it lies between the counts of two ticks; where it is
+passed to and fro between them it is as if the joint had stayed. On a slide there is one mark, at
+θ₀. Without ``index`` it never learns.
+
+``rates: differenced`` are what a driver makes of the counts, (k − k_last)·q/Δt, with Δt the time
+since the last tick: 0 at the first tick, and as they were where no time has passed. They are whole
+multiples of q/Δt (R. H. Brown, S. C. Schneider and M. G. Mulligan, Analysis of algorithms for
+velocity estimation from discrete position versus time data, IEEE Transactions on Industrial
+Electronics 39, 1992). The step of y at the index mark is no motion, and not in them. ``exact``
+leaves the rates as they come. Where none come none are made. Accelerations and efforts, and joints
+without an encoder, pass as they come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import floor, tau
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.errors import DefinitionError
+from linkage_ros.parameters import choice, each, flag, number, whole
+from linkage_ros.tuples import new
+
+
+@dataclass(frozen=True, slots=True)
+class JointEncoder:
+    """The encoder of a joint."""
+
+    counts: int = whole(
+        'counts in a turn, or in a metre of a slide', unit='1/turn or 1/m', least=1, most=2**32
+    )
+    offset: float = number('where count 0 begins', 0.0, unit='rad or m', least=-1e6, most=1e6)
+    incremental: bool = flag(
+        'counts from where it is switched on, until it passes its index mark', False
+    )
+    index: bool = flag('has an index mark, where count 0 begins', True)
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderParameters:
+    """Joints are read in whole counts."""
+
+    joints: Mapping[str, JointEncoder] = each(
+        'encoder of a joint', 'joint', JointEncoder, required=True
+    )
+    rates: str = choice(
+        'rates of these joints: differences of their counts over the time of a tick, or exact',
+        ('differenced', 'exact'),
+        'differenced',
+    )
+
+
+PARAMETERS = EncoderParameters
+
+
+def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
+    """
+    Build the sensor.
+
+    Raises
+    ------
+    DefinitionError
+        Where an absolute encoder is said to have no index mark.
+
+    """
+    counters = []
+    for place, (joint, turns) in enumerate(
+        zip(context.joints, context.closure.turning, strict=True)
+    ):
+        encoder = parameters.joints.get(joint)
+        if encoder is None:
+            continue
+        if not (encoder.index or encoder.incremental):
+            raise DefinitionError(
+                f'effects.encoder.joints.{joint}.index',
+                'an absolute encoder needs no mark',
+                'leave it out, or write incremental: true',
+            )
+        counters.append((place, Counter(encoder, turns)))
+    return Encoder(tuple(counters), parameters.rates == 'differenced')
+
+
+class Counter:
+    """
+    Counts of one joint.
+
+    Parameters
+    ----------
+    encoder
+        What it is.
+    turns
+        Whether the joint is an angle.
+
+    """
+
+    __slots__ = ('_begin', '_counts', '_encoder', '_last', '_span', '_turns', 'rate')
+
+    rate: float
+    """What a driver makes of the counts, in [rad/s] or [m/s]."""
+
+    def __init__(self, encoder: JointEncoder, turns: bool) -> None:
+        self._encoder = encoder
+        self._turns = turns
+        # The counts and what they span: (k*tau)/n is closer than k times a rounded resolution.
+        self._counts, self._span = encoder.counts, tau if turns else 1.0
+        self._last: int | None = None
+        self._begin: int | None = None
+        self.rate = 0.0
+
+    def read(self, value: float, elapsed: int) -> float:
+        """Return what is read of a value, in [rad] or [m], so many [ns] after the last."""
+        encoder, counts, span, last = self._encoder, self._counts, self._span, self._last
+        count = floor((value - encoder.offset) * counts / span)
+        if last is None:
+            self._begin = count if encoder.incremental else None
+        else:
+            if elapsed > 0:
+                self.rate = (count - last) * span / (counts * elapsed * 1e-9)
+            if self._begin is not None and encoder.index and self._passes(last, count):
+                self._begin = None
+        self._last = count
+        if self._begin is not None:
+            return (count - self._begin) * span / counts
+        return encoder.offset + count * span / counts
+
+    def _passes(self, last: int, count: int) -> bool:
+        """Whether an index mark lies between two counts."""
+        if self._turns:
+            return last // self._counts != count // self._counts
+        return (last < 0) != (count < 0)
+
+
+class Encoder:
+    """
+    The encoders of a linkage.
+
+    Parameters
+    ----------
+    counters
+        The place of each joint that has one, and its counter.
+    differenced
+        Whether the rates are made of the counts.
+
+    """
+
+    __slots__ = ('_counters', '_differenced', '_last')
+
+    def __init__(self, counters: tuple[tuple[int, Counter], ...], differenced: bool) -> None:
+        self._counters = counters
+        self._differenced = differenced
+        self._last = 0
+
+    def __call__(self, now: int, reading: Reading) -> Reading:
+        """Return what is read."""
+        stamp, joints, rates, accelerations, efforts = reading
+        elapsed = now - self._last
+        self._last = now
+        values = list(joints)
+        for place, counter in self._counters:
+            values[place] = counter.read(values[place], elapsed)
+        if rates and self._differenced:
+            speeds = list(rates)
+            for place, counter in self._counters:
+                speeds[place] = counter.rate
+            rates = tuple(speeds)
+        return new(Reading, (stamp, tuple(values), rates, accelerations, efforts))

@@ -1,0 +1,148 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What a sensor has read lately: the memory of a delay line, and of a sensor that looks late.
+
+Between two readings a value x with the rate v is the cubic that has both ends' values and rates
+(Hermite's; C. de Boor, A Practical Guide to Splines, 1978, ch. IV). With s from 0 to 1 over the
+interval h, and Δ = x₁ − x₀::
+
+    x(s) = x₀ + s·Δ + s·(1 − s)·((1 − s)·(h·v₀ − Δ) − s·(h·v₁ − Δ))
+
+Its error is at most h⁴/384 times the largest fourth derivative. Where a reading has no rates it is
+the straight line x₀ + s·Δ, with an error of h²/8 times the largest second derivative. So are the
+rates, accelerations and efforts themselves; those that one of the two does not have are left out.
+
+At a tick next to a toggle a rate may be any number, and the cubic would leave the mechanism. For
+a motion that the readings resolve, c = h·v₀ + h·v₁ − 2Δ, which is h³/6 times the third derivative,
+is small beside the change of the rates or the way itself. Where 2·|c| > |h·v₁ − h·v₀| + |Δ| the
+rates do not fit the values, and the line is taken.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import deque
+
+from linkage_ros.effects.stage import Reading
+from linkage_ros.tuples import new
+
+_Values = tuple[float, ...]
+
+
+class History:
+    """
+    Readings, as many as reach back over a span; older ones are forgotten.
+
+    Parameters
+    ----------
+    span
+        How far back it has to reach, in [ns].
+
+    """
+
+    __slots__ = ('_readings', '_span', '_times')
+
+    def __init__(self, span: int) -> None:
+        self._span = span
+        self._times: deque[int] = deque()
+        self._readings: deque[Reading | None] = deque()
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    @property
+    def begin(self) -> int:
+        """Earliest time that is remembered, in [ns]."""
+        return self._times[0]
+
+    def add(self, now: int, reading: Reading | None) -> None:
+        """
+        Remember a reading.
+
+        Parameters
+        ----------
+        now
+            The time of its tick, in [ns]; none is before the last. Of readings at one time the
+            last one counts.
+        reading
+            The reading; None for silence, which is remembered as well.
+
+        """
+        times, readings = self._times, self._readings
+        if times and times[-1] == now:
+            if reading is not None:
+                readings[-1] = reading
+            return
+        times.append(now)
+        readings.append(reading)
+        oldest = now - self._span
+        while len(times) > 1 and times[1] <= oldest:
+            times.popleft()
+            readings.popleft()
+
+    def newest(self, time: int) -> Reading | None:
+        """Return the newest reading that is not after a time, in [ns]; None for silence."""
+        at = bisect_right(self._times, time)
+        return self._readings[at - 1] if at else None
+
+    def between(self, time: int) -> Reading | None:
+        """
+        Return what was read at a time, in [ns], and bears it as its stamp.
+
+        Where nothing was read since, or before it, there is nothing to mix with: then it is the
+        newest reading that is not after the time, with its own stamp; None for silence.
+        """
+        at = bisect_right(self._times, time)
+        if not at:
+            return None
+        before, begin = self._readings[at - 1], self._times[at - 1]
+        if before is None or begin == time or at == len(self._times):
+            return before
+        after = self._readings[at]
+        return before if after is None else _mixed(time, begin, before, self._times[at], after)
+
+
+def _mixed(time: int, begin: int, before: Reading, end: int, after: Reading) -> Reading:
+    """Return the reading at a time between two, all times in [ns]."""
+    s = (time - begin) / (end - begin)
+    _, x0, v0, a0, e0 = before
+    _, x1, v1, a1, e1 = after
+    if v0 and v1:
+        h = (end - begin) * 1e-9
+        joints = tuple(
+            [_cubic(s, p, q, h * v, h * w) for p, q, v, w in zip(x0, x1, v0, v1, strict=True)]
+        )
+    else:
+        joints = _line(s, x0, x1)
+    return new(Reading, (time, joints, _line(s, v0, v1), _line(s, a0, a1), _line(s, e0, e1)))
+
+
+def _cubic(s: float, x0: float, x1: float, way0: float, way1: float) -> float:
+    """Return the value at s; the ways are what the rates at both ends make in the interval."""
+    step = x1 - x0
+    more0, more1 = way0 - step, way1 - step
+    line = x0 + s * step
+    if 2.0 * abs(more0 + more1) > abs(way1 - way0) + abs(step):
+        return line
+    r = 1.0 - s
+    return line + s * r * (r * more0 - s * more1)
+
+
+def _line(s: float, first: _Values, last: _Values) -> _Values:
+    if not first or not last:
+        return ()
+    return tuple([a + s * (b - a) for a, b in zip(first, last, strict=True)])

@@ -1,0 +1,98 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Rate limit: the sensor is slower than the ticks, and samples at a rate of its own.
+
+Counted from the first tick t₀, its k-th sample is due at::
+
+    t_k = t₀ + ⌊k·10⁹/f + ½⌋ ns
+
+in whole numbers, f being the very fraction that the double is: nothing drifts, in however long. A
+sample is what is read at the first tick at or after t_k: it is not interpolated to t_k, so that
+the counts of an encoder stay whole. It is held until the next one (a zero-order hold; K. J. Åström
+and B. Wittenmark, Computer-Controlled Systems, 3rd ed., 1997).
+
+``hold: repeat`` publishes at every tick what is held, rates, accelerations and efforts too, with
+the stamp of the tick, as a driver does that polls its sensor. ``silent`` publishes a sample once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.parameters import choice, number
+from linkage_ros.tuples import new
+
+
+@dataclass(frozen=True, slots=True)
+class RateLimitParameters:
+    """The sensor's own, slower rate: sample and hold."""
+
+    rate: float = number('samples a second', unit='Hz', least=0.001, most=20_000.0)
+    hold: str = choice(
+        'between two samples: repeat the last one at every tick, or be silent',
+        ('repeat', 'silent'),
+        'repeat',
+    )
+
+
+PARAMETERS = RateLimitParameters
+
+
+def sensor(parameters: RateLimitParameters, _context: Context) -> Sensor:
+    """Build the sensor."""
+    return RateLimit(parameters)
+
+
+class RateLimit:
+    """
+    Sample and hold.
+
+    Parameters
+    ----------
+    use
+        What it does.
+
+    """
+
+    __slots__ = ('_begin', '_due', '_held', '_per', '_repeat', '_unit')
+
+    def __init__(self, use: RateLimitParameters) -> None:
+        # f = numerator/denominator, and the k-th sample is due after ⌊(k·per + unit)/(2·unit)⌋ ns.
+        self._unit, denominator = use.rate.as_integer_ratio()
+        self._per = 2_000_000_000 * denominator
+        self._repeat = use.hold == 'repeat'
+        self._held: Reading | None = None
+        self._begin = self._due = 0
+
+    def __call__(self, now: int, reading: Reading) -> Reading | None:
+        """Return what is held; None where that is not repeated."""
+        held = self._held
+        if held is None:
+            self._begin = now
+        elif now < self._due:
+            if not self._repeat:
+                return None
+            _, joints, rates, accelerations, efforts = held
+            return new(Reading, (reading[0], joints, rates, accelerations, efforts))
+        unit, per = self._unit, self._per
+        elapsed = now - self._begin
+        following = ((2 * elapsed + 1) * unit - 1) // per + 1
+        self._due = self._begin + (following * per + unit) // (2 * unit)
+        self._held = reading
+        return reading

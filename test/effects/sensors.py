@@ -1,0 +1,86 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What the tests of the sensors share: two linkages, readings by hand, scenes, and statistics."""
+
+from __future__ import annotations
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Reading
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.load import parse_scene
+from linkage_ros.scene.read import parts_of, read_parameters
+from linkage_ros.scene.yaml_file import parse_yaml
+from mpmath import gammainc
+
+MS = 1_000_000
+BEGIN = 1_700_000_000_000_000_000
+
+FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
+SLIDER_CRANK = b'inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}'
+
+
+def closure(text):
+    return Closure(read_linkage(parse_yaml(text, 'linkage.yaml')))
+
+
+ANGLES = closure(FOUR_BAR)
+"""Publishes coupler_joint and rocker_joint, both angles."""
+SLIDE = closure(SLIDER_CRANK)
+"""Publishes rod_joint, an angle, and rod_slide, a slide."""
+
+
+def context(loop=ANGLES, seed='seed'):
+    return Context(loop, 1000.0, True, seed, None, None)
+
+
+def reading(now, *joints, rates=(), accelerations=(), efforts=()):
+    return Reading(now, joints, rates, accelerations, efforts)
+
+
+def written(effect, text):
+    """Return an effect's parameters as a scene writes them."""
+    content = parse_yaml(text.encode(), 'scene.yaml')
+    return read_parameters(content, effect.PARAMETERS, parts_of(ANGLES.linkage))
+
+
+def published(effects, ticks=100, seed=0, rate=10.0):
+    """Return what is read in a four-bar's scene, at each ms; the crank turns, in [rad/s]."""
+    scene = f'linkage: linkage.yaml\nseed: {seed}\neffects: {{velocity: {{}}, {effects}}}'
+    files = {'scene.yaml': scene.encode(), 'linkage.yaml': FOUR_BAR}
+    pipeline = Pipeline(parse_scene('test', 'test', files))
+    crank = JointStateWriter(['crank_joint']).write(BEGIN, [0.5], [rate], [])
+    assert pipeline.offer(crank, BEGIN) is None
+    return [pipeline.tick(BEGIN + i * MS).looks[0].reading for i in range(ticks)]
+
+
+def chi_square(total, n):
+    """Return the chance that n squares of standard normal numbers have a sum below a total."""
+    return float(gammainc(n / 2, 0, total / 2, regularized=True))
+
+
+UNLIKELY = 1e-4
+"""
+Chance, on either side, beyond which a statistic is not what it should be: of true claims one in
+5000 fails with the seed that was written down first, and then every time.
+"""
+
+
+def likely(total, n):
+    """Whether a sum of n squares of what should be standard normal numbers is as it should be."""
+    return UNLIKELY < chi_square(total, n) < 1.0 - UNLIKELY

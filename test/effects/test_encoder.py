@@ -1,0 +1,276 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Encoder: whole counts, however many turns; what it knows before its index mark; its rates."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import floor, isclose, pi, tau, ulp
+
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from linkage_ros.effects import encoder
+from linkage_ros.effects.encoder import EncoderParameters, JointEncoder
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.errors import DefinitionError, FileError
+import pytest
+
+from .sensors import ANGLES, BEGIN, context, MS, published, reading, SLIDE, written
+
+EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')
+
+
+def angle_encoder(rates='differenced', **parameters):
+    """Return the encoder of rocker_joint, the second of two angles."""
+    joints = {'rocker_joint': JointEncoder(**parameters)}
+    return encoder.sensor(EncoderParameters(joints, rates), context(ANGLES))
+
+
+def slide_encoder(**parameters):
+    joints = {'rod_slide': JointEncoder(**parameters)}
+    return encoder.sensor(EncoderParameters(joints), context(SLIDE))
+
+
+def read(sensor, values, period=MS):
+    """Return what is read of values, one for each tick."""
+    times = [BEGIN + i * period for i in range(len(values))]
+    return [
+        sensor(now, reading(now, 0.125, value)).joints[1]
+        for now, value in zip(times, values, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ('offset', 'angle', 'expected'),
+    [
+        # A quarter of a turn is a count, and is read where it begins.
+        (0.0, 0.0, 0.0),
+        (0.0, 1.57, 0.0),
+        (0.0, 1.58, pi / 2),
+        (0.0, 3.13, pi / 2),
+        (0.0, -1e-9, -pi / 2),
+        (0.0, -1.58, -pi),
+        (0.0, 6.29, tau),
+        (0.0, 100.0, 63 * pi / 2),
+        # Count 0 begins at the offset.
+        (0.5, 0.5, 0.5),
+        (0.5, 0.4, 0.5 - pi / 2),
+        (0.5, 2.0, 0.5),
+        (0.5, 2.1, 0.5 + pi / 2),
+        (-7.0, -6.9, -7.0),
+    ],
+)
+def test_four_counts_a_turn(offset, angle, expected):
+    assert read(angle_encoder(counts=4, offset=offset), [angle]) == pytest.approx([expected])
+
+
+@pytest.mark.parametrize(
+    ('slide', 'expected'), [(0.0, 0.0), (0.0124, 0.012), (-0.0001, -0.001), (0.9999, 0.999)]
+)
+def test_a_thousand_counts_a_metre(slide, expected):
+    assert read(slide_encoder(counts=1000), [slide]) == pytest.approx([expected], abs=1e-15)
+
+
+counts = st.one_of(st.integers(1, 2**32), st.sampled_from([1, 1000, 4096, 2**23, 2**32]))
+
+
+@given(counts, st.floats(-10.0, 10.0), st.floats(-1e4, 1e4))
+def test_what_is_read_is_a_whole_count_and_less_than_one_below_the_angle(n, offset, angle):
+    (found,) = read(angle_encoder(counts=n, offset=offset), [angle])
+    resolution = EXACT_TAU / n
+    rounding = 4 * Fraction(ulp(abs(angle) + abs(offset) + tau / n))
+    below = Fraction(angle) - Fraction(found)
+    assert -rounding <= below < resolution + rounding
+    count = (Fraction(found) - Fraction(offset)) / resolution
+    assert abs(count - round(count)) * resolution <= rounding
+
+
+def test_it_is_half_a_count_low_and_a_twelfth_of_a_square_uncertain():
+    # Over a sweep every place within a count is as frequent as any other: mean and variance of a
+    # uniform number.
+    n, sweep = 100, [0.7 + i * tau / 99_991 for i in range(99_991)]
+    errors = [y - x for y, x in zip(read(angle_encoder(counts=n), sweep), sweep, strict=True)]
+    mean = sum(errors) / len(errors)
+    variance = sum((error - mean) ** 2 for error in errors) / len(errors)
+    assert mean == pytest.approx(-tau / n / 2, rel=1e-3)
+    assert variance == pytest.approx((tau / n) ** 2 / 12, rel=1e-3)
+
+
+@given(st.integers(-(10**6), 10**6), st.floats(0.0, tau), counts)
+def test_over_a_million_turns_no_error_adds_up(turns, rest, n):
+    angle = turns * tau + rest
+    exact = Fraction(angle) / EXACT_TAU * n
+    # Where the angle's own last digit makes the count, either is right.
+    assume(abs(exact - round(exact)) * EXACT_TAU / n > 4 * Fraction(ulp(angle)))
+    (found,) = read(angle_encoder(counts=n), [angle])
+    assert abs(Fraction(found) - floor(exact) * EXACT_TAU / n) <= 3 * Fraction(ulp(angle))
+
+
+def test_after_a_million_turns_it_reads_what_it_read_before():
+    sensor = angle_encoder(counts=5000, incremental=True)
+    out_and_back = [0.3, 0.9, *(0.9 + 3.0 * i for i in range(100_000)), 1e6 * tau, 0.9, 0.3]
+    found = read(sensor, out_and_back)
+    absolute = read(angle_encoder(counts=5000), out_and_back)
+    # The index mark was passed on the way.
+    assert found[-2:] == absolute[-2:] == absolute[1::-1]
+
+
+# A turn has 8 counts, of an eighth of a turn each; angles in eighths of a turn.
+INCREMENTAL = [
+    pytest.param({}, [2.5, 3.5, 7.5, 8.5, 9.5, 2.5], [0, 1, 5, 8, 9, 2], id='upwards'),
+    pytest.param({}, [2.5, 0.5, -0.5, -1.5, 2.5], [0, -2, -1, -2, 2], id='downwards'),
+    pytest.param({}, [2.5, 1.5, 7.5, 0.5, 6.5], [0, -1, 5, -2, 4], id='never at the mark'),
+    pytest.param({}, [8.0, 9.5, 8.5, 7.5, 8.5], [0, 1, 0, 7, 8], id='begins at the mark'),
+    pytest.param({}, [2.5, 6.5, 10.5], [0, 4, 10], id='passed between two ticks'),
+    pytest.param({}, [-3.5, -0.5, 0.5], [0, 3, 0], id='from below zero'),
+    pytest.param({}, [50.5, 52.5, 60.5], [0, 2, 60], id='some turns away'),
+    pytest.param(
+        {'index': False}, [2.5, 7.5, 8.5, 17.5, -3.5], [0, 5, 6, 15, -6], id='without a mark'
+    ),
+]
+
+
+@pytest.mark.parametrize(('parameters', 'eighths', 'expected'), INCREMENTAL)
+def test_until_its_index_mark_an_incremental_encoder_knows_the_way_only(
+    parameters, eighths, expected
+):
+    sensor = angle_encoder(counts=8, incremental=True, **parameters)
+    found = read(sensor, [eighth * tau / 8 for eighth in eighths])
+    assert found == pytest.approx([eighth * tau / 8 for eighth in expected], abs=1e-12)
+
+
+def test_the_index_mark_lies_at_the_offset():
+    sensor = angle_encoder(counts=8, incremental=True, offset=0.5)
+    found = read(sensor, [0.5 + eighth * tau / 8 for eighth in (2.5, 7.5, 8.5)])
+    assert found == pytest.approx([0.0, 5 * tau / 8, 0.5 + tau], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('slides', 'expected'),
+    [
+        pytest.param([0.145, 0.155, 0.205, 0.215], [0.0, 0.01, 0.2, 0.21], id='outwards'),
+        pytest.param([0.245, 0.255, 0.195, 0.255], [0.0, 0.01, 0.19, 0.25], id='inwards'),
+        pytest.param([0.245, 1.245, 5.245], [0.0, 1.0, 5.0], id='metres are no turns'),
+    ],
+)
+def test_on_a_slide_there_is_one_mark(slides, expected):
+    sensor = slide_encoder(counts=100, incremental=True, offset=0.2)
+    assert read(sensor, slides) == pytest.approx(expected, abs=1e-12)
+
+
+def speeds(sensor, angles, times):
+    return [
+        sensor(now, reading(now, 0.125, angle, rates=(7.0, 9.0))).rates
+        for now, angle in zip(times, angles, strict=True)
+    ]
+
+
+def test_rates_are_differences_of_counts_over_the_time_between():
+    # Of 1000 counts a turn; angles in counts, times in ms.
+    q = tau / 1000
+    ticks = [(0, 10.5), (1, 10.9), (2, 11.1), (4, 15.5), (4, 16.5), (5, 17.5), (6, 14.5)]
+    sensor = angle_encoder(counts=1000)
+    found = speeds(sensor, [c * q for _, c in ticks], [BEGIN + ms * MS for ms, _ in ticks])
+    assert [first for first, _ in found] == [7.0] * 7
+    # In no time nothing can be said of the rate: it stays.
+    expected = [0.0, 0.0, 1000.0, 2000.0, 2000.0, 1000.0, -3000.0]
+    assert [rate for _, rate in found] == pytest.approx([counts * q for counts in expected])
+
+
+@given(st.floats(-200.0, 200.0), st.floats(0.0, 6.0), st.integers(2, 10_000))
+def test_the_mean_of_the_rates_is_the_rate(rate, begin, n):
+    sensor = angle_encoder(counts=n)
+    times = [BEGIN + i * MS for i in range(200)]
+    found = speeds(sensor, [begin + rate * 1e-3 * i for i in range(200)], times)
+    resolution = tau / n
+    for _, each in found:
+        assert isclose(each / (resolution * 1000), round(each / (resolution * 1000)), abs_tol=1e-6)
+        assert abs(each - rate) < resolution * 1000 * (1 + 1e-9) or each == 0.0
+    mean = sum(each for _, each in found[1:]) / 199
+    assert abs(mean - rate) <= resolution / 0.199 * (1 + 1e-9)
+
+
+def test_the_step_at_the_index_mark_is_no_motion():
+    sensor = angle_encoder(counts=8, incremental=True)
+    angles = [eighth * tau / 8 for eighth in (5.5, 6.5, 7.5, 8.5, 9.5)]
+    found = speeds(sensor, angles, [BEGIN + i * MS for i in range(5)])
+    assert [rate for _, rate in found] == pytest.approx([0.0, *[1000 * tau / 8] * 4])
+
+
+def test_exact_rates_pass_as_they_come():
+    sensor = angle_encoder(rates='exact', counts=8)
+    found = speeds(sensor, [0.0, 1.0, 2.0], [BEGIN, BEGIN + MS, BEGIN + 2 * MS])
+    assert found == [(7.0, 9.0)] * 3
+
+
+def test_where_no_rates_come_none_are_made_and_the_next_know_of_the_last_count():
+    sensor = angle_encoder(counts=1000)
+    found = [
+        sensor(BEGIN + i * MS, reading(BEGIN, 0.0, (i**2 + 0.5) * tau / 1000, rates=rates)).rates
+        for i, rates in enumerate([(7.0, 9.0), (), (), (7.0, 9.0)])
+    ]
+    assert found[:3] == [(7.0, 0.0), (), ()]
+    assert found[3] == pytest.approx((7.0, 5000 * tau / 1000))
+
+
+def test_what_has_no_encoder_passes_as_it_comes():
+    sensor = angle_encoder(counts=8)
+    rest = {'accelerations': (3.0, 4.0), 'efforts': (5.0, 6.0)}
+    found = sensor(BEGIN, reading(BEGIN + 5, 0.123, 0.9, rates=(1.0, 2.0), **rest))
+    assert found == reading(BEGIN + 5, 0.123, tau / 8, rates=(1.0, 0.0), **rest)
+
+
+def test_in_a_scene_whose_angle_runs_on_over_turns():
+    # The coupler falls behind by a turn in each of the three turns of the crank.
+    text = 'encoder: {joints: {coupler_joint: {counts: 64}}}'
+    ideal, found = published('', 200, rate=100.0), published(text, 200, rate=100.0)
+    assert found[-1].joints[0] < -2 * tau
+    for i, f in zip(ideal, found, strict=True):
+        assert 0.0 <= i.joints[0] - f.joints[0] < tau / 64
+        assert f.joints[1] == i.joints[1]
+        assert f.rates[1] == i.rates[1]
+    assert found == published(text, 200, rate=100.0)
+
+
+def test_an_absolute_encoder_is_not_told_of_a_mark():
+    with pytest.raises(DefinitionError, match=r'effects.encoder.joints.rocker_joint.index: '):
+        angle_encoder(counts=8, index=False)
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('{}', 'joints'),
+        ('joints: {rocker_joint: {}}', 'counts'),
+        ('joints: {rocker_joint: 4096}', 'joints.rocker_joint'),
+        ('joints: {rocker_joint: {counts: 0}}', 'at least 1'),
+        ('joints: {rocker_joint: {counts: 10.5}}', '10.5 is not whole'),
+        ('joints: {rocker_joint: {counts: 8, offset: .nan}}', 'finite'),
+        ('joints: {rocker_joint: {counts: 8, incremental: 1}}', 'true or false'),
+        ('joints: {crank_joint: {counts: 8}}', "no joint 'crank_joint'"),
+        ('{joints: {rocker_joint: {counts: 8}}, rates: true}', 'differenced or exact'),
+    ],
+)
+def test_what_it_is_given_is_checked(text, message):
+    with pytest.raises(FileError, match=message):
+        written(encoder, text)
+
+
+def test_what_a_scene_writes():
+    assert written(encoder, 'joints: {rocker_joint: {counts: 4096}}') == EncoderParameters(
+        {'rocker_joint': JointEncoder(4096, 0.0, False, True)}, 'differenced'
+    )
+    assert EFFECTS['encoder'] == encoder.__name__

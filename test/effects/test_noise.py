@@ -1,0 +1,200 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Noise: as strong as it says, each of its own, and the same again from the same seed."""
+
+from __future__ import annotations
+
+from itertools import accumulate, cycle, islice, pairwise
+from math import sqrt
+
+from linkage_ros.effects import noise
+from linkage_ros.effects.noise import JointNoise, NoiseParameters
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.errors import FileError
+import pytest
+
+from .sensors import BEGIN, context, likely, MS, published, reading, SLIDE, written
+
+N = 20_000
+REGULAR = [BEGIN + i * MS for i in range(N)]
+IRREGULAR = list(accumulate(islice(cycle((MS, 50, 7 * MS, 0, 300_000)), N - 1), initial=BEGIN))
+
+
+def noisy(joints, times=REGULAR, *, seed='seed', loop=None, rates=lambda _: (0.0, 0.0)):
+    """Return what is read of a mechanism at rest."""
+    where = context(seed=seed) if loop is None else context(loop, seed)
+    sensor = noise.sensor(NoiseParameters(joints), where)
+    return [sensor(now, reading(now, 0.0, 0.0, rates=rates(now))) for now in times]
+
+
+def values(found, joint=1):
+    return [read.joints[joint] for read in found]
+
+
+def squares(numbers, deviation):
+    return sum((number / deviation) ** 2 for number in numbers)
+
+
+def assert_white(numbers, deviation):
+    """Hold numbers to be normal in mean and variance, and each new to the one before."""
+    n = len(numbers)
+    assert likely(squares(numbers, deviation), n)
+    # Means of n, and products with the one before, are normal to within what n terms leave.
+    assert likely((sum(numbers) / deviation) ** 2 / n, 1)
+    products = sum(a * b for a, b in pairwise(numbers)) / deviation**2
+    assert likely(products**2 / (n - 1), 1)
+
+
+@pytest.mark.parametrize('deviation', [1e-9, 0.002, 1e3])
+def test_white_noise_has_its_standard_deviation_and_no_memory(deviation):
+    found = noisy({'rocker_joint': JointNoise(white=deviation)})
+    assert_white(values(found), deviation)
+    assert set(values(found, 0)) == {0.0}
+    assert all(read.rates == (0.0, 0.0) for read in found)
+
+
+def test_white_noise_is_normal_beyond_its_variance():
+    # Of a normal number the fourth moment is 3, and that of its estimate 96/n.
+    numbers = values(noisy({'rocker_joint': JointNoise(white=0.5)}))
+    fourth = sum((number / 0.5) ** 4 for number in numbers) / N
+    assert likely((fourth - 3.0) ** 2 / (96.0 / N), 1)
+
+
+def test_the_noise_of_rates_is_in_the_rates_only():
+    found = noisy({'rocker_joint': JointNoise(rate_white=0.3)})
+    assert_white([read.rates[1] for read in found], 0.3)
+    assert all(read.joints == (0.0, 0.0) for read in found)
+    assert all(read.rates[0] == 0.0 for read in found)
+
+
+@pytest.mark.parametrize('times', [REGULAR, IRREGULAR], ids=['1 kHz', 'irregular ticks'])
+def test_the_steps_of_a_walk_go_as_the_root_of_the_time(times):
+    walk = values(noisy({'rocker_joint': JointNoise(walk=0.25)}, times))
+    assert walk[0] == 0.0
+    steps = []
+    for (before, after), (begin, end) in zip(pairwise(walk), pairwise(times), strict=True):
+        if begin == end:
+            assert before == after
+        else:
+            steps.append((after - before) / sqrt((end - begin) * 1e-9))
+    assert_white(steps, 0.25)
+
+
+def test_a_walk_ends_as_far_off_whatever_the_ticks_between():
+    # After 0.1 s the standard deviation is K·√0.1, in one step or in a hundred.
+    for times in ([BEGIN, BEGIN + 100 * MS], [BEGIN + i * MS for i in range(101)]):
+        ends = [
+            values(noisy({'rocker_joint': JointNoise(walk=2.0)}, times, seed=str(seed)))[-1]
+            for seed in range(300)
+        ]
+        assert likely(squares(ends, 2.0 * sqrt(0.1)), 300)
+
+
+def test_white_and_walk_add_up():
+    white, walk = JointNoise(white=0.01), JointNoise(walk=0.3)
+    both = JointNoise(white=0.01, walk=0.3)
+    alone = [values(noisy({'rocker_joint': kind})) for kind in (white, walk)]
+    summed = [a + b for a, b in zip(*alone, strict=True)]
+    assert values(noisy({'rocker_joint': both})) == summed
+
+
+def test_what_one_joint_has_does_not_change_the_other():
+    one = JointNoise(white=0.01, walk=0.3, rate_white=1.0)
+    alone, beside = (
+        noisy({'rocker_joint': one}),
+        noisy({'coupler_joint': one, 'rocker_joint': one}),
+    )
+    assert values(alone) == values(beside)
+    assert [read.rates[1] for read in alone] == [read.rates[1] for read in beside]
+    assert values(beside, 0) != values(beside, 1)
+
+
+def test_the_noise_of_two_joints_goes_its_own_ways():
+    one = JointNoise(white=1.0)
+    found = noisy({'coupler_joint': one, 'rocker_joint': one})
+    products = sum(a * b for a, b in zip(values(found, 0), values(found, 1), strict=True))
+    assert likely(products**2 / N, 1)
+
+
+def test_the_kinds_of_noise_of_a_joint_go_their_own_ways():
+    found = noisy({'rocker_joint': JointNoise(white=1.0, rate_white=1.0)})
+    products = sum(read.joints[1] * read.rates[1] for read in found)
+    assert likely(products**2 / N, 1)
+
+
+def test_ticks_without_rates_draw_as_those_with():
+    one = {'rocker_joint': JointNoise(white=0.01, walk=0.3, rate_white=1.0)}
+    always = noisy(one, REGULAR[:100])
+    toggles = noisy(one, REGULAR[:100], rates=lambda now: () if now // MS % 3 == 0 else (0.0, 0.0))
+    assert values(always) == values(toggles)
+    assert sum(read.rates == () for read in toggles) in {33, 34}
+    for full, found in zip(always, toggles, strict=True):
+        assert found.rates in {(), full.rates}
+
+
+def test_the_seed_decides():
+    one = {'rocker_joint': JointNoise(white=0.01, walk=0.3, rate_white=1.0)}
+    assert noisy(one, REGULAR[:50]) == noisy(one, REGULAR[:50])
+    first, other = noisy(one, REGULAR[:50]), noisy(one, REGULAR[:50], seed='other')
+    assert all(a.joints[1] != b.joints[1] for a, b in zip(first, other, strict=True))
+
+
+def test_that_of_a_slide_is_in_metres():
+    found = noisy({'rod_slide': JointNoise(white=1e-5)}, loop=SLIDE)
+    assert_white(values(found), 1e-5)
+
+
+def test_the_rest_of_the_reading_is_passed_on():
+    sensor = noise.sensor(NoiseParameters({'rocker_joint': JointNoise(white=1.0)}), context())
+    rest = {'rates': (1.0, 2.0), 'accelerations': (3.0, 4.0), 'efforts': (5.0, 6.0)}
+    found = sensor(BEGIN, reading(BEGIN + 5, 1.0, 2.0, **rest))
+    assert found == reading(BEGIN + 5, 1.0, found.joints[1], **rest)
+
+
+def test_in_a_scene():
+    text = 'noise: {joints: {rocker_joint: {white: 0.01, walk: 0.1}}}'
+    ideal, first = published('', 2000 // 10), published(text, 2000 // 10)
+    errors = [a.joints[1] - b.joints[1] for a, b in zip(first, ideal, strict=True)]
+    # Differences of white noise have twice its variance, the steps of the walk add their own.
+    steps = [after - before for before, after in pairwise(errors)][::2]
+    assert likely(squares(steps, sqrt(2 * 0.01**2 + 0.1**2 * 0.001)), len(steps))
+    assert [read.joints[0] for read in first] == [read.joints[0] for read in ideal]
+    assert published(text, 200) == first
+    assert published(text, 200, seed=1) != first
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('{}', 'joints'),
+        ('joints: {rocker_joint: {white: -1}}', 'at least 0'),
+        ('joints: {rocker_joint: {walk: .inf}}', 'finite'),
+        ('joints: {rocker_joint: {whte: 1}}', 'whte: unknown key'),
+        ('joints: {crank: {white: 1}}', "there is no joint 'crank'"),
+        ('joints: {rocker_joint: 0.1}', 'joints.rocker_joint'),
+    ],
+)
+def test_what_it_is_given_is_checked(text, message):
+    with pytest.raises(FileError, match=message):
+        written(noise, text)
+
+
+def test_what_a_scene_writes():
+    found = written(noise, 'joints: {rocker_joint: {white: 0.1}, coupler_joint: {walk: 2}}')
+    assert found == NoiseParameters(
+        {'rocker_joint': JointNoise(0.1, 0.0, 0.0), 'coupler_joint': JointNoise(0.0, 2.0, 0.0)}
+    )
+    assert EFFECTS['noise'] == noise.__name__
