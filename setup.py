@@ -54,13 +54,25 @@ def shared(folder):
 ROS = ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces']
 REPORT = ['matplotlib', 'rich']
 # The name `test` matters: colcon runs pytest only when it finds it in this extra.
-TEST = ['pytest', 'pytest-timeout', 'hypothesis', 'mpmath', 'python-flint>=0.6', 'rosbags']
+TEST = [
+    'pytest',
+    'pytest-timeout',
+    'hypothesis',
+    'jsonschema>=4',
+    'mpmath',
+    'python-flint>=0.6',
+    'rosbags',
+    # What drives and forces are held against: splines, and an engine of rigid bodies.
+    'scipy',
+    'mujoco>=3',
+]
 # What the speed of the kinematics is measured against.
 BENCH = ['pylinkage[numba]>=1.3,<1.4']
 STYLE = [
     'mypy',
     'ruff',
     'types-PyYAML',
+    'types-jsonschema',
     # ament's linters as Jazzy has them. The wheels leave flake8 and its plugins out.
     'ros-ament-flake8>=0.17,<0.18',
     'ros-ament-pep257>=0.17,<0.18',
