@@ -19,7 +19,7 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test bench accuracy gallery lint format clean
+.PHONY: help demo test bench accuracy gallery schema cost effects lint format clean
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
@@ -27,6 +27,9 @@ help:
 	@echo 'make bench     measure'
 	@echo 'make accuracy  prove the kinematics on 11 million cases (30 min)'
 	@echo 'make gallery   draw the linkages that come with the package'
+	@echo 'make schema    write the JSON Schemas of scene and linkage files'
+	@echo 'make cost      measure what every effect costs, into docs/cost.md'
+	@echo 'make effects   draw what drives, effects and faults do, for docs/effects.md'
 	@echo 'make lint      ruff and mypy'
 	@echo 'make format    let ruff put right what it can'
 	@echo 'make clean     remove what make and colcon have built; recorded runs stay'
@@ -64,6 +67,19 @@ accuracy: $(STAMP)
 
 gallery: $(STAMP)
 	@$(BIN)/python docs/make_gallery.py
+
+schema: $(STAMP)
+	@mkdir -p config/schema
+	@for kind in scene linkage; do \
+	  file=config/schema/$$kind.schema.json; \
+	  $(BIN)/linkage scene --schema $$kind >$$file.new && mv $$file.new $$file || exit $$?; \
+	done
+
+cost: $(STAMP)
+	@$(BIN)/python -m docs.make_cost
+
+effects: $(STAMP)
+	@$(BIN)/python -m docs.make_effects
 
 lint: $(STAMP)
 	$(BIN)/ruff check

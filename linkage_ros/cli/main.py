@@ -29,6 +29,8 @@ COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
     'demo': 'run the demo scene with a crank of its own, on a ROS graph of its own',
     'plot': 'draw the joints of a bag over the angle of its crank',
+    'scene': 'say what a scene consists of; list all effects; print the schemas of the files',
+    'cost': 'say what each effect of a scene costs on this machine',
     'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
     'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
     'draw': 'draw a linkage, and its joints over its range',

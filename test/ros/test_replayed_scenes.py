@@ -14,9 +14,10 @@
 
 
 """
-A run of any scene replays from its bag to the same bytes, whatever was withheld, pushed or injected.
+A run of any scene replays from its bag to the same bytes: withheld, pushed, or with faults.
 
-The tick loop is the node's own, with its recorder; only DDS is left out: messages come from a list.
+The tick loop is the node's own, with its recorder; only DDS is left out: messages come from a
+list.
 """
 
 from __future__ import annotations
@@ -47,10 +48,12 @@ SLOW_RANDOM = 'noise: {joints: {rocker_joint: {white: 1.0e-3, walk: 1.0e-2}}}'
 SCENES = {
     'readings lost': f'effects: {{velocity: {{}}, {SLOW_RANDOM}, dropout: {{probability: 0.3}}}}',
     'a slow sensor': f'effects: {{{SLOW_RANDOM}, rate_limit: {{rate: 90, hold: silent}}}}',
-    'a delay that fills': 'effects: {velocity: {}, jitter: {seconds: 0.004}, delay: {seconds: 0.05}}',
+    'a delay that fills': 'effects: {velocity: {}, jitter: {seconds: 0.004}, '
+    'delay: {seconds: 0.05}}',
     'lost and delayed': f'effects: {{{SLOW_RANDOM}, dropout: {{probability: 0.5, burst: 4}}, '
     'delay: {seconds: 0.0205, between: sampled, stamp: measured}}',
-    'play, forces and leaning pins': 'effects: {backlash: {play: 0.05}, effort: {}, pin_forces: {}, '
+    'play, forces and leaning pins': 'effects: {backlash: {play: 0.05}, effort: {}, '
+    'pin_forces: {}, '
     'clearance: {pins: {A: 1.0e-5, B: 1.0e-5}}, acceleration: {}}\nloads: {gravity: [0, -9.81]}',
     'faults at their times': f"""
 effects: {{velocity: {{}}, {SLOW_RANDOM}}}
@@ -72,7 +75,8 @@ faults:
   ahead: {{time_jump: {{by: 0.5}}, at: [0.1], seconds: 0.05}}
   behind: {{time_jump: {{by: -0.05}}, at: [0.2], seconds: 0.05}}
 """,
-    'driven by itself': f'drive: {{sine: {{amplitude: 1.0, frequency: 2.0}}}}\neffects: {{{SLOW_RANDOM}}}',
+    'driven by itself': 'drive: {sine: {amplitude: 1.0, frequency: 2.0}}\n'
+    f'effects: {{{SLOW_RANDOM}}}',
     'pushed': """
 drive: {torque: {method: rk4, timeout: 0.02}}
 effects: {velocity: {}, effort: {}, encoder: {joints: {crank_joint: {counts: 4096}}}}
