@@ -1,0 +1,64 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Measure what every effect costs on this machine, and write it into docs/cost.md.
+
+Run it in the checkout's own folder, as `make cost` does: ``python -m docs.make_cost``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bench.machine import describe_machine
+from linkage_ros.cli.cost import all_effects
+from linkage_ros.cli.tables import Table
+
+PAGE = Path(__file__).resolve().parent / 'cost.md'
+BEGIN, END = '<!-- measured: begin -->', '<!-- measured: end -->'
+"""Between them stands what is measured; the rest of the page is written by hand."""
+
+_TICKS = 50_000
+_LEFT_OUT = ('governor', 'kernel', 'rclpy', 'middleware')
+"""What the machine has and no tick here sees."""
+
+
+def main() -> int:
+    """Measure and write."""
+    table = all_effects(_TICKS)
+    assert table is not None, 'nobody stops it'
+    PAGE.write_text(filled(PAGE.read_text('utf-8'), measured(table)), 'utf-8')
+    return 0
+
+
+def filled(page: str, text: str) -> str:
+    """Return a page with a text between its marks."""
+    head, _, rest = page.partition(BEGIN)
+    _, _, tail = rest.partition(END)
+    return f'{head}{BEGIN}\n{text}\n{END}{tail}'
+
+
+def measured(table: Table) -> str:
+    """Return what is measured as Markdown: the machine, and the table."""
+    machine = [f'{name} {value}' for name, value in describe_machine() if name not in _LEFT_OUT]
+    rule = ['---:' if column.startswith('>') else '---' for column in table.columns]
+    rows = [[column.lstrip('>') for column in table.columns], rule, *table.rows]
+    lines = ['| ' + ' | '.join(row) + ' |' for row in rows]
+    return '\n'.join([f'{table.title}; {", ".join(machine)}.', '', *lines])
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

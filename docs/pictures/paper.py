@@ -1,0 +1,97 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What the pictures look like: size, colours, and how they are stored."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+import numpy as np
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+
+mpl.use('Agg')
+mpl.rcParams.update(
+    {
+        'font.size': 9.0,
+        'axes.titlesize': 9.5,
+        'axes.titlelocation': 'left',
+        'axes.spines.top': False,
+        'axes.spines.right': False,
+        'axes.grid': True,
+        'axes.axisbelow': True,
+        'grid.alpha': 0.3,
+        'lines.linewidth': 1.8,
+        'legend.frameon': False,
+        'legend.borderaxespad': 0.0,
+        'figure.facecolor': 'white',
+    }
+)
+
+BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = (
+    '#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9',
+)  # fmt: skip
+"""Okabe and Ito's, which colour-blind readers can tell."""
+
+IDEAL: dict[str, Any] = {'color': 'black', 'linewidth': 1.0, 'linestyle': (0, (4, 2))}
+"""The line of what would be without the effect."""
+
+SCENE = 'Scene'
+"""Under this name a picture holds the scene that it shows."""
+
+_SIZE = (8.0, 3.5)
+_DPI = 120
+_COLOURS = 256
+
+
+def sheet(rows: int = 1, columns: int = 1, **layout: Any) -> tuple[Figure, Any]:
+    """Return a figure, and its axes or an array of them."""
+    figure = empty_sheet()
+    return figure, figure.subplots(rows, columns, **layout)
+
+
+def empty_sheet() -> Figure:
+    """Return a figure without axes."""
+    return Figure(figsize=_SIZE, dpi=_DPI, layout=ConstrainedLayoutEngine(w_pad=0.09, h_pad=0.07))
+
+
+def save(figure: Figure, scene: str, file: Path) -> None:
+    """Store a picture as PNG, in as many colours as are told apart, with its scene."""
+    figure.align_ylabels()
+    drawn = BytesIO()
+    figure.savefig(drawn, format='png')
+    about = PngInfo()
+    about.add_itxt(SCENE, scene)
+    with Image.open(drawn) as image:
+        few = image.convert('RGB').quantize(_COLOURS, dither=Image.Dither.NONE)
+        few.save(file, optimize=True, pnginfo=about)
+
+
+def over_a_turn(axes: Any, label: str = 'crank angle [rad]') -> None:
+    """Let the horizontal axis be one turn of the crank."""
+    axes.set_xlim(0.0, 2.0 * np.pi)
+    axes.set_xticks([0.5 * n * np.pi for n in range(5)], ['0', 'π/2', 'π', '3π/2', '2π'])
+    axes.set_xlabel(label)
+
+
+def legend(axes: Any, columns: int = 4) -> None:
+    """Say what the lines are, above the axes, where no line is."""
+    axes.legend(loc='lower left', bbox_to_anchor=(0.0, 1.02), ncols=columns, handlelength=2.2)

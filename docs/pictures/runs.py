@@ -1,0 +1,221 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Runs of a scene at simulated times: the real pipeline, without a node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from copy import deepcopy
+import json
+from math import nan
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.effects.stage import Reading
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.line import Look
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene
+import numpy as np
+from numpy.typing import NDArray
+
+Scene = dict[str, Any]
+"""A scene file, as YAML has it."""
+
+Sample = tuple[float, float, float]
+"""Time since the first tick, in [s], and the crank then: its angle and rate."""
+
+Values = NDArray[np.float64]
+
+START = 1_700_000_000_000_000_000
+"""Time of the first tick, in [ns]."""
+
+CRANK = 'crank_joint'
+"""The input of the linkages here."""
+
+_LINKAGES = Path(__file__).resolve().parents[2] / 'config' / 'linkages'
+
+
+class Run(NamedTuple):
+    """
+    What came of a scene.
+
+    Attributes
+    ----------
+    pipeline
+        The pipeline, after its last tick.
+    times
+        Of the ticks, in [s] since the first.
+    looks
+        What the linkage came to at each.
+
+    """
+
+    pipeline: Pipeline
+    times: Values
+    looks: list[Look]
+
+    def position(self, joint: str) -> Values:
+        """Return what is published of a joint, in [rad] or [m]; nan where nothing is."""
+        return self._read(joint, lambda reading: reading.joints)
+
+    def rate(self, joint: str) -> Values:
+        """Return the published rate of a joint, in [rad/s] or [m/s]."""
+        return self._read(joint, lambda reading: reading.rates)
+
+    def acceleration(self, joint: str) -> Values:
+        """Return the published acceleration of a joint, in [rad/s²] or [m/s²]."""
+        return self._read(joint, lambda reading: reading.accelerations)
+
+    def effort(self, joint: str) -> Values:
+        """Return the published effort of a joint, in [N·m] or [N]."""
+        return self._read(joint, lambda reading: reading.efforts)
+
+    def stamps(self) -> Values:
+        """Return the stamps of what is published, in [s] since the first tick."""
+        return np.array(
+            [nan if look.reading is None else (look.reading.stamp - START) * 1e-9
+             for look in self.looks]
+        )  # fmt: skip
+
+    def crank(self) -> Values:
+        """Return what the drive says: a row each of angles, rates and accelerations."""
+        return np.array(
+            [
+                (nan, nan, nan) if crank is None else
+                (crank.angles[0], crank.rates[0], crank.accelerations[0])
+                for crank, _, _, _ in self.looks
+            ]
+        ).T  # fmt: skip
+
+    def force(self, pin: str) -> Values:
+        """Return the force in a pin, in [N]: its x in a row, and its y."""
+        names = self.pipeline.lines[0].context.reactions.names
+        place = names.index(pin)
+        motions = [look.motion for look in self.looks]
+        return np.array([m.reactions[place][:2] for m in motions if m is not None]).T
+
+    def energy(self) -> Values:
+        """Return the energy of the linkage, in [J]."""
+        energy = self.pipeline.lines[0].context.mechanics.energy
+        return np.array(
+            [
+                energy(position, *crank.rates)
+                for crank, position, _, _ in self.looks
+                if crank is not None and position is not None
+            ]
+        )
+
+    def _read(self, joint: str, values: Callable[[Reading], Sequence[float]]) -> Values:
+        place = self.pipeline.lines[0].member.joints.index(joint)
+        read = [look.reading and values(look.reading) for look in self.looks]
+        return np.array([each[place] if each else nan for each in read])
+
+
+def run(scene: Scene, seconds: float, samples: Sequence[Sample] = ()) -> Run:
+    """
+    Let a scene run for some seconds.
+
+    Parameters
+    ----------
+    scene
+        The scene, with files as a scene in config/scenes names them.
+    seconds
+        How long.
+    samples
+        Of the crank: what comes on the topic, or is in the bag, that it is driven from.
+
+    """
+    with TemporaryDirectory() as folder:
+        pipeline, reset = _built(Path(folder), scene, samples)
+        listens = bool(pipeline.topic)
+        due = list(messages(samples)) if listens else []
+        times = ticks(scene, seconds)
+        looks = []
+        last = START
+        for time in times:
+            now = START + time
+            if pipeline.injection is not None:
+                pipeline.injection.advance(now)
+                now = pipeline.injection.clock(now)
+            if now < last:
+                pipeline = reset(pipeline)
+            last = now
+            while due and due[0][0] <= START + time:
+                pipeline.offer(due.pop(0)[1], now)
+            looks.append(pipeline.tick(now).looks[0])
+    return Run(pipeline, np.array(times) * 1e-9, looks)
+
+
+def ticks(scene: Scene, seconds: float) -> list[int]:
+    """Return the times of the ticks, in [ns] since the first."""
+    rate = scene.get('rate', 1000)
+    return [round(number * 1e9 / rate) for number in range(round(seconds * rate) + 1)]
+
+
+def messages(samples: Sequence[Sample]) -> list[tuple[int, bytes]]:
+    """Return crank messages, each with the time at which it comes, in [ns]."""
+    write = JointStateWriter([CRANK]).write
+    times = [START + round(time * 1e9) for time, _, _ in samples]
+    return [
+        (time, write(time, (angle,), (rate,)))
+        for time, (_, angle, rate) in zip(times, samples, strict=True)
+    ]
+
+
+def changed(scene: Scene, *changes: tuple[str, Any]) -> Scene:
+    """Return a scene with other values at some places, each a dotted key; None takes one out."""
+    scene = deepcopy(scene)
+    for key, value in changes:
+        *outer, last = key.split('.')
+        within = scene
+        for name in outer:
+            within = within[name]
+        if value is None:
+            del within[last]
+        else:
+            within[last] = value
+    return scene
+
+
+def _built(
+    folder: Path, scene: Scene, samples: Sequence[Sample]
+) -> tuple[Pipeline, Callable[[Pipeline], Pipeline]]:
+    """Build the pipeline of a scene; return it, and what builds it again."""
+    file = folder / 'config' / 'scenes' / 'scene.yaml'
+    file.parent.mkdir(parents=True)
+    (folder / 'config' / 'linkages').symlink_to(_LINKAGES)
+    file.write_text(json.dumps(scene), 'utf-8')
+    bag = scene.get('drive', {}).get('bag')
+    if bag is not None:
+        _write_bag((file.parent / bag['file']).resolve(), samples)
+    loaded = load_scene(file)
+
+    def reset(old: Pipeline) -> Pipeline:
+        return Pipeline(loaded, old.closures, old.injection)
+
+    return Pipeline(loaded), reset
+
+
+def _write_bag(folder: Path, samples: Sequence[Sample]) -> None:
+    folder.parent.mkdir()
+    writer = BagWriter(folder, [Topic('/crank_states', 'sensor_msgs/msg/JointState', '', '')])
+    for time, data in messages(samples):
+        writer.write(0, time, time, data)
+    writer.close()

@@ -1,0 +1,132 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The page of drives, effects and faults says what the code declares, and shows its own scenes."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+import inspect
+from pathlib import Path
+import re
+import sys
+
+from linkage_ros.drives.drive import DRIVES
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.faults.fault import FAULTS
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import parse_scene
+import pytest
+
+ROOT = Path(__file__).parents[2]
+LINKAGES = ROOT / 'config' / 'linkages'
+
+SPEC = spec_from_file_location('make_effects', ROOT / 'docs' / 'make_effects.py')
+make_effects = module_from_spec(SPEC)
+SPEC.loader.exec_module(make_effects)
+
+PAGE = make_effects.PAGE.read_text('utf-8')
+SECTIONS = make_effects.sections(PAGE)
+BY_NAME = {section.name: section for section in SECTIONS}
+MODULES = {**DRIVES, **EFFECTS, **FAULTS}
+DRAWN = [section for section in SECTIONS if section.scene]
+
+
+def scene_of(text):
+    linkage = re.search(r'linkage: \.\./linkages/(\w+\.yaml)\n', text).group(1)
+    files = {'scene.yaml': text.encode(), 'linkage.yaml': (LINKAGES / linkage).read_bytes()}
+    return parse_scene('page', 'docs/effects.md', files)
+
+
+def squeezed(text):
+    return ' '.join(text.split())
+
+
+def equations(name):
+    """Return the equations of a module: the indented lines of its docstring."""
+    lines = inspect.getdoc(import_module(MODULES[name])).splitlines()
+    return [squeezed(line) for line in lines if line.startswith('    ') and '=' in line]
+
+
+def test_everything_has_its_section_in_physical_order():
+    names = [section.name for section in SECTIONS if section.name in MODULES]
+    assert names == [*DRIVES, *EFFECTS, *FAULTS]
+
+
+def test_what_is_made_of_the_code_is_as_the_code_is_now():
+    assert make_effects.filled(PAGE) == PAGE, 'make effects makes it anew'
+
+
+@pytest.mark.parametrize('name', MODULES)
+def test_a_section_says_what_a_reader_wants_to_know(name):
+    text = BY_NAME[name].text
+    assert '**Not modelled.**' in text
+    if name not in FAULTS:
+        assert re.search(r'\*\*Source\.\*\* \S', text)
+        assert '\n```text\n' in text
+        assert re.search(rf'^!\[[^\]]{{40,}}\]\(effects/{name}\.png\)$', text, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ('name', 'equation'), [(name, each) for name in EFFECTS for each in equations(name)]
+)
+def test_the_equations_of_a_module_stand_in_its_section(name, equation):
+    assert equation in squeezed(BY_NAME[name].text)
+
+
+@pytest.mark.parametrize('section', DRAWN, ids=lambda section: section.name)
+def test_a_scene_is_a_scene_and_has_what_its_section_is_about(section):
+    scene = scene_of(section.scene)
+    (member,) = scene.members
+    if section.name == 'Faults':
+        assert {fault.kind for fault in scene.faults.values()} == set(FAULTS)
+    else:
+        assert section.name in (member.drive[0], *member.effects)
+
+
+def test_every_drive_and_effect_has_a_scene_and_the_faults_have_one_together():
+    assert [section.name for section in DRAWN] == [*DRIVES, *EFFECTS, 'Faults']
+
+
+@pytest.mark.parametrize('section', DRAWN, ids=lambda section: section.name)
+def test_a_picture_shows_the_scene_beside_it(section):
+    image = pytest.importorskip('PIL.Image')
+    file = make_effects.PICTURES / f'{section.name.lower()}.png'
+    assert file.stat().st_size < make_effects.LARGEST
+    with image.open(file) as picture:
+        assert picture.format == 'PNG'
+        assert picture.text['Scene'] == section.scene, 'make effects draws it anew'
+
+
+def test_no_other_picture_lies_there():
+    drawn = {file.name for file in make_effects.PICTURES.iterdir()}
+    assert drawn == {f'{section.name.lower()}.png' for section in DRAWN}
+
+
+def test_the_effect_that_the_page_has_for_an_example_works(monkeypatch):
+    code = re.search(r'^```python\n(.*?)^```$', PAGE, re.MULTILINE | re.DOTALL).group(1)
+    module = type(sys)('saturation')
+    monkeypatch.setitem(sys.modules, 'saturation', module)
+    exec(compile(code, 'docs/effects.md', 'exec'), module.__dict__)
+    monkeypatch.setitem(EFFECTS, 'saturation', 'saturation')
+    text = (
+        'linkage: ../linkages/four_bar.yaml\n'
+        'drive: {constant_rate: {rate: 1.0}}\n'
+        'effects: {saturation: {largest: 0.5}}\n'
+    )
+    pipeline = Pipeline(scene_of(text))
+    read = [pipeline.tick(second * 10**9).looks[0].reading.joints[0] for second in range(3)]
+    assert read == [0.0, 0.5, 0.5]
