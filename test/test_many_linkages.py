@@ -188,6 +188,7 @@ def test_a_hundred_of_them(load):
     [
         ('linkages: []', 'linkages: the list is empty'),
         ('linkages: [{linkage: four_bar.yaml}]', "the key 'name' is missing"),
+        ('linkages: [{name: a/b, linkage: four_bar.yaml}]', "'a/b' is no ROS name"),
         ('linkages: [{name: a}]', "the key 'linkage' is missing"),
         ('linkages: [{name: a, linkage: none.yaml}]', 'is not a file'),
         (

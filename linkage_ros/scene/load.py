@@ -120,7 +120,7 @@ def _scene(
         for entry in content.sections('linkages'):
             linkage_content, data = open_linkage(entry)
             files[f'linkage_{len(files)}.yaml'] = data
-            own = entry.text('name')
+            own = entry.ros_name(entry.text('name'))
             if own in [member.name for member in members]:
                 raise entry.error('name', f'{quoted(own)} is taken', 'give each its own')
             members.append(_member(own, linkage_content, entry, content, folder))
@@ -229,7 +229,7 @@ def _faults(content: Section, members: list[Member]) -> dict[str, Fault]:
     for member in members:
         for kind, names in parts_of(member.linkage).items():
             parts[kind] = (*parts.get(kind, ()), *(member.prefix + name for name in names))
-    return {name: _fault(section.section(name), parts) for name in section}
+    return {section.ros_name(name): _fault(section.section(name), parts) for name in section}
 
 
 def _fault(content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:

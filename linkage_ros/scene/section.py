@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from math import inf, isfinite
+from re import fullmatch
 from typing import Any, cast
 
 from linkage_ros.errors import FileError, quoted
@@ -118,6 +119,16 @@ class Section:
         if not isinstance(value, str) or not value.isprintable() or not value:
             raise self.error(key, f'{quoted(value)} is not a text', 'write a name; quote numbers')
         return value
+
+    def ros_name(self, name: str) -> str:
+        """Return a key of this section, or a value in it, that becomes part of the name of a topic."""
+        if not fullmatch('[A-Za-z][A-Za-z0-9_]*', name):
+            raise self.error(
+                name if name in self._content else '',
+                f'{quoted(name)} is no ROS name',
+                'use letters, digits and _, a letter first',
+            )
+        return name
 
     def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
         """Return one of several words."""

@@ -181,6 +181,8 @@ def test_several_faults_at_once():
     [
         ('{mine: {silense: {}}}', "faults.mine.silense: unknown key; did you mean 'silence'?"),
         ('{mine: {}}', 'faults.mine: 0 kinds; name one of'),
+        ('{my own: {silence: {}}}', "faults.my own: 'my own' is no ROS name; use letters"),
+        ('{1st: {silence: {}}}', "faults.1st: '1st' is no ROS name; use letters"),
         ('{mine: {silence: {}, freeze: {}}}', 'faults.mine: 2 kinds; name one of'),
         ('{mine: {stuck: {joint: rokker_joint}}}', "did you mean 'rocker_joint'?"),
         ('{mine: {stuck: {}}}', "faults.mine.stuck: the key 'joint' is missing"),
