@@ -23,57 +23,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from operator import add
 from types import ModuleType
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.drives.drive import Context, CrankState, Drive, DRIVES
-from linkage_ros.effects.stage import (
-    Begin,
-    EFFECTS,
-    LOADED,
-    Motion,
-    NEEDS,
-    PUBLISHED_WITH,
-    Reading,
-    Sensor,
-    Writer,
-)
-from linkage_ros.effects.turns import Continuous, Wrapped
+from linkage_ros.drives.drive import Context, Drive, DRIVES
+from linkage_ros.effects.stage import EFFECTS, LOADED, NEEDS, PUBLISHED_WITH, Sensor, Writer
 from linkage_ros.errors import DefinitionError
 from linkage_ros.joint_state import Rejection
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.look import at_rest, delayed, full_look, in_sequence, Look, observer, plain_look
 from linkage_ros.scene.scene import Member, Scene
-from linkage_ros.tuples import new
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Injection
-
-
-class Look(NamedTuple):
-    """
-    What a linkage comes to at a tick.
-
-    Attributes
-    ----------
-    crank
-        The crank; nothing where there is none.
-    position
-        The loop; nothing where there is no crank.
-    motion
-        What the mechanism does; nothing where the loop has no pose, or no stage asks.
-    reading
-        What is published of it; nothing where nothing is.
-
-    """
-
-    crank: CrankState | None
-    position: Position | None
-    motion: Motion | None
-    reading: Reading | None
-
-
-_NO_CRANK = Look(None, None, None, None)
 
 
 class Extra(NamedTuple):
@@ -181,21 +143,21 @@ class Line:
         sensing: list[Any] = built('sensor')
         if 'delay' in modules:
             *before, delay = sensing
-            sensing = [_delayed(before, delay)]
-        sensors = _sensors(scene, self.closure, [*sensing, *faulty])
+            sensing = [delayed(before, delay)]
+        sensors = in_sequence([*sensing, *faulty], self.closure.turning, scene.wrapped)
         stages = built('stage')
         drive_stages = built('drive_stage')
-        (begin,) = built('begin') or [_at_rest]
+        (begin,) = built('begin') or [at_rest]
         state, close = self.drive.state, self.closure.position
         self.look: Callable[[int], Look]
         """Returns what the linkage comes to at a time, in [ns]."""
-        if begin is not _at_rest or drive_stages or mechanism:
-            observe = _observer(named, len(self.closure.linkage.joints))
-            self.look = _look(
+        if begin is not at_rest or drive_stages or mechanism:
+            observe = observer(named, len(self.closure.linkage.joints))
+            self.look = full_look(
                 state, drive_stages, close, mechanism, begin, stages, observe, sensors
             )
         else:
-            self.look = _plain_look(state, close, sensors)
+            self.look = plain_look(state, close, sensors)
         self.extras = [
             Extra(
                 name,
@@ -224,9 +186,11 @@ class Line:
 
 def _refuse_idle(member: Member, forced: bool) -> None:
     """Refuse what acts on nothing."""
+    # Of several linkages those without forces may share what others need.
+    own = member.content
     for given, key in (
-        (member.loads, 'loads'),
-        ('friction' in member.effects, 'effects.friction'),
+        (member.loads and 'loads' in own, 'loads'),
+        ('friction' in member.effects and 'effects' in own, 'effects.friction'),
     ):
         if given and not forced:
             raise DefinitionError(
@@ -244,151 +208,3 @@ def _closure(
         if hasattr(module, 'alter'):
             linkage = module.alter(parameters[name], linkage, Context.generator(seed, name))
     return Closure(linkage)
-
-
-def _sensors(scene: Scene, closure: Closure, sensors: list[Sensor]) -> tuple[Sensor, ...]:
-    """Return the sensors, what makes angles run on before them, and what wraps them behind."""
-    if scene.wrapped:
-        wrapped = Wrapped(closure.turning)
-        return (Continuous(closure.turning), *sensors, wrapped) if sensors else (wrapped,)
-    return (Continuous(closure.turning), *sensors)
-
-
-def _delayed(sensors: list[Sensor], delay: Any) -> Sensor:
-    """Return the sensors with the delay behind them, which is told their silence too."""
-
-    def late(now: int, reading: Reading) -> Reading | None:
-        found: Reading | None = reading
-        for sensor in sensors:
-            if found is None:
-                break
-            found = sensor(now, found)
-        arrived: Reading | None = delay(now, found)
-        return arrived
-
-    return late
-
-
-def _plain_look(
-    state: Callable[[int], CrankState | None],
-    close: Callable[..., Position],
-    sensors: tuple[Sensor, ...],
-) -> Callable[[int], Look]:
-    """Put a tick together that asks for positions and for nothing that moves or pushes."""
-    first, others = sensors[0], sensors[1:]
-
-    def look(now: int) -> Look:
-        crank = state(now)
-        if crank is None:
-            return _NO_CRANK
-        position = close(*crank[0])
-        joints = position[2]
-        if not joints:
-            return new(Look, (crank, position, None, None))
-        reading = first(now, new(Reading, (now, joints, (), (), ())))
-        for sensor in others:
-            if reading is None:
-                break
-            reading = sensor(now, reading)
-        return new(Look, (crank, position, None, reading))
-
-    return look
-
-
-def _look(
-    state: Callable[[int], CrankState | None],
-    drive_stages: list[Any],
-    close: Callable[..., Position],
-    mechanism: list[Any],
-    begin: Begin,
-    stages: list[Any],
-    observe: Callable[[int, Motion], Reading],
-    sensors: tuple[Sensor, ...],
-) -> Callable[[int], Look]:
-    """Put a tick together."""
-    first, others = sensors[0], sensors[1:]
-
-    def look(now: int) -> Look:
-        crank = state(now)
-        if crank is None:
-            return _NO_CRANK
-        for stage in drive_stages:
-            crank = stage(crank)
-        position = close(*crank[0])
-        for harm in mechanism:
-            position = harm(position)
-        if not position[2]:
-            return new(Look, (crank, position, None, None))
-        motion = begin(crank, position)
-        for stage in stages:
-            motion = stage(motion)
-        reading = first(now, observe(now, motion))
-        for sensor in others:
-            if reading is None:
-                break
-            reading = sensor(now, reading)
-        return new(Look, (crank, position, motion, reading))
-
-    return look
-
-
-def _at_rest(crank: CrankState, position: Position) -> Motion:
-    """Return the motion of which only the pose is asked for."""
-    return new(Motion, (crank, position, None, None, (), (), ()))
-
-
-def _observer(named: set[str], joints: int) -> Callable[[int, Motion], Reading]:
-    """Return what makes the reading of an ideal sensor: what is named, and no more."""
-    if named.isdisjoint(_OBSERVED):
-        return _positions
-    if named & _OBSERVED == {'velocity'}:
-        return _positions_and_rates
-    return _Observer(named, joints).observe
-
-
-_OBSERVED = {'velocity', 'acceleration', 'effort', 'compliance', 'clearance'}
-
-
-def _positions(now: int, motion: Motion) -> Reading:
-    return new(Reading, (now, motion[1][2], (), (), ()))
-
-
-def _positions_and_rates(now: int, motion: Motion) -> Reading:
-    velocity = motion[2]
-    return new(Reading, (now, motion[1][2], velocity[0] if velocity else (), (), ()))
-
-
-class _Observer:
-    """Reads off a motion what is published of it."""
-
-    def __init__(self, named: set[str], joints: int) -> None:
-        self._joints = joints
-        self._rates = _rates if 'velocity' in named else _nothing
-        self._accelerations = _accelerations if 'acceleration' in named else _nothing
-        self._efforts = self._drive_efforts if 'effort' in named else _nothing
-
-    def observe(self, now: int, motion: Motion) -> Reading:
-        joints, shift = motion[1][2], motion[6]
-        if shift:
-            joints = tuple(map(add, joints, shift))
-        rates, accelerations = self._rates(motion), self._accelerations(motion)
-        return new(Reading, (now, joints, rates, accelerations, self._efforts(motion)))
-
-    def _drive_efforts(self, motion: Motion) -> tuple[float, ...]:
-        """Return the efforts of the inputs, which are published first; 0 for the others."""
-        efforts = motion[4]
-        return (*efforts, *(0.0,) * (self._joints - len(efforts))) if efforts else ()
-
-
-def _rates(motion: Motion) -> tuple[float, ...]:
-    velocity = motion[2]
-    return velocity[0] if velocity else ()
-
-
-def _accelerations(motion: Motion) -> tuple[float, ...]:
-    acceleration = motion[3]
-    return acceleration[0] if acceleration else ()
-
-
-def _nothing(_motion: Motion) -> tuple[float, ...]:
-    return ()

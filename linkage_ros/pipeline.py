@@ -27,7 +27,8 @@ from typing import NamedTuple, TYPE_CHECKING
 from linkage_ros.effects.stage import Reading
 from linkage_ros.joint_state import JointStateWriter, Rejection
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.line import Line, Look
+from linkage_ros.line import Line
+from linkage_ros.look import Look
 from linkage_ros.routes import Routes
 from linkage_ros.scene.scene import Scene
 from linkage_ros.tuples import new
@@ -171,7 +172,7 @@ class Pipeline:
         stamp = max(reading.stamp for reading in readings)
         message = writer.write(stamp, *_joined(readings))
         extras = tuple(
-            extra.write(now, motion, reading) if motion is not None and reading is not None else b''
+            b'' if motion is None or reading is None else extra.write(now, motion, reading)
             for line, (_, _, motion, reading) in zip(self.lines, looks, strict=True)
             for extra in line.extras
         )

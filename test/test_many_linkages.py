@@ -162,6 +162,32 @@ effects: {noise: {joints: {rocker_joint: {white: 1.0e-3}}}}
 LR = ('left', 'right')
 
 
+@pytest.mark.parametrize(
+    ('fault', 'held'),
+    [
+        ('stuck: {joint: left_rocker_joint}', [True, False]),
+        ('freeze: {}', [True, True]),
+    ],
+)
+def test_a_fault_concerns_whom_it_names(load, fault, held):
+    both = Pipeline(
+        load(f'{TWO}\ndrive: {{constant_rate: {{rate: 1.0}}}}\nfaults: {{f: {{{fault}}}}}')
+    )
+    before = read(both.tick(BEGIN).message)
+    both.injection.set('f', True)
+    after = read(both.tick(BEGIN + 100 * MS).message)
+    for side, is_held in zip(LR, held, strict=True):
+        place = before.name.index(f'{side}_rocker_joint')
+        assert (before.position[place] == after.position[place]) == is_held
+
+
+def test_a_broken_link_is_one_of_one_linkage(load):
+    text = f'{TWO}\ndrive: {{constant_rate: {{rate: 1.0}}}}\n'
+    both = Pipeline(load(f'{text}faults: {{f: {{broken_link: {{link: right_coupler}}}}}}'))
+    both.injection.set('f', True)
+    assert read(both.tick(BEGIN).message).name == ['left_crank_joint', *LEFT]
+
+
 def test_a_bag_holds_enough_to_build_it_again(load):
     scene = load(TWO)
     assert list(scene.files) == ['scene.yaml', 'linkage_1.yaml', 'linkage_2.yaml']

@@ -26,7 +26,7 @@ import sys
 
 from linkage_ros.joint_state import JointStateWriter, Rejection
 from linkage_ros.kinematics.status import Status
-from linkage_ros.line import Look
+from linkage_ros.look import Look
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest

@@ -22,10 +22,10 @@ With the delay d in whole nanoseconds, at the tick t::
 
 ``between`` says what x is between two ticks: ``interpolated``, as `history` has it; or
 ``sampled``, the newest reading that is at least d old, as of a line that carries one reading for
-each tick (the delays of dm_control's observables: S. Tunyasuvunakool et al., dm_control: Software and
-tasks for continuous control, Software Impacts 6, 2020; in a control loop: B. Wittenmark, J. Nilsson and M.
-Törngren, Timing problems in real-time control systems, ACC 1995). A reading of an encoder keeps
-its whole counts only where it is sampled.
+each tick (the delays of dm_control's observables: S. Tunyasuvunakool et al., dm_control: Software
+and tasks for continuous control, Software Impacts 6, 2020; in a control loop: B. Wittenmark, J.
+Nilsson and M. Törngren, Timing problems in real-time control systems, ACC 1995). A reading of an
+encoder keeps its whole counts only where it is sampled.
 
 Nothing is published before there is a reading that old, and nothing is extrapolated. Silence takes
 as long as a reading does: where the line is told of it, a reading that was lost is missing when it

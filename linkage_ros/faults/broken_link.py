@@ -43,9 +43,11 @@ PARAMETERS = BrokenLinkParameters
 
 
 def mechanism(
-    _parameters: BrokenLinkParameters, switch: Switch, _context: Context
-) -> Callable[[Position], Position]:
-    """Build what takes the pose away."""
+    parameters: BrokenLinkParameters, switch: Switch, context: Context
+) -> Callable[[Position], Position] | None:
+    """Build what takes the pose away, where the link is one of this linkage."""
+    if parameters.link not in [context.prefix + link for link in context.closure.linkage.links]:
+        return None
 
     def broken(position: Position) -> Position:
         if not switch.on:

@@ -27,10 +27,12 @@ and with one function that builds what it does while its `Switch` is on; which, 
     The time by which the tick goes, of the true one, in [ns].
 ``message(parameters, switch) -> Callable[[bytes], bytes]``
     The crank message that is read, of the one that came.
-``mechanism(parameters, switch, context) -> Callable[[Position], Position]``
+``mechanism(parameters, switch, context) -> Callable[[Position], Position] | None``
     The linkage, once its loops are closed.
-``sensor(parameters, switch, joints) -> Callable[[int, Reading], Reading | None]``
+``sensor(parameters, switch, joints) -> Callable[[int, Reading], Reading | None] | None``
     What is read, behind all effects; as there.
+
+Of several linkages each asks them all; to one that a fault does not concern, these return None.
 
 Faults are built only where a scene has a section ``faults``.
 """

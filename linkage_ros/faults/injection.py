@@ -120,4 +120,4 @@ class Injection:
             if hasattr(module, function):
                 build = getattr(module, function)
                 built.append(build(fault.parameters, self.switches[name], *arguments))
-        return built
+        return [each for each in built if each is not None]

@@ -41,8 +41,10 @@ class StuckParameters:
 PARAMETERS = StuckParameters
 
 
-def sensor(parameters: StuckParameters, switch: Switch, joints: Sequence[str]) -> Sensor:
-    """Build what holds the joint."""
+def sensor(parameters: StuckParameters, switch: Switch, joints: Sequence[str]) -> Sensor | None:
+    """Build what holds the joint, where it is one of these."""
+    if parameters.joint not in joints:
+        return None
     held: float | None = None
     place = joints.index(parameters.joint)
     after = place + 1

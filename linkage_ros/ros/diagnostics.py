@@ -163,7 +163,7 @@ class Health:
         return self._status('tick', level, message, values)
 
     def _lost_time(self) -> dict[str, object]:
-        """Return the time that drives which integrate have left out, since they could not follow."""
+        """Return the time that drives which integrate could not follow, and left out."""
         drives = [line.drive for line in self.loop.pipeline.lines]
         lost = [drive.lost for drive in drives if hasattr(drive, 'lost')]
         return {'Time not integrated (s)': f'{sum(lost) / NANOSECONDS:.3f}'} if lost else {}

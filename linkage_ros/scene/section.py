@@ -121,7 +121,7 @@ class Section:
         return value
 
     def ros_name(self, name: str) -> str:
-        """Return a key of this section, or a value in it, that becomes part of the name of a topic."""
+        """Return a key of this section, or a value in it, that is to be in a topic's name."""
         if not fullmatch('[A-Za-z][A-Za-z0-9_]*', name):
             raise self.error(
                 name if name in self._content else '',
