@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -218,32 +219,53 @@ class Health:
             'Ticks indeterminate': counts.unclosed[Status.INDETERMINATE],
             'Gap when last open (m)': f'{last.gap:.6g}' if last is not None else '0',
         }
-        for line, look in zip(lines, counts.last.looks if counts.last else (), strict=False):
-            crank, position, _, _ = look
-            if crank is None or position is None or not position.joints:
-                continue
-            # Of several linkages each has its own lines, with its name before them.
-            of = f'{line.member.name}: ' if line.member.name else ''
-            inputs = line.member.linkage.inputs
-            for driven, angle in zip(inputs, crank.angles, strict=True):
-                values[f'{of}Input {driven.joint} ({_unit(driven)})'] = f'{angle:.6f}'
-            values[f'{of}Residual (m)'] = f'{line.closure.residual(position):.3g}'
-            near, warning = self._nearness(line, position)
-            values |= {f'{of}{key}': value for key, value in near.items()}
+        posed = [
+            (line, look.position)
+            for line, look in zip(lines, counts.last.looks if counts.last else (), strict=False)
+            if look.position is not None and look.position.joints
+        ]
+        if posed:
+            if len(lines) == 1:
+                values |= self._inputs()
+            line, worst = max(
+                ((line, line.closure.residual(position)) for line, position in posed),
+                key=itemgetter(1),
+            )
+            values['Residual (m)'] = f'{worst:.3g}{_of(line)}'
+            near, warning = self._nearness(posed)
+            values |= near
             if warning and level == OK:
-                level, message = WARN, f'{of}{warning}'
+                level, message = WARN, warning
         return self._status('loop closure', level, message, values)
 
-    def _nearness(self, line: Line, position: Position) -> tuple[dict[str, str], str]:
-        """Return how near trouble a position is, and of what there is to warn."""
-        unit = ' or '.join(sorted({_unit(driven) for driven in line.member.linkage.inputs}))
+    def _inputs(self) -> dict[str, str]:
+        """Return the inputs of the only linkage."""
+        (line,) = self.loop.pipeline.lines
+        last = self.loop.counts.last
+        crank = last.looks[0].crank if last else None
+        return {
+            f'Input {driven.joint} ({_unit(driven)})': f'{angle:.6f}'
+            for driven, angle in zip(
+                line.member.linkage.inputs, crank.angles if crank else (), strict=False
+            )
+        }
+
+    def _nearness(self, posed: Sequence[tuple[Line, Position]]) -> tuple[dict[str, str], str]:
+        """Return how near trouble the linkage is that is nearest, and what there is to warn."""
+        nearness = [(line, line.closure.nearness(position)) for line, position in posed]
+        inputs = [driven for line, _ in posed for driven in line.member.linkage.inputs]
+        unit = ' or '.join(sorted({_unit(driven) for driven in inputs}))
         values, warnings = {}, []
-        nearness = line.closure.nearness(position)
         for name, text in _NEARNESS.items():
-            key, value, limit = text.format(unit=unit), getattr(nearness, name), self.limits[name]
-            values[key] = f'{value:.6g}'
+            line, value = min(
+                ((line, getattr(near, name)) for line, near in nearness), key=itemgetter(1)
+            )
+            key, limit = text.format(unit=unit), self.limits[name]
+            values[key] = f'{value:.6g}{_of(line)}'
             if value < limit:
-                warnings.append(f'{key} is {value:.3g}, below warn.{name} of {limit:.3g}')
+                warnings.append(
+                    f'{key} is {value:.3g}{_of(line)}, below warn.{name} of {limit:.3g}'
+                )
         return values, '; '.join(warnings)
 
     def _faults(self, injection: Injection) -> DiagnosticStatus:
@@ -283,6 +305,11 @@ class Health:
             hardware_id=self.scene,
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
+
+
+def _of(line: Line) -> str:
+    """Return which linkage it is, where there are several."""
+    return f' ({line.member.name})' if line.member.name else ''
 
 
 def _unit(driven: Input) -> str:

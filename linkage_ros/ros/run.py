@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+import gc
 from math import inf
 import sys
 from threading import Event, Thread
@@ -129,11 +130,19 @@ def _spin(
     ended = Event()
     serving = Thread(target=_serve, args=(node, executor, ended), name='executor', daemon=True)
     serving.start()
+    # A tick makes no cycles, but with a hundred linkages so many objects that Python would look
+    # for some in every tick. They are looked for here instead, among what came after the start.
+    gc.collect()
+    gc.freeze()
+    gc.disable()
     while not stop.wait(_LOOK) and monotonic() < deadline and serving.is_alive():
+        gc.collect()
         if view is not None:
             view.show(node)
         if node.loop is not None and node.loop.failure:
             break
+    gc.enable()
+    gc.unfreeze()
     served = serving.is_alive()
     # To shut the executor down while it waits is a race that it can lose, and then waits for ever.
     # The node's watch wakes it, several times a second.

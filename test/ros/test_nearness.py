@@ -40,7 +40,7 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
     counts = Counts()
     position = SimpleNamespace(status=None, gap=0.1, joints=(1.0,))
     crank = SimpleNamespace(angles=(0.25,) * len(inputs))
-    look = (crank, position, None, None)
+    look = SimpleNamespace(crank=crank, position=position)
     counts.last = SimpleNamespace(looks=(look,))
     counts.last_unclosed = 0, position
     closure = SimpleNamespace(
@@ -52,7 +52,9 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
     )
     member = SimpleNamespace(name='', linkage=SimpleNamespace(inputs=inputs))
     pipeline = SimpleNamespace(
-        lines=[SimpleNamespace(member=member, closure=closure)], max_age=1, newest_stamp=0
+        lines=[SimpleNamespace(member=member, closure=closure, drive=None)],
+        max_age=1,
+        newest_stamp=0,
     )
     loop = SimpleNamespace(
         counts=counts, pipeline=pipeline, newest_stamp=0, recorder=None, injection=None
