@@ -29,46 +29,35 @@ from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
 from linkage_ros.bag.topic import Topic
-from linkage_ros.cdr import text_message
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
 from linkage_ros.pipeline import Pipeline
-from linkage_ros.replay import change_text
 from linkage_ros.ros import pacing
-from linkage_ros.ros.bag_topics import bag_topic, message_type
+from linkage_ros.ros.bag_topics import bag_topic
 from linkage_ros.ros.diagnostics import Health, Snapshot
 from linkage_ros.ros.parameters import declare_parameters, nearness_limits
-from linkage_ros.ros.run_recording import EXTRA, RunRecording
+from linkage_ros.ros.run_recording import RunRecording
+from linkage_ros.ros.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
 from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
 from linkage_ros.ros.warnings import Warnings
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
 from rclpy._rclpy_pybind11 import RCLError
-from rclpy.callback_groups import CallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.serialization import serialize_message
-from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
 if TYPE_CHECKING:
-    from linkage_ros.faults.injection import Change
-
-CRANK_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Sensor data, but deeper: at a slow tick every sample still gets into the bag."""
-
-OUTPUT_QOS = QoSProfile(depth=10)
-"""Reliable, volatile, as robot_state_publisher and RViz take it."""
+    pass
 
 _CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 _DIAGNOSTICS_QOS = QoSProfile(depth=1)
 _WATCH_PERIOD = 0.25
-_CHANGES_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _NOT_YET_KNOWN = '_NODE_NAME_UNKNOWN_'
 
 Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
@@ -105,16 +94,12 @@ class LinkageNode(LifecycleNode):
         self._joint_states = self.create_publisher(
             JointState, 'joint_states', OUTPUT_QOS, qos_overriding_options=overridable
         )
-        self._extras: list[Publisher] = []
-        self._changes: Publisher | None = None
-        self._injectors: list[Any] = []
-        self._crank: Subscription | None = None
+        self._scene_topics = SceneTopics(self, self._on_inject)
         self._diagnostics = self.create_publisher(
             DiagnosticArray, '/diagnostics', _DIAGNOSTICS_QOS
         )
-        self._taken_by_tick = _TakenByTick()
         self._simulation = self.create_subscription(
-            ClockMessage, '/clock', _never_called, _CLOCK_QOS, callback_group=self._taken_by_tick
+            ClockMessage, '/clock', never_called, _CLOCK_QOS, callback_group=TakenByTick()
         )
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
@@ -130,7 +115,7 @@ class LinkageNode(LifecycleNode):
     @property
     def crank_topic(self) -> str:
         """Return the resolved name of the topic that the drives listen to; '' for none."""
-        return '' if self._crank is None else str(self._crank.topic_name)
+        return self._scene_topics.crank_topic
 
     # Transitions.
 
@@ -145,9 +130,9 @@ class LinkageNode(LifecycleNode):
                 )
             scene = load_scene(file)
             pipeline = Pipeline(scene)  # what it calls for is proven now, not at the first tick
-            self._connect(pipeline)
+            self._scene_topics.connect(pipeline)
         except LinkageError as error:
-            self._disconnect()
+            self._scene_topics.disconnect()
             self.failure = error
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
@@ -160,9 +145,8 @@ class LinkageNode(LifecycleNode):
         assert self.scene is not None
         self.loop = self._build_loop(self.scene)
         self._warnings = Warnings(self.get_logger())  # as new as the counts that it compares
-        if self._crank is not None:
-            while self._crank.handle.take_message(JointState, True) is not None:
-                pass  # what came before this moment is not of this run
+        while (take := self._scene_topics.take) is not None and take() is not None:
+            pass  # what came before this moment is not of this run
         self._before = Snapshot.of(self.loop.counts, time.monotonic_ns())
         if self.scene.record is not None:
             self._start_recording()
@@ -171,7 +155,7 @@ class LinkageNode(LifecycleNode):
         cranks = ', '.join(joint for member in self.scene.members for joint in member.inputs)
         drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))
         source = f'from {self.crank_topic}' if self.crank_topic else f'driven by {drives}'
-        to = [each.topic_name for each in (self._joint_states, *self._extras)]
+        to = [each.topic_name for each in (self._joint_states, *self._scene_topics.extras)]
         self.get_logger().info(
             f'{self.scene.name}: ticking {rate}; crank {cranks} {source}; '
             f'{", ".join(self.scene.joints)} to {" and ".join(to)}'
@@ -188,7 +172,7 @@ class LinkageNode(LifecycleNode):
     def on_cleanup(self, _: LifecycleState) -> TransitionCallbackReturn:
         """Forget the scene."""
         self.scene = None
-        self._disconnect()
+        self._scene_topics.disconnect()
         return TransitionCallbackReturn.SUCCESS
 
     @_reporting
@@ -202,53 +186,8 @@ class LinkageNode(LifecycleNode):
         """Return to unconfigured."""
         self.get_logger().error('a transition failed; the node is unconfigured now')
         self.end()
-        self._disconnect()
+        self._scene_topics.disconnect()
         return TransitionCallbackReturn.SUCCESS
-
-    def _connect(self, pipeline: Pipeline) -> None:
-        """Have the topics and services that a scene calls for, and no others."""
-        self._disconnect()
-        overridable = QoSOverridingOptions.with_default_policies()
-        for extra in pipeline.extras:
-            self._extras.append(
-                self.create_publisher(
-                    message_type(extra.message, f'effects.{extra.effect}'),
-                    extra.topic,
-                    OUTPUT_QOS,
-                    qos_overriding_options=overridable,
-                )
-            )
-        if pipeline.topic:
-            self._crank = self.create_subscription(
-                JointState,
-                pipeline.topic,
-                _never_called,
-                CRANK_QOS,
-                callback_group=self._taken_by_tick,
-                qos_overriding_options=overridable,
-            )
-        if pipeline.injection is not None:
-            # What one who joins later has to know: which faults are on.
-            self._changes = self.create_publisher(
-                message_type('std_msgs/msg/String', 'faults'), '~/faults', _CHANGES_QOS
-            )
-            for name in pipeline.injection.faults:
-                self._injectors.append(
-                    self.create_service(
-                        SetBool, f'~/inject/{name}', partial(self._on_inject, name)
-                    )
-                )
-
-    def _disconnect(self) -> None:
-        """Have none of them."""
-        for publisher in (*self._extras, self._changes):
-            if publisher is not None:
-                self.destroy_publisher(publisher)
-        for service in self._injectors:
-            self.destroy_service(service)
-        if self._crank is not None:
-            self.destroy_subscription(self._crank)
-        self._extras, self._injectors, self._changes, self._crank = [], [], None, None
 
     def _build_loop(self, scene: Scene) -> TickLoop:
         shared = self.crank_topic == self._joint_states.topic_name
@@ -258,25 +197,14 @@ class LinkageNode(LifecycleNode):
             # Found before the first tick, which would wait for it: iterated links are followed
             # there.
             _ = closure.critical_inputs
-        take = None
-        if self._crank is not None:
-            take = partial(self._crank.handle.take_message, JointState, True)
         return TickLoop(
             partial(Pipeline, scene, closures, injection),
-            take,
+            self._scene_topics.take,
             self._joint_states.handle.publish_raw,
             JointStateWriter(scene.joints).names if shared else b'',
-            [extra.handle.publish_raw for extra in self._extras],
-            self._publish_change,
+            [extra.handle.publish_raw for extra in self._scene_topics.extras],
+            self._scene_topics.publish_change,
         )
-
-    def _publish_change(self, change: Change) -> bytes:
-        """Publish that a fault has begun or ended, on the thread of the tick."""
-        assert self.scene is not None
-        assert self._changes is not None
-        message = text_message(change_text(change, self.scene.faults[change.name].kind))
-        self._changes.handle.publish_raw(message)
-        return message
 
     def _pace(self, rate: float) -> Pace:
         simulated = self.get_parameter('use_sim_time').value
@@ -284,10 +212,10 @@ class LinkageNode(LifecycleNode):
             return pacing.on_clock(self.context, self._simulation, rate)
         if rate:
             return pacing.steady(rate)
-        assert self._crank is not None  # without samples a scene has a rate
+        assert self._scene_topics.crank is not None  # without samples a scene has a rate
         clock = self.get_clock()
         now = (lambda: int(clock.now().nanoseconds)) if simulated else time.time_ns
-        return pacing.on_samples(self.context, self._crank, now)
+        return pacing.on_samples(self.context, self._scene_topics.crank, now)
 
     def end(self) -> None:
         """Stop ticking and close the bag; where nothing runs, do nothing."""
@@ -304,14 +232,7 @@ class LinkageNode(LifecycleNode):
 
     def _bag_topics(self) -> list[tuple[str, Topic]]:
         """Describe what is recorded, in the order of the tick's topic numbers."""
-        assert self.loop is not None
         joint_states = self._joint_states
-        offered = [
-            info.qos_profile
-            for info in (
-                self.get_publishers_info_by_topic(self.crank_topic) if self.crank_topic else []
-            )
-        ]
         topics = [
             (
                 'joint_states_topic',
@@ -319,23 +240,7 @@ class LinkageNode(LifecycleNode):
             ),
             ('diagnostics_topic', bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS)),
         ]
-        if self.crank_topic:
-            qos = offered[0] if offered else CRANK_QOS
-            topics.append(('crank_topic', bag_topic(self.crank_topic, JointState, qos)))
-        if (changes := self._changes) is not None:
-            topics.append(
-                ('faults_topic', bag_topic(changes.topic_name, changes.msg_type, _CHANGES_QOS))
-            )
-        if self.loop.pipeline.withholds:
-            # For the replay alone: on the graph there is nothing to say at such a tick.
-            name = f'{self.get_fully_qualified_name()}/withheld'
-            time_type = message_type('builtin_interfaces/msg/Time', 'record')
-            topics.append(('withheld_topic', bag_topic(name, time_type, OUTPUT_QOS)))
-        topics += [
-            (EXTRA, bag_topic(extra.topic_name, extra.msg_type, extra.qos_profile))
-            for extra in self._extras
-        ]
-        return topics
+        return topics + self._scene_topics.described()
 
     # Services.
 
@@ -444,23 +349,6 @@ class LinkageNode(LifecycleNode):
             for info in self.get_publishers_info_by_topic(self.crank_topic)
             if info.node_name != _NOT_YET_KNOWN
         ]
-
-
-class _TakenByTick(CallbackGroup):
-    """A group whose entities no executor waits for: the tick takes from them itself."""
-
-    def can_execute(self, _: Any) -> bool:
-        return False
-
-    def beginning_execution(self, _: Any) -> bool:
-        return False
-
-    def ending_execution(self, _: Any) -> None:
-        pass
-
-
-def _never_called(_: Any) -> None:
-    pass
 
 
 def _answer(response: Any, success: bool, message: str) -> Any:
