@@ -126,6 +126,7 @@ setup(
         'console_scripts': [
             'linkage_node = linkage_ros.ros.linkage_node:main',
             'crank_source = linkage_ros.ros.crank_source:main',
+            'pd_controller = linkage_ros.ros.pd_controller:main',
             'linkage = linkage_ros.cli.main:main',
         ],
     },

@@ -190,7 +190,7 @@ class Pipeline:
 
     @property
     def closures(self) -> list[Closure]:
-        """The linkages."""
+        """Return the linkages."""
         return [line.closure for line in self.lines]
 
     @property

@@ -117,7 +117,7 @@ def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
             open_tick[1][published] = data
         elif topic == run.faults_topic:
             if injection is not None:
-                injection.set(*read_change(data))
+                injection.turn(*read_change(data))
         elif topic == run.withheld_topic:
             pipeline.tick(publish_time)
         else:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Two runs of one scene, in processes of their own, give identical bytes; of every shipped scene."""
+"""Two runs of one scene, in processes of their own, give identical bytes: every shipped scene."""
 
 from __future__ import annotations
 

@@ -14,15 +14,19 @@
 
 
 """
-Run the demo scene: a crank in a process of its own, the node in this one, a picture at the end.
+Run a scene that comes with the package: the node in this process, what it needs beside it.
 
-Nothing leaves the machine, and no other ROS graph on it is heard: discovery stays local, in a
-domain of its own.
+A crank from a topic, or a controller of its effort, is in a process of its own. Nothing leaves the
+machine, and no other ROS graph on it is heard: discovery stays local, in a domain of its own. At
+the end the bag is drawn, where the scene records one.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from difflib import get_close_matches
 import os
 from pathlib import Path
 import subprocess
@@ -31,41 +35,45 @@ from threading import Event
 
 from linkage_ros.cli.plot import draw
 from linkage_ros.cli.run import add_run_arguments, run_scene
+from linkage_ros.cli.tables import show, Table
 from linkage_ros.errors import LinkageError
+from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.scene import Member, Scene
 from linkage_ros.shipped import shipped
 
 _DOMAINS = 101
 """Domain ids up to this one are safe with the ports of every operating system."""
 
+_BESIDE = {
+    'topic': ('linkage_ros.ros.crank_source',),
+    'torque': ('linkage_ros.ros.pd_controller', 'swing:=1.0'),
+}
+"""What drives that listen to a topic need beside them, with parameters; others need nothing."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    parser.add_argument('name', nargs='?', default='demo', help='the scene; without it, demo')
+    parser.add_argument('--list', action='store_true', help='the scenes that there are')
     add_run_arguments(parser)
     parser.set_defaults(seconds=10.0)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Run the demo."""
-    scene = shipped('scenes/demo.yaml')
+    if arguments.list:
+        show(Table('', ('scene', 'drive', 'recorded', ''), [_row(f) for f in _files().values()]))
+        return 0
+    file = _file(arguments.name)
+    scene = load_scene(file)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ['ROS_DOMAIN_ID'] = str(1 + os.getpid() % _DOMAINS)
     print(
         f'{scene.name}: {arguments.seconds:g} s; from a second terminal: '
         f'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]}'
     )
-    # Bounded, so that it ends by itself even where this process is killed.
-    crank = subprocess.Popen(
-        [
-            *(sys.executable, '-m', 'linkage_ros.ros.crank_source'),
-            *('--ros-args', '-p', f'seconds:={arguments.seconds + 10.0:.1f}'),
-        ],
-        start_new_session=True,  # Ctrl-C is for this process, which ends the other
-    )
-    try:
-        code, bag = run_scene(str(scene), arguments, stop)
-    finally:
-        crank.terminate()
-        crank.wait()
+    with _beside(scene, arguments.seconds):
+        code, bag = run_scene(str(file), arguments, stop)
     if bag is not None:
         picture = Path(f'{bag}.png')
         try:
@@ -75,4 +83,77 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             print(f'picture   none: {error}')
         else:
             print(f'picture   {picture}')
+    elif scene.record is None and code == 0:
+        print(f'picture   none: {scene.name} records no bag to draw')
     return code
+
+
+@contextmanager
+def _beside(scene: Scene, seconds: float) -> Iterator[None]:
+    """Have what the scene's drives need in processes of their own."""
+    processes = [
+        subprocess.Popen(
+            command,
+            start_new_session=True,  # Ctrl-C is for this process, which ends the others
+        )
+        for member in scene.members
+        for command in _commands(member, seconds)
+    ]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.terminate()
+        for process in processes:
+            process.wait()
+
+
+def _commands(member: Member, seconds: float) -> Iterator[list[str]]:
+    """Yield the command of what a linkage needs beside it, if it does."""
+    drive, _ = member.drive
+    if drive in _BESIDE:
+        module, *parameters = _BESIDE[drive]
+        # Bounded, so that it ends by itself even where this process is killed.
+        parameters += [f'joint:={member.inputs[0]}', f'seconds:={seconds + 10.0:.1f}']
+        yield [sys.executable, '-m', module, '--ros-args', *_each('-p', parameters)]
+
+
+def _each(flag: str, values: list[str]) -> Iterator[str]:
+    for value in values:
+        yield from (flag, value)
+
+
+def _files() -> dict[str, Path]:
+    """Return the scenes that come with the package, by their names."""
+    folder = shipped('scenes/demo.yaml').parent
+    return {file.stem: file for file in sorted(folder.glob('*.yaml'))}
+
+
+def _file(name: str) -> Path:
+    files = _files()
+    if name in files:
+        return files[name]
+    near = get_close_matches(name, files, n=1)
+    raise LinkageError(
+        name,
+        'there is no such scene',
+        f'did you mean {near[0]!r}?' if near else f'there are: {", ".join(files)}',
+    )
+
+
+def _row(file: Path) -> tuple[str, ...]:
+    """Return what the list says of a scene: its drives, and what it says of itself."""
+    scene = load_scene(file)
+    drives = ' and '.join(dict.fromkeys(member.drive[0] for member in scene.members))
+    return scene.name, drives, 'yes' if scene.record else 'no', _first_sentence(file)
+
+
+def _first_sentence(file: Path) -> str:
+    """Return that of the comment at the head of a file."""
+    comment = []
+    for line in file.read_text('utf-8').splitlines():
+        if not line.startswith('#'):
+            break
+        if not line.startswith('# yaml-language-server:'):
+            comment.append(line.lstrip('# '))
+    return ' '.join(comment).partition('. ')[0].rstrip('.')

@@ -154,14 +154,14 @@ class Context:
 
     @cached_property
     def mechanics(self) -> Mechanics:
-        """The forces of the linkage, shared by all that ask for them."""
+        """Return the forces of the linkage, shared by all that ask for them."""
         from linkage_ros.dynamics.mechanics import Mechanics  # local import: where forces act
 
         return Mechanics(self.closure, self.loads, self.friction)
 
     @cached_property
     def reactions(self) -> Reactions:
-        """The forces in its pins and sliders, shared by all that ask for them."""
+        """Return the forces in its pins and sliders, shared by all that ask for them."""
         from linkage_ros.dynamics.reactions import Reactions  # local import: where forces act
 
         return Reactions(self.mechanics)

@@ -60,10 +60,8 @@ class Fault:
 
     Attributes
     ----------
-    kind
-        What goes wrong: a key of `FAULTS`.
-    parameters
-        Of that kind.
+    kind, parameters
+        What goes wrong: a key of `FAULTS`, and how.
     at
         When it is injected by itself, in [s] from the first tick.
     seconds

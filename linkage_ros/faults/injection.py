@@ -95,9 +95,9 @@ class Injection:
             self._next += 1
         while self._asked:
             due.append(self._asked.pop(0))
-        return [change for change in due if self.set(*change)]
+        return [change for change in due if self.turn(*change)]
 
-    def set(self, name: str, on: bool) -> bool:
+    def turn(self, name: str, on: bool) -> bool:
         """Turn a fault on or off; return whether it was not so."""
         switch = self.switches[name]
         if switch.on == on:

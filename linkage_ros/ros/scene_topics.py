@@ -131,12 +131,12 @@ class SceneTopics:
 
     @property
     def crank_topic(self) -> str:
-        """Resolved name of the topic that the drives listen to; '' for none."""
+        """Return the resolved name of the topic that the drives listen to; '' for none."""
         return '' if self.crank is None else str(self.crank.topic_name)
 
     @property
     def take(self) -> Take | None:
-        """Takes the next message for the drives."""
+        """Return what takes the next message for the drives, if they listen to a topic."""
         if self.crank is None:
             return None
         return partial(self.crank.handle.take_message, JointState, True)

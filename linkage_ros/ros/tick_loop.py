@@ -161,7 +161,7 @@ class TickLoop:
 
     @property
     def pipeline(self) -> Pipeline:
-        """The pipeline, as it was built last."""
+        """Return the pipeline, as it was built last."""
         return self._pipeline
 
     def _offer(self, message: bytes, info: dict[str, Any], now: int) -> bool:

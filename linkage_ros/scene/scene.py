@@ -80,17 +80,17 @@ class Member:
 
     @property
     def prefix(self) -> str:
-        """What its joints' names have before their own."""
+        """Return what its joints' names have before their own."""
         return f'{self.name}_' if self.name else ''
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The names under which its joints are published."""
+        """Return the names under which its joints are published."""
         return tuple(self.prefix + joint for joint in self.linkage.joints)
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The names of its driven joints in messages."""
+        """Return the names of its driven joints in messages."""
         return tuple(self.prefix + given.joint for given in self.linkage.inputs)
 
 
@@ -134,5 +134,5 @@ class Scene:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The names of all published joints, in their order."""
+        """Return the names of all published joints, in their order."""
         return tuple(joint for member in self.members for joint in member.joints)

@@ -46,15 +46,7 @@ def scene(text):
 
 
 def run(text, times, ask=None):
-    """
-    Tick at times, in [ms], as the tick loop does; return a message or nothing for each.
-
-    Parameters
-    ----------
-    ask
-        At which times somebody asks for what.
-
-    """
+    """Tick at times, in [ms], and let somebody ask for faults; return a message for each."""
     pipeline = Pipeline(scene(text))
     injection = pipeline.injection
     messages = []
