@@ -21,9 +21,9 @@ Run it in the checkout's own folder, as `make cost` does: ``python -m docs.make_
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from bench.machine import describe_machine
 from linkage_ros.cli.cost import all_effects
 from linkage_ros.cli.tables import Table
 
@@ -38,9 +38,11 @@ _LEFT_OUT = ('governor', 'kernel', 'rclpy', 'middleware')
 
 def main() -> int:
     """Measure and write."""
+    from bench.machine import describe_machine  # who reads the page's functions need not have it
+
     table = all_effects(_TICKS)
     assert table is not None, 'nobody stops it'
-    PAGE.write_text(filled(PAGE.read_text('utf-8'), measured(table)), 'utf-8')
+    PAGE.write_text(filled(PAGE.read_text('utf-8'), measured(table, describe_machine())), 'utf-8')
     return 0
 
 
@@ -51,13 +53,13 @@ def filled(page: str, text: str) -> str:
     return f'{head}{BEGIN}\n{text}\n{END}{tail}'
 
 
-def measured(table: Table) -> str:
+def measured(table: Table, machine: Sequence[tuple[str, str]]) -> str:
     """Return what is measured as Markdown: the machine, and the table."""
-    machine = [f'{name} {value}' for name, value in describe_machine() if name not in _LEFT_OUT]
+    on = ', '.join(f'{name} {value}' for name, value in machine if name not in _LEFT_OUT)
     rule = ['---:' if column.startswith('>') else '---' for column in table.columns]
     rows = [[column.lstrip('>') for column in table.columns], rule, *table.rows]
     lines = ['| ' + ' | '.join(row) + ' |' for row in rows]
-    return '\n'.join([f'{table.title}; {", ".join(machine)}.', '', *lines])
+    return '\n'.join([f'{table.title}; {on}.', '', *lines])
 
 
 if __name__ == '__main__':

@@ -103,7 +103,8 @@ def _head(file: Path) -> str:
     for line in file.read_text(encoding='utf-8').splitlines():
         if not line.startswith('#'):
             break
-        lines.append(line.lstrip('# ').rstrip())
+        if not line.startswith('# yaml-language-server:'):
+            lines.append(line.lstrip('# ').rstrip())
     return ' '.join(lines)
 
 

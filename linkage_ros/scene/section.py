@@ -68,6 +68,11 @@ class Section:
     def __iter__(self) -> Iterator[str]:
         return iter(self._content)
 
+    @property
+    def mapping(self) -> Mapping[str, Any]:
+        """Return all of it, as it was read."""
+        return self._content
+
     def error(self, key: str, reason: str, remedy: str) -> FileError:
         """Return the error for a key of this section ('' for the section itself)."""
         path = '.'.join(filter(None, (self._path, key)))

@@ -23,22 +23,15 @@ from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import FileError
 from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
+from linkage_ros.scene.load import load_scene, parse_scene
 import yaml
 
 from .files import CONFIG, is_one_line
 
-SHIPPED = [
-    (
-        scene.read_bytes(),
-        (scene.parent / yaml.safe_load(scene.read_text())['linkage']).read_bytes(),
-    )
-    for scene in sorted((CONFIG / 'scenes').glob('*.yaml'))
-]
+SHIPPED = [load_scene(scene).files for scene in sorted((CONFIG / 'scenes').glob('*.yaml'))]
 
 
-def either_runs_or_says_why(scene: bytes, linkage: bytes) -> None:
-    files = {'scene.yaml': scene, 'linkage.yaml': linkage}
+def either_runs_or_says_why(files: dict[str, bytes]) -> None:
     refused = None
     try:
         pipeline = Pipeline(parse_scene('damaged', 'bag', files))
@@ -48,14 +41,17 @@ def either_runs_or_says_why(scene: bytes, linkage: bytes) -> None:
         assert is_one_line(refused), refused
         return
     for angle in (0.0, 1.0, -2.0, 1e9):
-        pipeline.closures[0].position(angle)
+        for closure in pipeline.closures:
+            closure.position(*[angle] * len(closure.linkage.inputs))
+    pipeline.tick(1)
 
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_damaged_bytes(data):
-    files = [bytearray(file) for file in data.draw(st.sampled_from(SHIPPED))]
-    damaged = data.draw(st.sampled_from(files))
+    shipped = data.draw(st.sampled_from(SHIPPED))
+    files = {name: bytearray(file) for name, file in shipped.items()}
+    damaged = files[data.draw(st.sampled_from(sorted(files)))]
     for _ in range(data.draw(st.integers(1, 4))):
         place = data.draw(st.integers(0, len(damaged) - 1))
         kind = data.draw(st.sampled_from(('flip', 'cut', 'double')))
@@ -68,7 +64,7 @@ def test_damaged_bytes(data):
         else:
             end = place + 10
             damaged[place:place] = damaged[place:end]
-    either_runs_or_says_why(*map(bytes, files))
+    either_runs_or_says_why({name: bytes(file) for name, file in files.items()})
 
 
 ODD = [
@@ -88,8 +84,9 @@ def places(content, path=()):
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_damaged_contents(data):
-    files = [yaml.safe_load(file) for file in data.draw(st.sampled_from(SHIPPED))]
-    damaged = data.draw(st.sampled_from(files))
+    shipped = data.draw(st.sampled_from(SHIPPED))
+    files = {name: yaml.safe_load(file) for name, file in shipped.items()}
+    damaged = files[data.draw(st.sampled_from(sorted(files)))]
     for _ in range(data.draw(st.integers(1, 3))):
         *path, key = data.draw(st.sampled_from(sorted(places(damaged), key=str) or [('x',)]))
         parent = damaged
@@ -105,4 +102,4 @@ def test_damaged_contents(data):
             value = parent.pop(key, None)
             if kind == 'rename':
                 parent[f'{key}_'] = value
-    either_runs_or_says_why(*(yaml.safe_dump(file).encode() for file in files))
+    either_runs_or_says_why({name: yaml.safe_dump(file).encode() for name, file in files.items()})

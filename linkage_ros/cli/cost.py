@@ -1,0 +1,176 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Say what each effect of a scene costs on this machine, and what leaving it out would save."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from threading import Event
+
+from linkage_ros.cli.tables import show, Table
+from linkage_ros.cost.measure import EffectCost, measure, SceneCost, Times
+from linkage_ros.effects.stage import NEEDS
+from linkage_ros.errors import LinkageError
+from linkage_ros.scene.load import LINKAGE_FILE, load_scene, parse_scene, SCENE_FILE
+from linkage_ros.scene.scene import Scene
+from linkage_ros.shipped import shipped
+
+ALL = 'all'
+"""Name of the scene of all effects."""
+
+_TICKS = 10_000
+_MOST_TICKS = 10_000_000
+
+EVERY_EFFECT = b"""
+linkage: four_bar.yaml
+publish_input: true
+loads: {gravity: [0, -9.81]}
+effects:
+  tolerance: {standard_deviation: 2.0e-5}
+  backlash: {play: 0.01}
+  velocity: {}
+  acceleration: {}
+  friction: {joints: {O2: {coulomb: 0.01}}}
+  effort: {}
+  pin_forces: {}
+  compliance: {links: {coupler: 1.0e+7}}
+  clearance: {pins: {B: 1.0e-4}}
+  jitter: {seconds: 1.0e-4}
+  bias: {joints: {rocker_joint: 0.01}}
+  noise: {joints: {rocker_joint: {white: 0.001, walk: 0.001, rate_white: 0.01}}}
+  encoder: {joints: {rocker_joint: {counts: 4096}}}
+  rate_limit: {rate: 500}
+  dropout: {probability: 0.1, burst: 3}
+  delay: {seconds: 0.002}
+"""
+"""A scene with every effect, each for one joint, pin or link, on the four-bar that is shipped."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    one = parser.add_mutually_exclusive_group(required=True)
+    one.add_argument('scene', nargs='?', help='the scene file')
+    one.add_argument(
+        '--all', action='store_true', help='every effect, alone, on the four-bar that is shipped'
+    )
+    parser.add_argument(
+        '--ticks',
+        type=_ticks,
+        default=_TICKS,
+        help=f'how often each variant of the scene ticks (here {_TICKS})',
+    )
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Measure; return 1 where it was stopped."""
+    if arguments.all:
+        found = all_effects(arguments.ticks, stop.is_set)
+    else:
+        scene = load_scene(arguments.scene)
+        cost = measure(scene, arguments.ticks, stopped=stop.is_set)
+        if cost is not None and not cost.published:
+            raise LinkageError(
+                arguments.scene,
+                f'nothing is published in {arguments.ticks} ticks: there is nothing to measure',
+                'see that the linkage closes where the drive brings it',
+            )
+        found = table_of_scene(arguments.scene, cost, arguments.ticks) if cost else None
+    if found is None:
+        return 1
+    show(found)
+    return 0
+
+
+def all_effects(ticks: int, stopped: Callable[[], bool] = lambda: False) -> Table | None:
+    """Measure every effect, alone, on the four-bar; return nothing where it was stopped."""
+    cost = measure(every_effect(), ticks, leave_out=False, stopped=stopped)
+    return table_of_all(cost, ticks) if cost else None
+
+
+def every_effect() -> Scene:
+    """Return the scene of all effects."""
+    linkage = shipped('linkages/four_bar.yaml').read_bytes()
+    return parse_scene(ALL, ALL, {SCENE_FILE: EVERY_EFFECT, LINKAGE_FILE: linkage})
+
+
+def table_of_scene(title: str, cost: SceneCost, ticks: int) -> Table:
+    """Return the table of a scene."""
+    rows = [
+        (
+            effect.name,
+            *_adds(effect.adds),
+            f'{effect.adds.median / cost.whole.median:.1%}' if effect.adds else '',
+            '' if effect.saves is None else f'{effect.saves:.2f}',
+            _note(effect),
+        )
+        for effect in cost.effects
+    ]
+    part = '' if cost.published == 1.0 else f'; {cost.published:.1%} of them published something'
+    return Table(
+        f'{title}: {ticks} ticks each{part}',
+        ('', '>median [µs]', '>p99 [µs]', '>of the tick', '>saved if left out [µs]', ''),
+        [
+            _whole('a tick without effects', cost.bare, cost),
+            *([_whole('  of it the crank message', cost.offer, cost)] if cost.offer else []),
+            *rows,
+            _whole('a tick of the scene', cost.whole, cost),
+        ],
+    )
+
+
+def table_of_all(cost: SceneCost, ticks: int) -> Table:
+    """Return the table of all effects, each alone beside the bare scene."""
+    rows = [
+        (
+            effect.name,
+            *_adds(effect.adds),
+            f'{effect.adds.median / cost.bare.median:+.2f}' if effect.adds else '',
+            effect.beside or ', '.join(NEEDS.get(effect.name, ())),
+        )
+        for effect in cost.effects
+    ]
+    bare = f'{cost.bare.median:.2f}', f'{cost.bare.p99:.2f}', '1.00'
+    return Table(
+        f'Every effect, alone, on the four-bar: {ticks} ticks each',
+        ('', '>median [µs]', '>p99 [µs]', '>in bare ticks', 'with'),
+        [('a tick without effects', *bare, ''), *rows],
+    )
+
+
+def _whole(name: str, times: Times, cost: SceneCost) -> tuple[str, ...]:
+    share = times.median / cost.whole.median
+    return name, f'{times.median:.2f}', f'{times.p99:.2f}', f'{share:.1%}', '', ''
+
+
+def _adds(times: Times | None) -> tuple[str, str]:
+    return (f'{times.median:+.2f}', f'{times.p99:+.2f}') if times else ('', '')
+
+
+def _note(effect: EffectCost) -> str:
+    notes = [
+        f'added beside {effect.beside}' if effect.beside else '',
+        f'left out with {effect.left_out_with}' if effect.left_out_with else '',
+        f'needed by {", ".join(effect.needed_by)}' if effect.needed_by else '',
+    ]
+    return '; '.join(filter(None, notes))
+
+
+def _ticks(text: str) -> int:
+    ticks = int(text)
+    if not 1 <= ticks <= _MOST_TICKS:
+        raise argparse.ArgumentTypeError(f'{text} is out of bounds; write 1 to {_MOST_TICKS}')
+    return ticks

@@ -1,0 +1,157 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a scene consists of, as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import import_module
+from typing import Any
+
+from linkage_ros.cli.tables import Table
+from linkage_ros.drives.drive import DRIVES
+from linkage_ros.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
+from linkage_ros.line import Line
+from linkage_ros.parameters import declared
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.scene import Scene
+from linkage_ros.scene.schema import default_of, is_required, summary
+
+_WHERE = {
+    'alter': 'in the place of the linkage that is drawn',
+    'drive_stage': 'between motor and crank',
+    'begin': 'in the mechanism',
+    'stage': 'in the mechanism',
+    'sensor': 'between mechanism and message',
+}
+"""Where in a tick an effect stands, by the function that builds it."""
+
+_JOINT_STATE = 'sensor_msgs/msg/JointState'
+_MOST_NAMES = 4
+_LONGEST = 60
+
+
+def tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
+    """Yield what there is to say of a scene that has been built."""
+    yield Table(title, ('', ''), list(_facts(scene)))
+    for lines in _alike(pipeline.lines):
+        names = _some([line.member.name for line in lines if line.member.name])
+        heads = ('>', 'stage', 'where', 'what it does', 'as said here', '')
+        yield Table(f'Stages of {names}' if names else 'Stages', heads, list(_stages(lines[0])))
+    if scene.faults:
+        yield Table('Faults', ('name', 'kind', 'as said here', 'by itself'), list(_faults(scene)))
+    yield Table('Topics', ('', 'topic', 'message', ''), list(_topics(scene, pipeline)))
+
+
+def brought_in_by(stage: str, named: Any) -> str:
+    """Return what of the effects that are named brings in one that is not, with commas."""
+    bringing = [
+        name
+        for name in EFFECTS
+        if name in named and stage in (*NEEDS.get(name, ()), *PUBLISHED_WITH.get(name, ()))
+    ]
+    return ', '.join(bringing)
+
+
+def _facts(scene: Scene) -> Iterator[tuple[str, str]]:
+    if scene.members[0].name:
+        yield 'linkages', _some([member.name for member in scene.members])
+    joints = list(scene.joints)
+    yield 'joints', _some(joints)
+    rate = f'{scene.rate:g} a second' if scene.rate else 'one for every crank sample'
+    yield 'ticks', rate
+    yield 'angles', 'wrapped to (−π, π]' if scene.wrapped else 'continuous'
+    yield 'seed', str(scene.seed)
+    record = scene.record
+    recorded = (
+        f'{record.directory}/{record.name or f"{scene.name}, and the time"}' if record else 'no'
+    )
+    yield 'recorded', recorded
+
+
+def _alike(lines: list[Line]) -> list[list[Line]]:
+    """Return the linkages, those together that have the same drive and effects."""
+    groups: dict[str, list[Line]] = {}
+    for line in lines:
+        groups.setdefault(repr((line.member.drive, line.member.effects)), []).append(line)
+    return list(groups.values())
+
+
+def _stages(line: Line) -> Iterator[tuple[str, ...]]:
+    name, parameters = line.member.drive
+    module = import_module(DRIVES[name])
+    yield '0', name, 'drive', summary(module.PARAMETERS), _said(parameters), ''
+    for number, stage in enumerate(line.stages, 1):
+        module = import_module(EFFECTS[stage])
+        named = line.member.effects
+        yield (
+            str(number),
+            stage,
+            next(
+                (where for has, where in _WHERE.items() if hasattr(module, has)), 'in the forces'
+            ),
+            summary(module.PARAMETERS),
+            _said(named[stage]) if stage in named else '',
+            '' if stage in named else f'brought in by {brought_in_by(stage, named)}',
+        )
+
+
+def _faults(scene: Scene) -> Iterator[tuple[str, ...]]:
+    for name, fault in scene.faults.items():
+        times = ', '.join(f'{time:g}' for time in fault.at)
+        when = f'at {times} s, for {fault.seconds:g} s' if fault.at else 'on demand only'
+        yield name, fault.kind, _said(fault.parameters), when
+
+
+def _topics(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
+    if pipeline.topic:
+        yield 'listens to', pipeline.topic, _JOINT_STATE, ''
+    yield 'publishes', 'joint_states', _JOINT_STATE, f'{len(scene.joints)} joints'
+    for extra in pipeline.extras:
+        yield 'publishes', extra.topic, extra.message, ''
+    if scene.faults:
+        yield 'publishes', '~/faults', 'std_msgs/msg/String', 'which are injected'
+        services = [f'~/inject/{name}' for name in scene.faults]
+        yield 'serves', _some(services), 'std_srvs/srv/SetBool', ''
+
+
+def _said(parameters: Any) -> str:
+    """Return the parameters that are not as by default."""
+    said = [
+        f'{entry.name} {_shown(getattr(parameters, entry.name))}'
+        for entry, _ in declared(type(parameters))
+        if is_required(entry)
+        or _shown(getattr(parameters, entry.name)) != _shown(default_of(entry))
+    ]
+    text = ', '.join(said)
+    return text if len(text) <= _LONGEST else f'{text[: _LONGEST - 1]}…'
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, tuple | list):
+        return f'[{", ".join(map(_shown, value))}]'
+    if isinstance(value, dict):
+        return f'{{{", ".join(f"{key}: {_shown(one)}" for key, one in value.items())}}}'
+    if hasattr(value, '__dataclass_fields__'):
+        return f'{{{_said(value)}}}'
+    return f'{value:g}' if isinstance(value, float) else str(value)
+
+
+def _some(names: list[str]) -> str:
+    """Return names, the first ones where there are many, and how many."""
+    if len(names) <= _MOST_NAMES + 1:
+        return ', '.join(names)
+    return f'{", ".join(names[:_MOST_NAMES])}, … ({len(names)})'

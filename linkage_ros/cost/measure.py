@@ -1,0 +1,244 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What each effect of a scene costs: the scene's own pipeline, with and without it.
+
+A stage is not timed by itself, since what it costs is also what it makes of the message and what
+it brings in. Variants of the scene tick in turn, a block of ticks each, over the same simulated
+times and crank messages: what disturbs the machine disturbs them alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from random import Random
+from statistics import median
+from typing import NamedTuple
+
+from linkage_ros.cost.feed import feed
+from linkage_ros.cost.variants import bringing, FAULTS, Names, Variant, Variants
+from linkage_ros.effects.stage import EFFECTS, LOADED
+from linkage_ros.scene.scene import Scene
+
+_BLOCK = 100
+"""Ticks of a variant in one go: long enough for the caches, short beside a drift."""
+
+_WARM_UP = 200
+_THOUSAND = 1000
+
+
+class Times(NamedTuple):
+    """
+    How long ticks take.
+
+    Attributes
+    ----------
+    median
+        Of all ticks, in [µs].
+    p99
+        The 99th percentile of a thousand ticks on end: of those of all thousands the median, so
+        that it is not what else the machine did for a moment, in [µs].
+
+    """
+
+    median: float
+    p99: float
+
+
+@dataclass(frozen=True, slots=True)
+class EffectCost:
+    """
+    What an effect costs.
+
+    Attributes
+    ----------
+    name
+        Of the effect, or `FAULTS`.
+    adds
+        What it, and what it starts from, add to the scene without effects; nothing where it
+        cannot be measured alone.
+    beside
+        The effect beside which that was measured, since alone it acts on nothing; '' for none.
+    saves
+        By how much the median of the whole scene's tick is shorter without it, in [µs]; nothing
+        where it cannot be left out.
+    left_out_with
+        The effect that would act on nothing then and is left out too; '' for none.
+    needed_by
+        The effects that bring it in anyway.
+
+    """
+
+    name: str
+    adds: Times | None
+    beside: str
+    saves: float | None
+    left_out_with: str
+    needed_by: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SceneCost:
+    """
+    What a scene costs.
+
+    Attributes
+    ----------
+    offer
+        A crank message, read and taken; nothing where the drives listen to no topic.
+    bare
+        A tick of the scene without effects, its crank message with it.
+    whole
+        A tick of the scene, its crank message with it.
+    effects
+        What is between the two, in physical order.
+    published
+        The part of all ticks that published something.
+
+    """
+
+    offer: Times | None
+    bare: Times
+    whole: Times
+    effects: tuple[EffectCost, ...]
+    published: float
+
+
+def measure(
+    scene: Scene,
+    ticks: int,
+    *,
+    leave_out: bool = True,
+    stopped: Callable[[], bool] = lambda: False,
+) -> SceneCost | None:
+    """
+    Measure a scene on this machine.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    ticks
+        How often each variant ticks.
+    leave_out
+        Whether to measure also what leaving an effect out saves.
+    stopped
+        Asked now and then whether to give up; then nothing is returned.
+
+    Raises
+    ------
+    FileError
+        Where something in the scene does not go together.
+
+    """
+    named = Names(name for member in scene.members for name in member.effects)
+    named |= {FAULTS} if scene.faults else set()
+    variants = Variants(scene)
+    bare, whole = variants.build(Names()), variants.build(named)
+    computed = [name for name in (*EFFECTS, FAULTS) if name in named or bringing(name, named)]
+    added = {name: _added(name, named, variants) for name in computed}
+    without = {
+        name: _left_out(name, named, variants)
+        for name in computed
+        if leave_out and not bringing(name, named)
+    }
+    if not _run(variants, ticks, stopped):
+        return None
+
+    effects = []
+    for name in computed:
+        base, one, beside = added[name]
+        less, left_out_with = without.get(name, (None, ''))
+        effects.append(
+            EffectCost(
+                name,
+                _difference(one.ticks, base.ticks) if base and one else None,
+                beside,
+                _times(whole.ticks).median - _times(less.ticks).median if less else None,
+                left_out_with,
+                bringing(name, named),
+            )
+        )
+    offers = bare.offers
+    return SceneCost(
+        offer=_times(offers) if offers else None,
+        bare=_times(bare.ticks),
+        whole=_times(whole.ticks),
+        effects=tuple(effects),
+        published=whole.published / len(whole.ticks),
+    )
+
+
+def _added(
+    name: str, named: Names, variants: Variants
+) -> tuple[Variant | None, Variant | None, str]:
+    """Return the scene without and with an effect alone, or beside another; and which."""
+    for beside in ('', *(loaded for loaded in LOADED if loaded in named and loaded != name)):
+        base = Names({beside} - {''})
+        one = variants.attempt(base | {name})
+        if one is not None:
+            return variants.build(base), one, beside
+    return None, None, ''
+
+
+def _left_out(name: str, named: Names, variants: Variants) -> tuple[Variant | None, str]:
+    """Return the scene without an effect, and what has to go with it."""
+    for other in ('', 'friction'):
+        less = variants.attempt(named - {name, other})
+        if less is not None:
+            return less, other
+    return None, ''
+
+
+def _run(variants: Variants, ticks: int, stopped: Callable[[], bool]) -> bool:
+    """Let all variants tick; return whether nobody stopped it."""
+    contenders = list(variants.built.values())
+    times = feed(variants.scene, contenders[0].pipeline)
+    shuffle = Random(0).shuffle
+    for number, size in enumerate((_WARM_UP, *_blocks(ticks))):
+        if stopped():
+            return False
+        nows, messages = zip(*[next(times) for _ in range(size)], strict=True)
+        # Who runs first, or behind a slow one, finds the caches cold: nobody always does.
+        shuffle(contenders)
+        for contender in contenders:
+            contender.run(nows, messages)
+            if number == 0:
+                contender.forget()
+    return True
+
+
+def _blocks(ticks: int) -> Iterator[int]:
+    for begin in range(0, ticks, _BLOCK):
+        yield min(_BLOCK, ticks - begin)
+
+
+def _times(nanoseconds: Sequence[int]) -> Times:
+    count = len(nanoseconds)
+    parts = max(1, count // _THOUSAND)
+    ends = [count * i // parts for i in range(parts + 1)]
+    p99s = [_p99(nanoseconds[begin:end]) for begin, end in pairwise(ends)]
+    return Times(median(nanoseconds) * 1e-3, median(p99s) * 1e-3)
+
+
+def _p99(nanoseconds: Sequence[int]) -> int:
+    return sorted(nanoseconds)[int(0.99 * (len(nanoseconds) - 1))]
+
+
+def _difference(one: Sequence[int], other: Sequence[int]) -> Times:
+    return Times(*(a - b for a, b in zip(_times(one), _times(other), strict=True)))

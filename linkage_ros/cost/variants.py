@@ -1,0 +1,120 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Variants of a scene, which differ in the effects that they have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from importlib import import_module
+from time import perf_counter_ns
+
+from linkage_ros.effects.stage import EFFECTS, LOADED, NEEDS, PUBLISHED_WITH
+from linkage_ros.errors import FileError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.scene import Member, Scene
+
+FAULTS = 'faults'
+"""What stands in the place of an effect for all faults of a scene, while none is injected."""
+
+Names = frozenset[str]
+
+
+class Variant:
+    """A variant of the scene at work, and how long its ticks took, in [ns]."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        self.pipeline = pipeline
+        self.ticks: list[int] = []
+        self.offers: list[int] = []
+        self.published = 0
+
+    def run(self, nows: Sequence[int], messages: Sequence[bytes]) -> None:
+        """Tick at these times, in [ns], each after its message."""
+        offer, tick, clock = self.pipeline.offer, self.pipeline.tick, perf_counter_ns
+        for now, message in zip(nows, messages, strict=True):
+            begin = clock()
+            if message:
+                offer(message, now)
+                self.offers.append(clock() - begin)
+            done = tick(now)
+            self.ticks.append(clock() - begin)
+            self.published += bool(done.message)
+
+    def forget(self) -> None:
+        """Begin to count."""
+        self.ticks.clear()
+        self.offers.clear()
+        self.published = 0
+
+
+class Variants:
+    """Variants of a scene, by the effects that they have."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.built: dict[Names, Variant] = {}
+        self._closures: dict[bool, list[Closure]] = {}
+
+    def build(self, named: Names) -> Variant:
+        """Return the scene with these of its effects, and without its recording."""
+        if named not in self.built:
+            scene = replace(
+                self.scene,
+                members=tuple(_with(member, named) for member in self.scene.members),
+                faults=self.scene.faults if FAULTS in named else {},
+                record=None,
+            )
+            # To solve a linkage for the first time may take a second where it is iterated.
+            altered = 'tolerance' in named
+            pipeline = Pipeline(scene, self._closures.get(altered))
+            self._closures.setdefault(altered, pipeline.closures)
+            self.built[named] = Variant(pipeline)
+        return self.built[named]
+
+    def attempt(self, named: Names) -> Variant | None:
+        """Return the scene with these effects; nothing where they do not go together."""
+        try:
+            return self.build(named)
+        except FileError:
+            return None
+
+
+def bringing(name: str, named: Iterable[str]) -> tuple[str, ...]:
+    """Return the effects, of those named, that bring another in."""
+    return tuple(
+        other
+        for other in EFFECTS
+        if other in named and name in (*NEEDS.get(other, ()), *_with_it(other))
+    )
+
+
+def _with_it(effect: str) -> tuple[str, ...]:
+    return PUBLISHED_WITH.get(effect, ())
+
+
+def _with(member: Member, named: Names) -> Member:
+    """Return a linkage with these effects, of those that it has or that they bring in."""
+    own = member.effects
+    brought = {need for effect in own for need in (*NEEDS.get(effect, ()), *_with_it(effect))}
+    effects = {
+        name: own[name] if name in own else import_module(EFFECTS[name]).PARAMETERS()
+        for name in EFFECTS
+        if name in named and (name in own or name in brought)
+    }
+    forced = member.drive[0] == 'torque' or not named.isdisjoint(LOADED)
+    return replace(member, effects=effects, loads=member.loads if forced else None)

@@ -1,0 +1,215 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The JSON Schema of a scene file: what `linkage_ros.scene.load` reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
+
+from linkage_ros.drives.drive import DRIVES
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.faults.fault import FAULTS
+from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
+from linkage_ros.scene.schema import (
+    CHARACTER,
+    DIALECT,
+    mapping,
+    named,
+    number,
+    parameters_schema,
+    point,
+    ROS_NAME,
+    Schema,
+    text,
+)
+
+_RATE = 'Ticks a second [Hz]; 0: one for every crank sample.'
+_STRONGEST = 1e9
+_STIFFEST = 1e12
+
+
+def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
+    """Return the type of parameters of each drive, effect or fault of a registry."""
+    return {name: import_module(module).PARAMETERS for name, module in registry.items()}
+
+
+def scene_schema() -> Schema:
+    """Return the schema of a scene file; it imports all drives, effects and faults."""
+    own = {key: {'$ref': f'#/$defs/{key}'} for key in _of_a_linkage()}
+    whole = mapping(
+        'A linkage or several, what drives them, what is called for, and a recording.',
+        {
+            'linkage': text('path of the linkage file, relative to the folder of this file'),
+            'linkages': _linkages(own),
+            'rate': {
+                **number(_RATE, least=0.0, most=HIGHEST_RATE),
+                'if': {'exclusiveMinimum': 0},
+                'then': number(_RATE, least=LOWEST_RATE),
+                'default': 1000,
+            },
+            'angles': {
+                'description': 'Whether published angles run on, or lie in (−π, π].',
+                'enum': ['continuous', 'wrapped'],
+                'default': 'continuous',
+            },
+            'seed': {
+                'description': 'From which everything random comes.',
+                'type': 'integer',
+                'minimum': 0,
+                'maximum': 2**53,
+                'default': 0,
+            },
+            **own,
+            'faults': {
+                **named('What can go wrong on demand, by a name for each.', _fault()),
+                'propertyNames': text('a name: letters, digits and _, a letter first', ROS_NAME),
+            },
+            'record': _record(),
+        },
+    )
+    return {
+        '$schema': DIALECT,
+        'title': 'Scene',
+        **whole,
+        'if': {'required': ['linkages']},
+        'then': {'properties': {'linkage': False}},
+        'else': {'required': ['linkage']},
+        '$defs': _of_a_linkage(),
+    }
+
+
+def _linkages(own: Mapping[str, Schema]) -> Schema:
+    one = mapping(
+        'A linkage; what it does not say for itself is as the scene says.',
+        {
+            'name': text(
+                'its name, which its joints have before their own: letters, digits and _',
+                ROS_NAME,
+            ),
+            'linkage': text('path of its file, relative to the folder of this file'),
+            **own,
+        },
+        required=('name', 'linkage'),
+    )
+    return {
+        'description': 'Several linkages in the place of one.',
+        'if': {'type': 'array'},
+        'then': {'minItems': 1, 'items': one},
+        'else': one,
+    }
+
+
+def _of_a_linkage() -> dict[str, Schema]:
+    """Return what the scene says for all linkages, and each may say for itself."""
+    drives, effects = (
+        {name: parameters_schema(of) for name, of in parameter_types(registry).items()}
+        for registry in (DRIVES, EFFECTS)
+    )
+    return {
+        'publish_input': {
+            'description': 'Whether the input joints are published too, before the others; '
+            'without it, they are where the drive is no topic, or effort is named.',
+            'type': 'boolean',
+        },
+        'drive': {
+            **mapping('Where the crank comes from: one drive.', drives),
+            'maxProperties': 1,
+            'default': {'topic': {}},
+        },
+        'effects': {**mapping('What is called for beyond positions.', effects), 'default': {}},
+        'loads': mapping(
+            'The forces that act on the links, where effects or the drive ask for them.',
+            {
+                'gravity': {**point('gravity: [x, y] [m/s²]', 1e3), 'default': [0, 0]},
+                'springs': named('springs between points of links, by name', _spring()),
+                'drive_inertia': {
+                    **number(
+                        'of the motor, at the input [kg·m², or kg of a slide]',
+                        least=0.0,
+                        most=_STRONGEST,
+                    ),
+                    'default': 0,
+                },
+            },
+        ),
+    }
+
+
+def _spring() -> Schema:
+    end = text('where it ends: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
+    free = number('length without a force [m]', least=0.0, most=_STRONGEST)
+    damping = number('damping along it [N·s/m]', least=0.0, most=_STIFFEST)
+    return mapping(
+        'A spring, with a damper beside it.',
+        {
+            'from': end,
+            'to': end,
+            'stiffness': number('stiffness [N/m]', least=0.0, most=_STIFFEST),
+            'free_length': {**free, 'default': 0},
+            'damping': {**damping, 'default': 0},
+        },
+        required=('from', 'to', 'stiffness'),
+    )
+
+
+def _fault() -> Schema:
+    kinds = {name: parameters_schema(of) for name, of in parameter_types(FAULTS).items()}
+    return {
+        **mapping(
+            'A fault of one kind, injected by service, or at the times that are said.',
+            {
+                **kinds,
+                'at': {
+                    'description': 'when it is injected by itself, from the first tick on [s]',
+                    'type': 'array',
+                    'items': number('a time [s]', least=0.0, most=1e9),
+                },
+                'seconds': number('how long it lasts then [s]', least=1e-6, most=1e9),
+            },
+        ),
+        'oneOf': [{'required': [kind]} for kind in kinds],
+        'if': {'required': ['at'], 'properties': {'at': {'minItems': 1}}},
+        'then': {'required': ['seconds']},
+        'else': {'properties': {'seconds': False}},
+    }
+
+
+def _record() -> Schema:
+    return mapping(
+        'How the run is recorded; without it, it is not.',
+        {
+            'directory': {
+                **text("folder of the bags' folders, relative to where the node is started"),
+                'default': 'runs',
+            },
+            'name': {
+                **text(
+                    "name of the bag's folder; '': the scene's name and the time",
+                    rf'^(?!\.\.?$)(?!.*/){CHARACTER}*$',
+                ),
+                'default': '',
+            },
+            'queue': {
+                'description': 'how many messages wait for the disk before more are dropped',
+                'type': 'integer',
+                'minimum': 100,
+                'maximum': 10_000_000,
+                'default': 20_000,
+            },
+        },
+    )

@@ -1,0 +1,556 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The JSON Schemas say what the strict reader takes: of shipped files, bad files, random ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+import json
+from pathlib import Path
+from typing import Any
+
+from hypothesis import given, HealthCheck, settings
+from hypothesis import strategies as st
+from linkage_ros.drives.drive import DRIVES
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.errors import FileError
+from linkage_ros.faults.fault import FAULTS
+from linkage_ros.parameters import (
+    Choice,
+    choice,
+    declared,
+    Each,
+    each,
+    File,
+    file,
+    Flag,
+    flag,
+    Group,
+    group,
+    KINDS,
+    Name,
+    name,
+    Names,
+    names,
+    Number,
+    number,
+    Numbers,
+    numbers,
+    Point,
+    point,
+    Rows,
+    rows,
+    Text,
+    text,
+    whole,
+)
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_schema import linkage_schema
+from linkage_ros.scene.load import load_scene, parse_scene
+from linkage_ros.scene.read import read_parameters
+from linkage_ros.scene.scene_schema import parameter_types, scene_schema
+from linkage_ros.scene.schema import as_text, KIND_NAMES, parameters_schema
+from linkage_ros.scene.section import Section
+from linkage_ros.scene.yaml_file import parse_yaml
+import pytest
+import yaml
+
+from .files import CONFIG, FOUR_BAR, SCENE
+from .test_bad_linkages import SLIDER, WRITTEN_OUT
+
+Validator = pytest.importorskip('jsonschema').Draft202012Validator
+
+SCENES = sorted((CONFIG / 'scenes').glob('*.yaml'))
+LINKAGES = sorted((CONFIG / 'linkages').glob('*.yaml'))
+SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
+
+
+@pytest.fixture(scope='module')
+def valid():
+    """Return a function that says whether contents are valid, by the kind of file."""
+    validators = {kind: Validator(schema()) for kind, schema in SCHEMAS.items()}
+    return lambda kind, content: validators[kind].is_valid(content)
+
+
+def content_of(data: bytes) -> Any:
+    return parse_yaml(data, 'file').mapping
+
+
+@pytest.mark.parametrize('kind', SCHEMAS)
+def test_the_schema_is_one(kind):
+    schema = SCHEMAS[kind]()
+    assert schema['$schema'] == 'https://json-schema.org/draft/2020-12/schema'
+    Validator.check_schema(schema)
+
+
+@pytest.mark.parametrize('kind', SCHEMAS)
+def test_the_published_file_is_what_the_code_says(kind):
+    published = (CONFIG / 'schema' / f'{kind}.schema.json').read_text('utf-8')
+    assert published == as_text(SCHEMAS[kind]()), 'run make schema'
+
+
+@pytest.mark.parametrize('path', SCENES + LINKAGES, ids=lambda path: path.stem)
+def test_a_shipped_file_is_valid_and_names_its_schema(path, valid):
+    kind = path.parent.name.removesuffix('s')
+    data = path.read_bytes()
+    assert valid(kind, content_of(data))
+    first, _, _ = data.decode().partition('\n')
+    assert first == f'# yaml-language-server: $schema=../schema/{kind}.schema.json'
+    assert (path.parent / first.partition('=')[2]).is_file()
+
+
+def test_all_that_scenes_can_name_is_in_the_schema():
+    schema = scene_schema()
+    own = schema['$defs']
+    assert list(own['drive']['properties']) == list(DRIVES)
+    assert list(own['effects']['properties']) == list(EFFECTS)
+    fault = schema['properties']['faults']['additionalProperties']['properties']
+    assert list(fault) == [*FAULTS, 'at', 'seconds']
+    for registry in (DRIVES, EFFECTS, FAULTS):
+        for of in parameter_types(registry).values():
+            assert list(parameters_schema(of)['properties']) == [f.name for f, _ in declared(of)]
+
+
+def test_no_mapping_lets_strangers_in():
+    def mappings(schema):
+        if isinstance(schema, dict):
+            if schema.get('type') == 'object':
+                yield schema
+            for inner in schema.values():
+                yield from mappings(inner)
+        elif isinstance(schema, list):
+            for inner in schema:
+                yield from mappings(inner)
+
+    for schema in (scene_schema(), linkage_schema()):
+        found = list(mappings(schema))
+        assert len(found) > 10
+        for one in found:
+            # Either keys are known, or they are names and their values are.
+            assert one['additionalProperties'] is False or 'properties' not in one
+            assert one['additionalProperties'] != {}
+
+
+def test_every_kind_of_part_has_a_name():
+    assert tuple(KIND_NAMES) == KINDS
+
+
+# Appended to a scene that says no more than its linkage. A schema cannot know what follows in
+# SEEN_BY_THE_READER.
+BAD_SCENES = {
+    'unknown key': 'rtae: 5',
+    'unknown drive': 'drive: {tropic: {}}',
+    'two drives': 'drive: {topic: {}, sine: {amplitude: 1, frequency: 1}}',
+    'unknown parameter of a drive': 'drive: {topic: {age: 1}}',
+    'parameter of a drive out of bounds': 'drive: {topic: {max_age: 0}}',
+    'parameter of a drive of a wrong type': 'drive: {topic: {carry_forward: yes}}',
+    'parameter of a drive that is missing': 'drive: {constant_rate: {}}',
+    'drive without a mapping': 'drive: {topic: }',
+    'unknown effect': 'effects: {velocty: {}}',
+    'effects in a list': 'effects: [velocity]',
+    'effect without a mapping': 'effects: {velocity: }',
+    'unknown parameter of an effect': 'effects: {velocity: {gain: 2}}',
+    'parameter of an effect that is missing': 'effects: {delay: {}}',
+    'parameter of an effect out of bounds': 'effects: {dropout: {probability: 1.5}}',
+    'parameter of an effect of a wrong type': 'effects: {delay: {seconds: soon}}',
+    'choice that is none': 'effects: {delay: {seconds: 0.1, between: guessed}}',
+    'number that is not whole': 'effects: {encoder: {joints: {rocker_joint: {counts: 0.5}}}}',
+    'nested parameter unknown': 'effects: {noise: {joints: {rocker_joint: {whit: 1}}}}',
+    'nested parameter out of bounds': 'effects: {noise: {joints: {rocker_joint: {white: -1}}}}',
+    'rate of text': 'rate: fast',
+    'rate of a flag': 'rate: true',
+    'rate of nothing': 'rate:',
+    'rate below 0': 'rate: -1',
+    'rate beyond a core': 'rate: 1.0e+9',
+    'hardly a rate': 'rate: 1.0e-9',
+    'angles': 'angles: unwrapped',
+    'seed below 0': 'seed: -1',
+    'seed that is not whole': 'seed: 0.5',
+    'publish_input of text': 'publish_input: yes',
+    'gravity of three': 'loads: {gravity: [0, 0, -9.81]}',
+    'spring without stiffness': 'loads: {springs: {s: {from: ground.O2, to: crank.A}}}',
+    'spring from no point': 'loads: {springs: {s: {from: O2, to: crank.A, stiffness: 1}}}',
+    'unknown load': 'loads: {wind: 1}',
+    'fault of no kind': 'faults: {f: {}}',
+    'fault of two kinds': 'faults: {f: {freeze: {}, silence: {}}}',
+    'fault whose name is none of ROS': 'faults: {a-b: {freeze: {}}}',
+    'unknown fault': 'faults: {f: {frieze: {}}}',
+    'fault before the first tick': 'faults: {f: {freeze: {}, at: [-1], seconds: 1}}',
+    'fault without an end': 'faults: {f: {freeze: {}, at: [1]}}',
+    'fault with an end and no beginning': 'faults: {f: {freeze: {}, seconds: 1}}',
+    'bag in a folder': 'record: {name: a/b}',
+    'bag above': 'record: {name: ..}',
+    'bag here': 'record: {name: .}',
+    'bag name a number': 'record: {name: 7}',
+    'bag without a folder': "record: {directory: ''}",
+    'line break in a name': 'record: {name: "a\\nb"}',
+    'half a message': 'record: {queue: 100.5}',
+    'hardly a queue': 'record: {queue: 1}',
+    'linkages beside linkage': 'linkages: [{name: a, linkage: linkage.yaml}]',
+}
+
+SEEN_BY_THE_READER = {
+    'joint that does not exist': 'effects: {bias: {joints: {wrist: 0.1}}}',
+    'link that does not exist': 'faults: {f: {broken_link: {link: boom}}}',
+    'not a number': 'rate: .nan',
+    'effort of an input that is not published': 'publish_input: false\neffects: {effort: {}}',
+}
+
+
+@pytest.mark.parametrize('kind', BAD_SCENES | SEEN_BY_THE_READER)
+def test_a_bad_scene_is_refused_by_the_reader_and_where_it_can_know_by_the_schema(
+    kind, build, valid
+):
+    scene = SCENE + (BAD_SCENES | SEEN_BY_THE_READER)[kind].encode()
+    with pytest.raises(FileError):
+        build(scene)
+    assert valid('scene', content_of(scene)) == (kind in SEEN_BY_THE_READER)
+
+
+@pytest.mark.parametrize(
+    'scene',
+    [
+        '{}',
+        'linkages: []',
+        'linkages: [{linkage: linkage.yaml}]',
+        'linkages: [{name: a}]',
+        'linkages: [{name: 1a, linkage: linkage.yaml}]',
+        'linkages: [{name: a, linkage: linkage.yaml, rate: 100}]',
+        'linkages: {name: a, linkage: linkage.yaml, effects: {velocty: {}}}',
+    ],
+)
+def test_bad_linkages_of_a_scene(scene, build, valid):
+    with pytest.raises(FileError):
+        build(scene.encode())
+    assert not valid('scene', content_of(scene.encode()))
+
+
+@pytest.mark.parametrize(
+    'scene',
+    [
+        'linkages: {name: a, linkage: linkage.yaml}',
+        'seed: 2\nlinkages: [{name: a, linkage: linkage.yaml, effects: {velocity: {}}}]',
+        'linkage: linkage.yaml\nrate: 0',
+        'linkage: linkage.yaml\nrate: 0.01\nseed: 5.0\nrecord: {name: ""}',
+        'linkage: linkage.yaml\nfaults: {f: {freeze: {}, at: [0, 1], seconds: 0.5}}',
+        'linkage: linkage.yaml\nfaults: {f: {freeze: {}, at: []}}',
+        'linkage: linkage.yaml\ndrive: {}\neffects: {}',
+    ],
+)
+def test_good_scenes(scene, build, valid):
+    build(scene.encode())
+    assert valid('scene', content_of(scene.encode()))
+
+
+def slider(text: bytes) -> bytes:
+    full = (CONFIG / 'linkages' / 'scotch_yoke.yaml').read_bytes()
+    old = b'{point: Y, block: yoke, angle: 0, along: ground, through: O2, direction: [1, 0]}'
+    assert old in full
+    return full.replace(old, text)
+
+
+# The whole file; what a schema cannot know follows in SEEN_IN_A_LINKAGE.
+BAD_LINKAGES = {
+    'nothing known': b'bars: 4',
+    'shorthand without a side': b'four_bar: {a: 1, b: 1, c: 1}',
+    'zero length': FOUR_BAR.replace(b'0.04', b'0'),
+    'a length beyond squaring': FOUR_BAR.replace(b'0.04', b'1.0e+200'),
+    'side of another shape': FOUR_BAR.replace(b'}', b', assembly: ahead}'),
+    'two shorthands': FOUR_BAR + SLIDER,
+    'shorthand and links': FOUR_BAR + b'links: {}',
+    'swivel that is no point': SLIDER.replace(b', 0.1', b''),
+    'point of three': WRITTEN_OUT.replace(b'[0.040, 0]', b'[0.040, 0, 0]'),
+    'point far away': WRITTEN_OUT.replace(b'[0.040, 0]', b'[1.0e+300, 0]'),
+    'side that is none': WRITTEN_OUT.replace(b'B: left', b'B: above'),
+    'input of nothing': WRITTEN_OUT.replace(
+        b'input: {joint: crank_joint, parent: ground, child: crank}', b'input: []'
+    ),
+    'input without a parent': WRITTEN_OUT.replace(b'parent: ground, child: crank}', b'}'),
+    'slider and parent': WRITTEN_OUT.replace(
+        b'{parent: crank, child: coupler}', b'{slider: s, parent: crank}'
+    ),
+    'nothing to publish': WRITTEN_OUT[: WRITTEN_OUT.index(b'joints:')] + b'joints: {}',
+    'joints missing': WRITTEN_OUT[: WRITTEN_OUT.index(b'joints:')],
+    'paths of no names': WRITTEN_OUT.replace(b'traced: [P]', b'traced: [1]'),
+    'pose without points': WRITTEN_OUT + b'pose: {inputs: [0]}',
+    'weightless': WRITTEN_OUT + b'masses: {crank: {mass: 0, center: [0, 0], inertia: 0}}',
+    'mass without a place': WRITTEN_OUT + b'masses: {crank: {mass: 1, inertia: 0}}',
+    'angle of no block': slider(
+        b'{point: Y, angle: 0, along: ground, through: O2, direction: [1, 0]}'
+    ),
+    'slider without a direction': slider(b'{point: Y, block: yoke, along: ground, through: O2}'),
+}
+SEEN_IN_A_LINKAGE = {
+    'NaN length': FOUR_BAR.replace(b'0.04', b'.nan'),
+    'closes nowhere': FOUR_BAR.replace(b'0.1}', b'1.0}'),
+    'no ground': WRITTEN_OUT.replace(b'ground:', b'base:'),
+    'crank that is no link': WRITTEN_OUT.replace(b'child: crank}', b'child: krank}'),
+    'no side': WRITTEN_OUT.replace(b'B: left', b''),
+    'slide of no slider': WRITTEN_OUT.replace(b'{parent: crank, child: coupler}', b'{slider: s}'),
+}
+
+
+@pytest.mark.parametrize('kind', BAD_LINKAGES | SEEN_IN_A_LINKAGE)
+def test_a_bad_linkage_is_refused_by_the_reader_and_where_it_can_know_by_the_schema(kind, valid):
+    data = (BAD_LINKAGES | SEEN_IN_A_LINKAGE)[kind]
+    if b'masses:' in data:  # those that the shipped file has make room
+        head, _, tail = data.rpartition(b'masses:')
+        data = head.partition(b'masses:')[0] + b'masses:' + tail
+    with pytest.raises(FileError):
+        read_linkage(parse_yaml(data, 'linkage.yaml'))
+    assert valid('linkage', content_of(data)) == (kind in SEEN_IN_A_LINKAGE)
+
+
+ODD = [
+    None, True, 0, -1, 1e-300, 1e300, 10**400, '', 'left', 'ground', 'O2', 'crank', [], [0, 0],
+    [1e9, -1e9], [True, 0], {}, {'O2': [0, 0]}, [[0]], '\0', 'é',
+]  # fmt: skip
+
+
+def places(content: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the path of each key, through lists too."""
+    for key, value in content.items() if isinstance(content, dict) else enumerate(content):
+        yield (*path, key)
+        if isinstance(value, dict | list):
+            yield from places(value, (*path, key))
+
+
+def files_of(path: Path) -> dict[str, Any]:
+    """Return the contents of a scene's files, as a bag names them."""
+    scene = yaml.safe_load(path.read_bytes())
+    entries = scene.get('linkages', [scene])
+    linkages = [yaml.safe_load((path.parent / one['linkage']).read_bytes()) for one in entries]
+    return {'scene.yaml': scene} | {f'linkage_{i}.yaml': one for i, one in enumerate(linkages)}
+
+
+SHIPPED = [files_of(path) for path in SCENES]
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(data=st.data())
+def test_what_the_reader_takes_of_damaged_files_the_schema_takes_too(data, valid):
+    contents = deepcopy(data.draw(st.sampled_from(SHIPPED)))
+    damaged = contents[data.draw(st.sampled_from(sorted(contents)))]
+    for _ in range(data.draw(st.integers(1, 2))):
+        *path, key = data.draw(st.sampled_from(sorted(places(damaged), key=str) or [('x',)]))
+        parent = damaged
+        for part in path:
+            parent = parent[part]
+        if data.draw(st.booleans()) or isinstance(parent, list):
+            parent[key] = deepcopy(data.draw(st.sampled_from(ODD)))
+        else:
+            parent.pop(key, None)
+    files = {name_: yaml.safe_dump(content).encode() for name_, content in contents.items()}
+    try:
+        parse_scene('damaged', 'bag', files)
+    except FileError:
+        return
+    for name_, text_ in files.items():
+        assert valid(name_.partition('_')[0].partition('.')[0], content_of(text_)), name_
+
+
+@dataclass(frozen=True, slots=True)
+class One:
+    """Of each."""
+
+    size: float = number('how large', unit='m', above=0.0, most=2.0)
+    loud: bool = flag('whether it is', False)
+
+
+@dataclass(frozen=True, slots=True)
+class Within:
+    """Within others."""
+
+    depth: int = whole('how deep', 3, least=1, most=9)
+
+
+@dataclass(frozen=True, slots=True)
+class AllKinds:
+    """Parameters of every kind."""
+
+    must: float = number('that must be there', unit='s', least=-1.0, most=1.0)
+    table: tuple[tuple[float, ...], ...] = rows('a table', ('time [s]', 'angle [rad]'), most=5.0)
+    path: str = file('where')
+    ones: Mapping[str, One] = each('of each', 'pin', One, required=True)
+    count: int = whole('that is whole', 1, least=0, most=100)
+    some: tuple[float, ...] = numbers('some', (), most=10.0)
+    on: bool = flag('whether', True)
+    word: str = choice('which', ('one', 'other'), 'one')
+    title: str = text('what it is called', 'none')
+    place: tuple[float, float] = point('where', (0.0, 0.0), unit='m', most=3.0)
+    joint: str = name('which', 'joint', 'rocker')
+    joints: tuple[str, ...] = names('which', 'joint')
+    gains: Mapping[str, float] = each('of each', 'joint', Number('gain', '', least=0.0))
+    shifts: Mapping[str, Any] = each('of each', 'link', Point('[x, y]', 'm', 1.0))
+    within: Within = group('further', Within)  # noqa: RUF009 (a field, as the others are)
+
+
+PARTS = dict.fromkeys(KINDS, ('rocker', 'crank'))
+STRANGE = st.sampled_from(
+    [None, True, -7, 7, 0.5, '', 'rocker', [], [1], [1, 2, 3], {}, {'rocker': 'x'}]
+)
+FINITE = st.floats(-12.0, 12.0) | st.integers(-12, 12) | st.just(1e300)
+
+
+def values_of(kind: Any) -> st.SearchStrategy[Any]:
+    """Return values of which about half are what a kind of parameter takes."""
+    part = st.sampled_from(['rocker', 'crank'])
+    pair = st.lists(FINITE, min_size=1, max_size=3)
+    match kind:
+        case Number():
+            good = FINITE
+        case Numbers():
+            good = st.lists(FINITE, max_size=3)
+        case Rows():
+            width = len(kind.columns)
+            good = st.lists(st.lists(FINITE, min_size=width, max_size=width), max_size=3)
+        case Flag():
+            good = st.booleans()
+        case Choice():
+            good = st.sampled_from([*kind.words, 'neither'])
+        case Text() | File():
+            good = st.sampled_from(['a b', 'ü', 'a\nb', '\u2028', '\xa0', '0'])
+        case Point():
+            good = pair
+        case Name():
+            good = part
+        case Names():
+            good = st.lists(part | st.just(''), max_size=2)
+        case Group():
+            good = contents_of(kind.of)
+        case Each():
+            inner = contents_of(kind.of) if isinstance(kind.of, type) else values_of(kind.of)
+            good = st.dictionaries(part, inner, max_size=2)
+    return st.one_of(good, good, good, STRANGE)
+
+
+def contents_of(of: Any) -> st.SearchStrategy[dict[str, Any]]:
+    """Return contents of a section of such parameters, most of them near what it takes."""
+    required = {entry.name: values_of(kind) for entry, kind in declared(of)}
+    whole_section = st.fixed_dictionaries({}, optional=required)
+    stranger = st.sampled_from([{}, {}, {}, {'stranger': 1}])
+    return st.builds(lambda content, more: content | more, whole_section, stranger)
+
+
+TYPES = {
+    'all kinds': AllKinds,
+    **{
+        f'{what} {name_}': of
+        for what, registry in (('drive', DRIVES), ('effect', EFFECTS), ('fault', FAULTS))
+        for name_, of in parameter_types(registry).items()
+    },
+}
+
+
+def reads(content: dict[str, Any], of: Any) -> bool:
+    try:
+        read_parameters(Section('scene.yaml', '', content), of, PARTS)
+    except FileError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize('what', TYPES)
+def test_schema_and_reader_take_the_same_parameters(what):
+    of = TYPES[what]
+    validator = Validator(parameters_schema(of))
+
+    @settings(
+        max_examples=200 if of is AllKinds else 60,
+        deadline=None,
+        suppress_health_check=[HealthCheck.too_slow],
+    )
+    @given(contents_of(of))
+    def same(content):
+        assert validator.is_valid(content) == reads(content, of)
+
+    same()
+
+
+GOOD = {
+    'must': 0.5, 'table': [[0, 1], [1, 2.5]], 'path': 'a.csv', 'ones': {'rocker': {'size': 2}},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('change', 'taken'),
+    [
+        ({}, True),
+        ({'must': 1.0}, True),
+        ({'must': 1.0000001}, False),
+        ({'must': True}, False),
+        ({'count': 100}, True),
+        ({'count': 7.0}, True),
+        ({'count': 7.5}, False),
+        ({'count': 101}, False),
+        ({'table': []}, False),
+        ({'table': [[0, 1], [1]]}, False),
+        ({'table': [[0, 6]]}, False),
+        ({'some': [-10, 10]}, True),
+        ({'some': [-10.5]}, False),
+        ({'word': 'other'}, True),
+        ({'word': 'third'}, False),
+        ({'title': ''}, False),
+        ({'place': [-3, 3]}, True),
+        ({'place': [3.5, 0]}, False),
+        ({'place': [0, 0, 0]}, False),
+        ({'joints': []}, True),
+        ({'joints': ['']}, False),
+        ({'gains': {}}, True),
+        ({'gains': {'rocker': -1}}, False),
+        ({'shifts': {'crank': [1, -1]}}, True),
+        ({'shifts': {'crank': [1, -2]}}, False),
+        ({'ones': {}}, True),
+        ({'ones': {'rocker': {}}}, False),
+        ({'ones': {'rocker': {'size': 0}}}, False),
+        ({'within': {}}, True),
+        ({'within': {'depth': 10}}, False),
+        ({'within': {'width': 1}}, False),
+        ({'stranger': 1}, False),
+    ],
+    ids=str,
+)
+def test_what_a_declaration_takes(change, taken):
+    content = GOOD | change
+    assert Validator(parameters_schema(AllKinds)).is_valid(content) == taken
+    assert reads(content, AllKinds) == taken
+
+
+def test_an_editor_is_told_meaning_unit_bounds_and_default():
+    said = parameters_schema(AllKinds)
+    assert said['description'] == 'Parameters of every kind.'
+    assert said['required'] == ['must', 'table', 'path', 'ones']
+    assert said['properties']['must'] == {
+        'description': 'that must be there [s]', 'type': 'number', 'minimum': -1, 'maximum': 1,
+    }  # fmt: skip
+    assert said['properties']['ones']['additionalProperties']['properties']['size'] == {
+        'description': 'how large [m]', 'type': 'number', 'maximum': 2, 'exclusiveMinimum': 0,
+    }  # fmt: skip
+    defaults = {key: value.get('default') for key, value in said['properties'].items()}
+    assert defaults == {
+        'must': None, 'count': 1, 'some': [], 'table': None, 'on': True, 'word': 'one',
+        'title': 'none', 'path': None, 'place': [0.0, 0.0], 'joint': 'rocker', 'joints': [],
+        'gains': {}, 'shifts': {}, 'ones': None, 'within': {'depth': 3},
+    }  # fmt: skip
+
+
+def test_every_shipped_scene_is_read_after_all():
+    # That a file is valid says nothing if nobody reads it.
+    for path in SCENES:
+        assert load_scene(path).members
+    assert json.loads(as_text(scene_schema()))['title'] == 'Scene'
