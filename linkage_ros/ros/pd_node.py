@@ -35,7 +35,6 @@ from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
@@ -64,9 +63,8 @@ class PDController(Node):
         self._state = (0.0, 0.0)
         self._heard = -inf
         self._begun = self.get_clock().now()
-        self._publisher = self.create_publisher(
-            JointState, 'crank_commands', qos_profile_sensor_data
-        )
+        # Reliable, for whoever listens, and no more than the newest, since it alone counts.
+        self._publisher = self.create_publisher(JointState, 'crank_commands', 1)
         self.create_subscription(JointState, 'joint_states', self._hear, 10)
         self.create_timer(1.0 / rate, self._command)
 

@@ -71,10 +71,71 @@ def test_the_demo_runs_records_proves_and_draws(linkage: Run, tmp_path: Path) ->
     assert picture.read_bytes().startswith(PNG)
 
 
-@pytest.mark.parametrize('after', [0.05, 0.4, 0.8, 1.2, 2.0])
-def test_ctrl_c_at_any_moment_leaves_no_open_bag(tmp_path: Path, after: float) -> None:
+def test_a_controller_moves_the_crank_of_a_scene_that_is_pushed(
+    linkage: Run, tmp_path: Path
+) -> None:
+    answer = linkage('demo', 'torque_crank', '--seconds', '3')
+    assert answer.returncode == 0, answer.stderr
+    bag = only_bag(tmp_path / 'runs')
+    counts = messages(bag)
+    assert counts['/crank_commands'] > 200
+    same, of = map(int, re.search(r'(\d+) of (\d+) joint states replay', answer.stdout).groups())
+    assert same == of == counts['/joint_states']
+    *_, last = re.findall(r'crank_joint ([+-]\d+\.\d+)', answer.stdout)
+    assert float(last) > 0.9  # it swings by 1 about 2.0; without commands it stands at 0.5
+    assert Path(f'{bag}.png').read_bytes().startswith(PNG)
+
+
+def test_a_scene_that_makes_its_crank_up_needs_nothing_beside_it(
+    linkage: Run, tmp_path: Path
+) -> None:
+    answer = linkage('demo', 'worn_press', '--seconds', '2')
+    assert answer.returncode == 0, answer.stderr
+    assert 'samples' not in answer.stdout
+    proof = re.search(r'(\d+) of (\d+) joint states and (\d+) of (\d+) pin_forces', answer.stdout)
+    assert len(set(proof.groups())) == 1
+    assert Path(f'{only_bag(tmp_path / "runs")}.png').read_bytes().startswith(PNG)
+
+
+def test_a_scene_that_records_nothing_is_not_drawn(linkage: Run, tmp_path: Path) -> None:
+    answer = linkage('demo', 'bare', '--seconds', '2')
+    assert answer.returncode == 0, answer.stderr
+    assert re.search(r'samples +[1-9]', answer.stdout)
+    assert 'picture   none: bare records no bag to draw' in answer.stdout
+    assert not (tmp_path / 'runs').exists()
+
+
+def test_the_list_names_every_scene_that_comes_along(linkage: Run) -> None:
+    answer = linkage('demo', '--list')
+    assert answer.returncode == 0, answer.stderr
+    heading, *rows = answer.stdout.splitlines()
+    assert heading.split() == ['scene', 'drive', 'recorded']
+    shipped = sorted((Path(__file__).parents[2] / 'config' / 'scenes').glob('*.yaml'))
+    assert [row.split()[0] for row in rows] == [file.stem for file in shipped]
+    (torque,) = (row for row in rows if row.startswith('torque_crank'))
+    assert torque.split(maxsplit=3)[1:3] == ['torque', 'yes']
+    assert torque.endswith('the four-bar moves under the effort that a controller commands')
+    assert not any('yaml-language-server' in row for row in rows)
+
+
+def test_a_scene_that_does_not_exist(linkage: Run) -> None:
+    answer = linkage('demo', 'worn_pres')
+    assert answer.returncode == 2
+    assert answer.stderr == (
+        "linkage demo: worn_pres: there is no such scene; did you mean 'worn_press'?\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ('name', 'after'),
+    [
+        *(('demo', after) for after in (0.05, 0.4, 0.8, 1.2, 2.0)),
+        *(('torque_crank', after) for after in (0.6, 2.0)),
+    ],
+)
+def test_ctrl_c_at_any_moment_leaves_no_open_bag(tmp_path: Path, name: str, after: float) -> None:
     demo = subprocess.Popen(
-        [sys.executable, '-m', 'linkage_ros.cli.main', 'demo', '--seconds', '30'],
+        [sys.executable, '-m', 'linkage_ros.cli.main', 'demo', name, '--seconds', '30'],
         cwd=tmp_path,
         env=environment(tmp_path),
         stdout=subprocess.PIPE,
