@@ -64,7 +64,7 @@ def summary(node: LinkageNode) -> str:
         rows += [('bag', str(recording.folder)), ('proof', _proof(recording.folder))]
     if node.recording.failure:
         rows.append(('FAILED', node.recording.failure))
-    return '\n'.join(f'{name:<10}{text}' for name, text in rows)
+    return '\n'.join(f'{name:<14}{text}' for name, text in rows)
 
 
 def _proof(folder: Path) -> str:

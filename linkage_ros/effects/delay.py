@@ -27,10 +27,10 @@ and tasks for continuous control, Software Impacts 6, 2020; in a control loop: B
 Nilsson and M. Törngren, Timing problems in real-time control systems, ACC 1995). A reading of an
 encoder keeps its whole counts only where it is sampled.
 
-Nothing is published before there is a reading that old, and nothing is extrapolated. Silence takes
-as long as a reading does: where the line is told of it, a reading that was lost is missing when it
-would have arrived. Where one side of t − d is silent there is nothing to interpolate with, and the
-reading itself arrives.
+Nothing is published before there is a reading that old, and nothing is extrapolated. Behind a
+sensor that is silent at times (a slow one, a lossy one) the line carries messages and no signal:
+from the first silence on, each reading arrives once, as it is, with the first tick that is d
+later; of several that come due between two ticks, one with each tick.
 
 ``stamp: arrival`` leaves the message the stamp of its tick, as a driver does that knows of no
 delay; ``measured`` is the time at which the sensor saw it, t − d, or that of the reading.
@@ -40,6 +40,7 @@ The line holds the readings of the last d: at 1 kHz a thousand for a second.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context
@@ -87,7 +88,7 @@ class Delay:
 
     """
 
-    __slots__ = ('_delay', '_history', '_look', '_measured')
+    __slots__ = ('_arrived', '_delay', '_history', '_look', '_measured', '_on_the_way')
 
     def __init__(self, use: DelayParameters) -> None:
         self._delay = round(use.seconds * 1e9)
@@ -95,12 +96,35 @@ class Delay:
         sampled = use.between == 'sampled'
         self._look = self._history.newest if sampled else self._history.between
         self._measured = use.stamp == 'measured'
+        self._arrived = -1
+        """Time up to which readings have arrived while there was no silence, in [ns]."""
+        self._on_the_way: deque[tuple[int, Reading]] | None = None
+        """Readings that have not arrived; nothing before the first silence."""
 
     def __call__(self, now: int, reading: Reading | None) -> Reading | None:
         """Return what arrives; None in the place of a reading is silence."""
-        self._history.add(now, reading)
-        found = self._look(now - self._delay)
+        due = now - self._delay
+        if reading is None and self._on_the_way is None:
+            self._on_the_way = deque(self._history.after(self._arrived))
+        if self._on_the_way is None:
+            assert reading is not None
+            self._history.add(now, reading)
+            self._arrived = due
+            found = self._look(due)
+        else:
+            found = self._next(self._on_the_way, now, reading, due)
         if found is None or self._measured:
             return found
         _, joints, rates, accelerations, efforts = found
         return new(Reading, (now, joints, rates, accelerations, efforts))
+
+    @staticmethod
+    def _next(
+        on_the_way: deque[tuple[int, Reading]], now: int, reading: Reading | None, due: int
+    ) -> Reading | None:
+        """Send a reading on its way, and return the first that is due."""
+        if reading is not None:
+            on_the_way.append((now, reading))
+        if on_the_way and on_the_way[0][0] <= due:
+            return on_the_way.popleft()[1]
+        return None

@@ -59,7 +59,7 @@ class History:
     def __init__(self, span: int) -> None:
         self._span = span
         self._times: deque[int] = deque()
-        self._readings: deque[Reading | None] = deque()
+        self._readings: deque[Reading] = deque()
 
     def __len__(self) -> int:
         return len(self._times)
@@ -69,7 +69,7 @@ class History:
         """Earliest time that is remembered, in [ns]."""
         return self._times[0]
 
-    def add(self, now: int, reading: Reading | None) -> None:
+    def add(self, now: int, reading: Reading) -> None:
         """
         Remember a reading.
 
@@ -79,13 +79,12 @@ class History:
             The time of its tick, in [ns]; none is before the last. Of readings at one time the
             last one counts.
         reading
-            The reading; None for silence, which is remembered as well.
+            The reading.
 
         """
         times, readings = self._times, self._readings
         if times and times[-1] == now:
-            if reading is not None:
-                readings[-1] = reading
+            readings[-1] = reading
             return
         times.append(now)
         readings.append(reading)
@@ -95,7 +94,7 @@ class History:
             readings.popleft()
 
     def newest(self, time: int) -> Reading | None:
-        """Return the newest reading that is not after a time, in [ns]; None for silence."""
+        """Return the newest reading that is not after a time, in [ns], if there is one."""
         at = bisect_right(self._times, time)
         return self._readings[at - 1] if at else None
 
@@ -103,17 +102,21 @@ class History:
         """
         Return what was read at a time, in [ns], and bears it as its stamp.
 
-        Where nothing was read since, or before it, there is nothing to mix with: then it is the
-        newest reading that is not after the time, with its own stamp; None for silence.
+        Where nothing was read since, there is nothing to mix with: then it is the newest reading,
+        with its own stamp. Before the first there is nothing.
         """
         at = bisect_right(self._times, time)
         if not at:
             return None
         before, begin = self._readings[at - 1], self._times[at - 1]
-        if before is None or begin == time or at == len(self._times):
+        if begin == time or at == len(self._times):
             return before
-        after = self._readings[at]
-        return before if after is None else _mixed(time, begin, before, self._times[at], after)
+        return _mixed(time, begin, before, self._times[at], self._readings[at])
+
+    def after(self, time: int) -> list[tuple[int, Reading]]:
+        """Return the readings since a time, in [ns], each with its own."""
+        pairs = zip(self._times, self._readings, strict=True)
+        return [(at, reading) for at, reading in pairs if at > time]
 
 
 def _mixed(time: int, begin: int, before: Reading, end: int, after: Reading) -> Reading:

@@ -207,7 +207,7 @@ class Health:
             message = (
                 f'Open by {last.gap:.6g} m; reachable: {reachable}'
                 if last.status is Status.OPEN
-                else 'Two pins coincide: the pose cannot be told'
+                else 'The pose cannot be told: two pins coincide, or a link is broken'
             )
         elif self.now.toggles > self.before.toggles:
             level, message = WARN, 'At a toggle: position valid, velocity not'

@@ -27,15 +27,11 @@ to hold against them. Where it hears nothing it commands nothing.
 from __future__ import annotations
 
 from math import cos, inf, sin, tau
-import sys
 from threading import Event
 from time import monotonic
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
-import rclpy
+from linkage_ros.ros.companion import Companion, run_companion
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
 _LOOK = 0.1
@@ -43,23 +39,21 @@ _OLDEST = 0.1
 """A state that came longer ago is none, in [s]."""
 
 
-class PDController(Node):
+class PDController(Companion):
     """Commands the effort of a joint."""
 
     def __init__(self) -> None:
         super().__init__('pd_controller')
-        self._joint = self.declare_parameter(
-            'joint', 'crank_joint', ParameterDescriptor(description='Name of the joint')
-        ).value
-        rate = self._number('rate', 500.0, 'Commands a second [Hz]', 0.1, 20_000.0)
-        self._target = self._number('target', 2.0, 'Where the joint is to be [rad]', -1e6, 1e6)
-        self._swing = self._number('swing', 0.0, 'Amplitude about the target [rad]', 0.0, 1e6)
-        self._period = self._number('period', 5.0, 'Of the swing [s]', 1e-3, 1e6)
-        self._kp = self._number('kp', 1.0, 'Effort for each unit of error [N·m/rad]', 0.0, 1e9)
-        self._kd = self._number(
+        self._joint = self.joint()
+        rate = self.number('rate', 500.0, 'Commands a second [Hz]', 0.1, 20_000.0)
+        self._target = self.number('target', 2.0, 'Where the joint is to be [rad]', -1e6, 1e6)
+        self._swing = self.number('swing', 0.0, 'Amplitude about the target [rad]', 0.0, 1e6)
+        self._period = self.number('period', 5.0, 'Of the swing [s]', 1e-3, 1e6)
+        self._kp = self.number('kp', 1.0, 'Effort for each unit of error [N·m/rad]', 0.0, 1e9)
+        self._kd = self.number(
             'kd', 0.05, "Effort for each unit of the error's rate [N·m·s/rad]", 0.0, 1e9
         )
-        self.seconds = self._number('seconds', 0.0, 'How long [s]; 0 for ever', 0.0, 1e9)
+        self._seconds = self.number('seconds', 0.0, 'How long [s]; 0 for ever', 0.0, 1e9)
         self._state = (0.0, 0.0)
         self._heard = -inf
         self._begun = self.get_clock().now()
@@ -92,31 +86,16 @@ class PDController(Node):
         message.header.stamp = now.to_msg()
         self._publisher.publish(message)
 
-    def _number(
-        self, name: str, default: float, description: str, least: float, most: float
-    ) -> float:
-        bounds = FloatingPointRange(from_value=least, to_value=most)
-        descriptor = ParameterDescriptor(
-            description=description, read_only=True, floating_point_range=[bounds]
-        )
-        return float(self.declare_parameter(name, default, descriptor).value)
+    def run(self, stop: Event) -> None:
+        """Control until the event, or for the time that was set."""
+        executor = SingleThreadedExecutor()
+        executor.add_node(self)
+        end = monotonic() + (self._seconds or inf)
+        while not stop.is_set() and monotonic() < end:
+            executor.spin_once(timeout_sec=_LOOK)
+        executor.shutdown()
 
 
 def run_pd_controller(stop: Event) -> int:
     """Control until the event, or for the time that was set, and return the exit code."""
-    try:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        node = PDController()
-    except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
-        print(f'pd_controller: {str(error).splitlines()[0]}; see the README', file=sys.stderr)
-        rclpy.try_shutdown()
-        return 2
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    end = monotonic() + (node.seconds or inf)
-    while not stop.is_set() and monotonic() < end:
-        executor.spin_once(timeout_sec=_LOOK)
-    executor.shutdown()
-    node.destroy_node()
-    rclpy.try_shutdown()
-    return 0
+    return run_companion('pd_controller', PDController, PDController.run, stop)

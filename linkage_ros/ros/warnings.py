@@ -123,6 +123,8 @@ class Warnings:
 
 _UNCLOSED = {
     Status.OPEN: '{ticks} ticks open by {gap:.6g} m, nothing published; reachable: {reachable}',
-    Status.INDETERMINATE: '{ticks} ticks with two pins in one place, nothing published',
+    Status.INDETERMINATE: (
+        '{ticks} ticks without a pose (two pins in one place, or a broken link), nothing published'
+    ),
     Status.TOGGLE: '{ticks} ticks at a toggle: positions published, velocities not',
 }

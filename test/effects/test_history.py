@@ -145,15 +145,13 @@ def test_outside_of_what_was_read_nothing_is_invented():
     assert history.newest(BEGIN + MS - 1) == first
 
 
-def test_there_is_nothing_between_a_reading_and_silence():
+def test_what_came_after_a_time_is_known_with_its_own():
     history = History(10**9)
-    first, last = reading(BEGIN, 1.0), reading(BEGIN + 3 * MS, 4.0)
-    for now, read in ((0, first), (1, None), (2, None), (3, last)):
-        history.add(BEGIN + now * MS, read)
-    for look in (history.between, history.newest):
-        assert look(BEGIN + 999_999) == first
-        assert look(BEGIN + MS) is look(BEGIN + 3 * MS - 1) is None
-        assert look(BEGIN + 3 * MS) == last
+    read = [(BEGIN + ms * MS, reading(BEGIN + ms * MS, float(ms))) for ms in range(4)]
+    for now, one in read:
+        history.add(now, one)
+    assert history.after(BEGIN + MS) == read[2:]
+    assert history.after(-1) == read
 
 
 @given(st.lists(st.integers(0, 20), min_size=1, max_size=50), st.integers(0, 40))
@@ -175,7 +173,6 @@ def test_while_time_stands_the_last_reading_counts_and_none_pile_up():
     history.add(BEGIN, reading(BEGIN, 0.0))
     for number in range(1000):
         history.add(BEGIN + MS, reading(BEGIN + MS, float(number)))
-        history.add(BEGIN + MS, None)
     assert len(history) == 2
     assert history.newest(BEGIN + MS).joints == (999.0,)
     assert history.between(BEGIN + MS // 2).joints == (499.5,)
