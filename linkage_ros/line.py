@@ -88,7 +88,9 @@ class Line:
         try:
             self._build(scene, closure, injection)
         except DefinitionError as error:
-            raise member.content.error(error.where, error.reason, error.remedy) from None
+            of_linkage = error.where.startswith('masses')
+            content = member.linkage_content if of_linkage else member.content
+            raise content.error(error.where, error.reason, error.remedy) from None
 
     def _build(self, scene: Scene, closure: Closure | None, injection: Injection | None) -> None:
         member = self.member

@@ -24,6 +24,7 @@ from pathlib import Path
 import subprocess
 import sys
 
+from linkage_ros.errors import FileError
 from linkage_ros.joint_state import JointStateWriter, Rejection
 from linkage_ros.kinematics.status import Status
 from linkage_ros.look import Look
@@ -330,3 +331,9 @@ def test_a_delay_delays_the_silence_of_slow_and_lossy_sensors_too():
     )
     heard = [time for time in range(30) if slow.tick(BEGIN + time * MS).message]
     assert heard == [3, 13, 23]
+
+
+def test_what_the_linkage_lacks_is_told_of_the_linkage_file():
+    with pytest.raises(FileError) as caught:
+        pipeline(b'drive: {constant_rate: {rate: 1.0}}\neffects: {effort: {}}')
+    assert str(caught.value).startswith("test: linkage.yaml: masses: link 'crank' has no mass")

@@ -149,7 +149,7 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
     ------
     DefinitionError
         With the key ``loads.springs.NAME`` (the spring's number, from 1, where it has no name) or
-        ``friction.NAME``.
+        ``effects.friction.joints.NAME``.
 
     """
     for number, spring in enumerate(loads.springs, 1):
@@ -175,13 +175,13 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
     for name in friction.joints if friction else ():
         if name not in pins and name not in linkage.sliders:
             raise DefinitionError(
-                f'friction.{name}',
+                f'effects.friction.joints.{name}',
                 f'{quoted(name)} is no pin or slider',
                 _one_of({*pins, *linkage.sliders}),
             )
         if name in pins and name in linkage.sliders:
             raise DefinitionError(
-                f'friction.{name}',
+                f'effects.friction.joints.{name}',
                 f'{quoted(name)} names a pin and a slider',
                 'give the slider another name',
             )

@@ -202,6 +202,7 @@ def _member(
         effects={e: read_parameters(effects.section(e), of, parts) for e, of in types.items()},
         loads=read_loads(loads) if loads is not None else None,
         content=own,
+        linkage_content=linkage_content,
     )
     effects.finish(tuple(EFFECTS))
     return member

@@ -66,8 +66,8 @@ class Member:
         Parameters of each effect that is called for, by its name, in physical order.
     loads
         What acts on it; nothing where the scene does not say.
-    content
-        Where all this stands, for messages.
+    content, linkage_content
+        Where all this stands, for messages: in the scene, and in the linkage file.
 
     """
 
@@ -77,6 +77,7 @@ class Member:
     effects: Mapping[str, Any]
     loads: Loads | None
     content: Section = field(compare=False, repr=False)
+    linkage_content: Section = field(compare=False, repr=False)
 
     @property
     def prefix(self) -> str:

@@ -67,19 +67,19 @@ REFUSED = {
         'four_bar',
         Loads(),
         {'P': RUBBING},
-        "friction.P: 'P' is no pin or slider; name one of A, B, O2, O4",
+        "effects.friction.joints.P: 'P' is no pin or slider; name one of A, B, O2, O4",
     ),
     'friction in a slider that is not there': (
         'slider_crank',
         Loads(),
         {'bore': RUBBING},
-        "friction.bore: 'bore' is no pin or slider; name one of A, B, O2, cylinder",
+        "effects.friction.joints.bore: 'bore' is no pin or slider; name one of A, B, O2, cylinder",
     ),
     'the point of a block that is a link, and no pin': (
         'scotch_yoke',
         Loads(),
         {'Y': RUBBING},
-        "friction.Y: 'Y' is no pin or slider; name one of A, O2, guide, slot",
+        "effects.friction.joints.Y: 'Y' is no pin or slider; name one of A, O2, guide, slot",
     ),
 }
 
@@ -94,7 +94,7 @@ def test_refused(kind):
 
 def test_refused_as_the_mechanics_are_built():
     closure = Closure(shipped('four_bar'))
-    with pytest.raises(DefinitionError, match=r'^friction\.X: '):
+    with pytest.raises(DefinitionError, match=r'^effects\.friction\.joints\.X: '):
         Mechanics(closure, Loads(), Friction({'X': RUBBING}))
 
 
@@ -104,7 +104,7 @@ def test_a_name_that_means_two_joints():
     with pytest.raises(DefinitionError) as caught:
         check_loads(linkage, Loads(), Friction({'B': RUBBING}))
     assert str(caught.value) == (
-        "friction.B: 'B' names a pin and a slider; give the slider another name"
+        "effects.friction.joints.B: 'B' names a pin and a slider; give the slider another name"
     )
 
 
