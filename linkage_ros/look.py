@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.effects.stage import Begin, DriveStage, Motion, Reading, Sensor, Stage
-from linkage_ros.effects.turns import Continuous, Wrapped
+from linkage_ros.effects.turns import all_wrapped, continuous
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.tuples import new
 
@@ -64,8 +64,8 @@ def in_sequence(
 ) -> tuple[Sensor, ...]:
     """Return the sensors, what makes angles run on before them, and what wraps them behind."""
     if wrapped and not sensors:
-        return (Wrapped(turning),)
-    return (Continuous(turning), *sensors, *([Wrapped(turning)] if wrapped else []))
+        return (all_wrapped(turning),)
+    return (continuous(turning), *sensors, *([all_wrapped(turning)] if wrapped else []))
 
 
 def delayed(sensors: Sequence[Sensor], delay: Any) -> Sensor:

@@ -21,7 +21,7 @@ Building puts in only what the scene names; a tick asks no scene.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.effects.stage import Reading
@@ -112,9 +112,7 @@ class Pipeline:
         """Whether there may be ticks with a pose and without a message."""
         if len(self.lines) == 1:
             (line,) = self.lines
-            writer = JointStateWriter(line.member.joints)
-            self._parts = (line.look, writer.write, tuple(e.write for e in line.extras))
-            self.tick = self._tick_one
+            self.tick = _ticking_one(line)
         else:
             self._routes = Routes({line: line.member.inputs for line in self.lines})
             self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
@@ -137,28 +135,6 @@ class Pipeline:
         # It may be for one linkage or for several: it is good if one of them takes it.
         rejections = [line.offer(message, now) for line in self._routes.find(message)]
         return None if None in rejections else next(iter(rejections), Rejection.MISSING)
-
-    def _tick_one(self, now: int) -> Tick:
-        """
-        Return the linkage at a time.
-
-        Parameters
-        ----------
-        now
-            The time, in [ns].
-
-        """
-        look_at, write, extras = self._parts
-        look = look_at(now)
-        _, _, motion, reading = look
-        if reading is None:
-            return new(Tick, ((look,), b'', ()))
-        stamp, joints, rates, _, efforts = reading
-        message = write(stamp, joints, rates, efforts)
-        if not extras or motion is None:
-            return new(Tick, ((look,), message, ()))
-        written = tuple([write_extra(now, motion, reading) for write_extra in extras])
-        return new(Tick, ((look,), message, written))
 
     def _tick_many(self, now: int) -> Tick:
         """Return all linkages at a time, in [ns], those joints left out that have no reading."""
@@ -202,6 +178,26 @@ class Pipeline:
     def max_age(self) -> int:
         """Age of the newest sample beyond which something is amiss, in [ns]; 0 for never."""
         return max(line.drive.max_age for line in self.lines)
+
+
+def _ticking_one(line: Line) -> Callable[[int], Tick]:
+    """Return what ticks where there is one linkage; a method takes longer, in every tick."""
+    look_at, write = line.look, JointStateWriter(line.member.joints).write
+    extras = tuple(extra.write for extra in line.extras)
+
+    def tick(now: int) -> Tick:
+        look = look_at(now)
+        _, _, motion, reading = look
+        if reading is None:
+            return new(Tick, ((look,), b'', ()))
+        stamp, joints, rates, _, efforts = reading
+        message = write(stamp, joints, rates, efforts)
+        if not extras or motion is None:
+            return new(Tick, ((look,), message, ()))
+        written = tuple([write_extra(now, motion, reading) for write_extra in extras])
+        return new(Tick, ((look,), message, written))
+
+    return tick
 
 
 def _joined(

@@ -16,9 +16,9 @@
 """
 How a published angle runs: on beyond a turn, or wrapped.
 
-The closure knows an angle up to whole turns. `Continuous` adds the turns that bring it nearest to
+The closure knows an angle up to whole turns. `continuous` adds the turns that bring it nearest to
 what came last, so it takes steps of less than half a turn. It stands before the sensors, which may
-then mix and quantise what they get without a thought of wrapping; `Wrapped` stands behind them.
+then mix and quantise what they get without a thought of wrapping; `all_wrapped` stands behind.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import pi, remainder, tau
 
-from linkage_ros.effects.stage import Reading
+from linkage_ros.effects.stage import Reading, Sensor
 from linkage_ros.tuples import new
 
 
-class Continuous:
+def continuous(turning: Sequence[bool]) -> Sensor:
     """
-    Angles without jumps; the first lies in (−π, π].
+    Build what lets angles run on without jumps; the first lies in (−π, π].
 
     Parameters
     ----------
@@ -40,69 +40,67 @@ class Continuous:
         For each joint whether it is an angle.
 
     """
+    places = tuple(i for i, turns in enumerate(turning) if turns)
+    raw: tuple[float, ...] = ()
+    """The angles as they came last."""
+    added: list[int] = []
+    """What is added to them, in turns; nothing where it is 0 for all."""
 
-    __slots__ = ('_raw', '_turning', '_turns')
-
-    def __init__(self, turning: Sequence[bool]) -> None:
-        self._turning = tuple(i for i, turns in enumerate(turning) if turns)
-        self._raw: tuple[float, ...] | None = None
-        """The angles as they came last."""
-        self._turns: list[int] | None = None
-        """What was added to them, in turns; nothing where it is 0 for all."""
-
-    def __call__(self, _now: int, reading: Reading) -> Reading:
-        """Return the reading with the turns added."""
-        stamp, joints, rates, accelerations, efforts = reading
-        raw, self._raw = self._raw, joints
-        if raw is None:
-            first = list(joints)
-            for i in self._turning:
-                first[i] = wrapped(joints[i])
-            self._add([round((w - v) / tau) for w, v in zip(first, joints, strict=True)])
-            return new(Reading, (stamp, tuple(first), rates, accelerations, efforts))
-        for i in self._turning:
-            if not -pi < raw[i] - joints[i] < pi:
-                self._follow(raw, joints)
-                break
-        turns = self._turns
-        if turns is None:
-            return reading
-        added = tuple([v + n * tau if n else v for v, n in zip(joints, turns, strict=True)])
-        return new(Reading, (stamp, added, rates, accelerations, efforts))
-
-    def _follow(self, raw: tuple[float, ...], joints: tuple[float, ...]) -> None:
-        """Add the turns that take back the jumps since the last reading."""
-        turns = self._turns or [0] * len(joints)
-        for i in self._turning:
-            if not -pi < raw[i] - joints[i] < pi:
-                turns[i] += round((raw[i] - joints[i]) / tau)
-        self._add(turns)
-
-    def _add(self, turns: list[int]) -> None:
-        self._turns = turns if any(turns) else None
-
-
-class Wrapped:
-    """
-    Angles in (−π, π].
-
-    Parameters
-    ----------
-    turning
-        For each joint whether it is an angle.
-
-    """
-
-    __slots__ = ('_turning',)
-
-    def __init__(self, turning: Sequence[bool]) -> None:
-        self._turning = tuple(turning)
-
-    def __call__(self, _now: int, reading: Reading) -> Reading:
-        """Return the reading with whole turns left out."""
-        stamp, joints, rates, accelerations, efforts = reading
-        now = [wrapped(v) if turns else v for v, turns in zip(joints, self._turning, strict=True)]
+    def run_on(_now: int, reading: Reading) -> Reading:
+        nonlocal raw, added
+        joints = reading[1]
+        if raw:
+            for i in places:
+                if not -pi < raw[i] - joints[i] < pi:
+                    added = _followed(added, raw, joints, places)
+                    break
+            raw = joints
+            if not added:
+                return reading
+            now = [v + n * tau if n else v for v, n in zip(joints, added, strict=True)]
+        else:
+            raw = joints
+            now = [wrapped(v) if i in places else v for i, v in enumerate(joints)]
+            added = _turns([round((w - v) / tau) for w, v in zip(now, joints, strict=True)])
+        stamp, _, rates, accelerations, efforts = reading
         return new(Reading, (stamp, tuple(now), rates, accelerations, efforts))
+
+    return run_on
+
+
+def _followed(
+    added: list[int], raw: tuple[float, ...], joints: tuple[float, ...], places: Sequence[int]
+) -> list[int]:
+    """Return the turns that take back the jumps since the last reading too."""
+    turns = added or [0] * len(joints)
+    for i in places:
+        if not -pi < raw[i] - joints[i] < pi:
+            turns[i] += round((raw[i] - joints[i]) / tau)
+    return _turns(turns)
+
+
+def _turns(turns: list[int]) -> list[int]:
+    return turns if any(turns) else []
+
+
+def all_wrapped(turning: Sequence[bool]) -> Sensor:
+    """
+    Build what wraps angles to (−π, π].
+
+    Parameters
+    ----------
+    turning
+        For each joint whether it is an angle.
+
+    """
+    turns = tuple(turning)
+
+    def wrap(_now: int, reading: Reading) -> Reading:
+        stamp, joints, rates, accelerations, efforts = reading
+        now = [wrapped(v) if turn else v for v, turn in zip(joints, turns, strict=True)]
+        return new(Reading, (stamp, tuple(now), rates, accelerations, efforts))
+
+    return wrap
 
 
 def wrapped(angle: float) -> float:
