@@ -17,7 +17,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 import gc
 from math import inf
 import sys
@@ -118,31 +119,55 @@ def _spin(
     deadline: float,
     view: View | None,
 ) -> int:
-    """Start the node unless it is told not to, spin until the end, and end its run."""
-    if node.get_parameter('autostart').value:
+    """Start the node unless it is told not to, and see it through."""
+    autostart = node.get_parameter('autostart').value
+    if autostart:
         node.trigger_configure()
         if node.failure is not None:
             return EXIT_CONFIGURATION
-        if node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
+    with _no_garbage_in_ticks():
+        if autostart and node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
             return EXIT_INCOMPLETE
+        return _attend(node, executor, stop, deadline, view)
+
+
+@contextmanager
+def _no_garbage_in_ticks() -> Iterator[None]:
+    """
+    Leave Python's search for cycles of objects to who calls `gc.collect`.
+
+    A tick makes no cycles, but with a hundred linkages so many objects that they would be searched
+    in every tick. What is there before the first is left out for good: that search takes 10 ms.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+        gc.unfreeze()
+
+
+def _attend(
+    node: LinkageNode,
+    executor: SingleThreadedExecutor,
+    stop: Event,
+    deadline: float,
+    view: View | None,
+) -> int:
+    """Spin until the end, and end the node's run."""
     # The executor waits without a timeout, which no signal would end. So it has a thread of its
     # own, and polls for nothing: each of its rounds costs as much as five ticks.
     ended = Event()
     serving = Thread(target=_serve, args=(node, executor, ended), name='executor', daemon=True)
     serving.start()
-    # A tick makes no cycles, but with a hundred linkages so many objects that Python would look
-    # for some in every tick. They are looked for here instead, among what came after the start.
-    gc.collect()
-    gc.freeze()
-    gc.disable()
     while not stop.wait(_LOOK) and monotonic() < deadline and serving.is_alive():
         gc.collect()
         if view is not None:
             view.show(node)
         if node.loop is not None and node.loop.failure:
             break
-    gc.enable()
-    gc.unfreeze()
     served = serving.is_alive()
     # To shut the executor down while it waits is a race that it can lose, and then waits for ever.
     # The node's watch wakes it, several times a second.

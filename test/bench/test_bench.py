@@ -72,6 +72,29 @@ def test_ticks_are_measured_against_the_bare_loop(tmp_path):
     assert 'bare loop' in kept
 
 
+@pytest.mark.ros
+@pytest.mark.timeout(90)
+def test_ticks_are_measured_against_the_idiomatic_node(tmp_path):
+    kept = _bench(tmp_path, '--only', 'a')
+    cells = _row(kept, 'idiomatic node')
+    assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:3]))
+
+
+@pytest.mark.ros
+@pytest.mark.timeout(90)
+def test_a_hundred_linkages_are_measured(tmp_path):
+    cells = _row(_bench(tmp_path, '--only', 'many'), '100 four-bars in one node, 1 kHz')
+    assert all(isfinite(value) for value in _numbers(cells[1:4]))
+
+
+@pytest.mark.timeout(90)
+def test_the_empty_scene_is_measured_against_its_bare_closure(tmp_path):
+    kept = _bench(tmp_path, '--only', 'empty')
+    cells = _row(kept, 'µs a tick: empty scene / bare closure and packing')
+    assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))
+    assert cells[4] == '≤ 1.05'
+
+
 @pytest.mark.timeout(90)
 def test_solving_is_measured_against_straight_line_c_and_pylinkage(tmp_path):
     kept = _bench(tmp_path, '--only', 'kinematics')
