@@ -31,7 +31,7 @@ from linkage_ros.effects.stage import EFFECTS, LOADED, NEEDS, PUBLISHED_WITH, Se
 from linkage_ros.errors import DefinitionError
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.look import at_rest, delayed, full_look, in_sequence, Look, observer, plain_look
+from linkage_ros.look import at_rest, delayed, full_look, Look, observer, plain_look, sensing
 from linkage_ros.scene.scene import Member, Scene
 
 if TYPE_CHECKING:
@@ -142,11 +142,11 @@ class Line:
                 raise DefinitionError(
                     'faults', f'not_a_number spoils messages, and {drive} has none', 'leave it out'
                 )
-        sensing: list[Any] = built('sensor')
+        sensors: list[Any] = built('sensor')
         if 'delay' in modules:
-            *before, delay = sensing
-            sensing = [delayed(before, delay)]
-        sensors = in_sequence([*sensing, *faulty], self.closure.turning, scene.wrapped)
+            *before, delay = sensors
+            sensors = [delayed(before, delay)]
+        sense = sensing([*sensors, *faulty], self.closure.turning, scene.wrapped)
         stages = built('stage')
         drive_stages = built('drive_stage')
         (begin,) = built('begin') or [at_rest]
@@ -156,10 +156,10 @@ class Line:
         if begin is not at_rest or drive_stages or mechanism:
             observe = observer(named, len(self.closure.linkage.joints))
             self.look = full_look(
-                state, drive_stages, close, mechanism, begin, stages, observe, sensors
+                state, drive_stages, close, mechanism, begin, stages, observe, sense
             )
         else:
-            self.look = plain_look(state, close, sensors)
+            self.look = plain_look(state, close, sense)
         self.extras = [
             Extra(
                 name,

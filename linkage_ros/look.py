@@ -59,37 +59,46 @@ class Look(NamedTuple):
 _NO_CRANK = Look(None, None, None, None)
 
 
-def in_sequence(
-    sensors: Sequence[Sensor], turning: Sequence[bool], wrapped: bool
-) -> tuple[Sensor, ...]:
-    """Return the sensors, what makes angles run on before them, and what wraps them behind."""
+def sensing(sensors: Sequence[Sensor], turning: Sequence[bool], wrapped: bool) -> Sensor:
+    """Put sensors together: what makes angles run on before them, what wraps them behind."""
     if wrapped and not sensors:
-        return (all_wrapped(turning),)
-    return (continuous(turning), *sensors, *([all_wrapped(turning)] if wrapped else []))
+        return all_wrapped(turning)
+    return _chain([continuous(turning), *sensors, *([all_wrapped(turning)] if wrapped else [])])
 
 
 def delayed(sensors: Sequence[Sensor], delay: Any) -> Sensor:
-    """Return the sensors with the delay behind them, which is told their silence too."""
+    """Put a delay behind sensors, which is told their silence too."""
+    sense = _chain(sensors)
 
     def late(now: int, reading: Reading) -> Reading | None:
-        found: Reading | None = reading
-        for sensor in sensors:
-            if found is None:
-                break
-            found = sensor(now, found)
-        arrived: Reading | None = delay(now, found)
+        arrived: Reading | None = delay(now, sense(now, reading))
         return arrived
 
     return late
 
 
+def _chain(sensors: Sequence[Sensor]) -> Sensor:
+    """Let each sensor read what the one before it has read, as long as there is something."""
+    if len(sensors) == 1:
+        return sensors[0]
+
+    def chain(now: int, reading: Reading) -> Reading | None:
+        found: Reading | None = reading
+        for sensor in sensors:
+            if found is None:
+                break
+            found = sensor(now, found)
+        return found
+
+    return chain
+
+
 def plain_look(
     state: Callable[[int], CrankState | None],
     close: Callable[..., Position],
-    sensors: tuple[Sensor, ...],
+    sense: Sensor,
 ) -> Callable[[int], Look]:
     """Put a tick together that asks for positions and for nothing that moves or pushes."""
-    first, others = sensors[0], sensors[1:]
 
     def look(now: int) -> Look:
         crank = state(now)
@@ -99,11 +108,7 @@ def plain_look(
         joints = position[2]
         if not joints:
             return new(Look, (crank, position, None, None))
-        reading = first(now, new(Reading, (now, joints, (), (), ())))
-        for sensor in others:
-            if reading is None:
-                break
-            reading = sensor(now, reading)
+        reading = sense(now, new(Reading, (now, joints, (), (), ())))
         return new(Look, (crank, position, None, reading))
 
     return look
@@ -117,10 +122,9 @@ def full_look(
     begin: Begin,
     stages: Sequence[Stage],
     observe: Callable[[int, Motion], Reading],
-    sensors: tuple[Sensor, ...],
+    sense: Sensor,
 ) -> Callable[[int], Look]:
     """Put a tick together."""
-    first, others = sensors[0], sensors[1:]
 
     def look(now: int) -> Look:
         crank = state(now)
@@ -136,11 +140,7 @@ def full_look(
         motion = begin(crank, position)
         for stage in stages:
             motion = stage(motion)
-        reading = first(now, observe(now, motion))
-        for sensor in others:
-            if reading is None:
-                break
-            reading = sensor(now, reading)
+        reading = sense(now, observe(now, motion))
         return new(Look, (crank, position, motion, reading))
 
     return look
