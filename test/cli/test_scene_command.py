@@ -182,7 +182,7 @@ WRONG = [
     (
         'linkage: l.yaml\neffects: {effort: {}}\n',
         'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
-        ["s.yaml: masses: link 'crank' has no mass"],
+        ["l.yaml: masses: link 'crank' has no mass"],
     ),
     (
         'linkage: l.yaml\nrate: .nan\n',
