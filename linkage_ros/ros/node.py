@@ -31,6 +31,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros import pacing
 from linkage_ros.ros.bag_topics import bag_topic
@@ -87,6 +88,7 @@ class LinkageNode(LifecycleNode):
         """Why the node could not be configured."""
         self.recording = RunRecording(self.get_logger())
         self.scene: Scene | None = None
+        self._closures: list[Closure] = []
         self.loop: TickLoop | None = None
         """The tick of this run, or of the last; nothing before the first."""
 
@@ -136,7 +138,7 @@ class LinkageNode(LifecycleNode):
             self.failure = error
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
-        self.failure, self.scene = None, scene
+        self.failure, self.scene, self._closures = None, scene, pipeline.closures
         return TransitionCallbackReturn.SUCCESS
 
     @_reporting
@@ -191,7 +193,7 @@ class LinkageNode(LifecycleNode):
 
     def _build_loop(self, scene: Scene) -> TickLoop:
         shared = self.crank_topic == self._joint_states.topic_name
-        pipeline = Pipeline(scene)
+        pipeline = Pipeline(scene, self._closures)
         closures, injection = pipeline.closures, pipeline.injection
         for closure in closures:
             # Found before the first tick, which would wait for it: iterated links are followed
