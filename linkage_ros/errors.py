@@ -21,6 +21,8 @@ value, and the remedy.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from os import PathLike
 from typing import Any
 
@@ -86,6 +88,12 @@ class RecordingError(LinkageError):
 
 class BagError(LinkageError):
     """A bag that cannot be read; ``where`` is its folder or file."""
+
+
+def did_you_mean(name: str, names: Iterable[str], otherwise: str) -> str:
+    """Return the remedy for a name that is none of these: the nearest, or what else there is."""
+    near = get_close_matches(name, list(names), n=1)
+    return f'did you mean {near[0]!r}?' if near else otherwise
 
 
 def quoted(value: Any) -> str:

@@ -26,7 +26,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
-from difflib import get_close_matches
 import os
 from pathlib import Path
 import subprocess
@@ -36,7 +35,7 @@ from threading import Event
 from linkage_ros.cli.plot import draw
 from linkage_ros.cli.run import add_run_arguments, run_scene
 from linkage_ros.cli.tables import show, Table
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import did_you_mean, LinkageError
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Member, Scene
 from linkage_ros.shipped import shipped
@@ -133,12 +132,8 @@ def _file(name: str) -> Path:
     files = _files()
     if name in files:
         return files[name]
-    near = get_close_matches(name, files, n=1)
-    raise LinkageError(
-        name,
-        'there is no such scene',
-        f'did you mean {near[0]!r}?' if near else f'there are: {", ".join(files)}',
-    )
+    remedy = did_you_mean(name, files, f'there are: {", ".join(files)}')
+    raise LinkageError(name, 'there is no such scene', remedy)
 
 
 def _row(file: Path) -> tuple[str, ...]:

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from difflib import get_close_matches
 from importlib.util import find_spec
 from pathlib import Path
 import sys
@@ -28,7 +27,7 @@ from threading import Event
 from linkage_ros.cli.parameter_tables import REGISTRIES, table_of
 from linkage_ros.cli.scene_tables import tables
 from linkage_ros.cli.tables import show
-from linkage_ros.errors import FileError, LinkageError
+from linkage_ros.errors import did_you_mean, FileError, LinkageError
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.linkage_schema import linkage_schema
 from linkage_ros.scene.load import load_scene
@@ -93,11 +92,10 @@ def _named(names: list[str]) -> Iterator[tuple[str, str]]:
         found = [entry for entry in known if entry[1] == name]
         if not found:
             words = [word for _, word in known]
-            near = get_close_matches(name, words, n=1)
             raise LinkageError(
                 f'--list {name}',
                 'there is no such drive, effect or fault',
-                f'did you mean {near[0]!r}?' if near else f'known: {", ".join(words)}',
+                did_you_mean(name, words, f'known: {", ".join(words)}'),
             )
         yield from found
 

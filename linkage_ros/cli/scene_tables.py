@@ -23,7 +23,7 @@ from typing import Any
 
 from linkage_ros.cli.tables import Table
 from linkage_ros.drives.drive import DRIVES
-from linkage_ros.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
+from linkage_ros.effects.stage import bringing, EFFECTS
 from linkage_ros.line import Line
 from linkage_ros.parameters import declared
 from linkage_ros.pipeline import Pipeline
@@ -58,12 +58,7 @@ def tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
 
 def brought_in_by(stage: str, named: Any) -> str:
     """Return what of the effects that are named brings in one that is not, with commas."""
-    bringing = [
-        name
-        for name in EFFECTS
-        if name in named and stage in (*NEEDS.get(name, ()), *PUBLISHED_WITH.get(name, ()))
-    ]
-    return ', '.join(bringing)
+    return ', '.join(bringing(stage, named))
 
 
 def _facts(scene: Scene) -> Iterator[tuple[str, str]]:

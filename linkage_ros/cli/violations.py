@@ -18,11 +18,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from difflib import get_close_matches
 from typing import Any, TYPE_CHECKING
 
 from jsonschema import Draft202012Validator
-from linkage_ros.errors import FileError, quoted
+from linkage_ros.errors import did_you_mean, FileError, quoted
 from linkage_ros.scene.schema import Schema
 from linkage_ros.scene.section import LinedDict, Section
 
@@ -155,10 +154,8 @@ def _meaning(schema: Schema, whole: Schema) -> str:
 
 
 def _near(key: str, known: Sequence[str]) -> str:
-    near = get_close_matches(key, known, n=1)
-    if near:
-        return f'did you mean {near[0]!r}?'
-    return f'known: {", ".join(sorted(known))}' if known else 'leave it out'
+    otherwise = f'known: {", ".join(sorted(known))}' if known else 'leave it out'
+    return did_you_mean(key, known, otherwise)
 
 
 def _dotted(path: _Path) -> str:

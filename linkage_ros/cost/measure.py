@@ -31,8 +31,8 @@ from statistics import median
 from typing import NamedTuple
 
 from linkage_ros.cost.feed import feed
-from linkage_ros.cost.variants import bringing, FAULTS, Names, Variant, Variants
-from linkage_ros.effects.stage import EFFECTS, LOADED
+from linkage_ros.cost.variants import FAULTS, Names, Variant, Variants
+from linkage_ros.effects.stage import bringing, EFFECTS, LOADED
 from linkage_ros.scene.scene import Scene
 
 _BLOCK = 100

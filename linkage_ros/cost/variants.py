@@ -17,12 +17,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import import_module
 from time import perf_counter_ns
 
-from linkage_ros.effects.stage import EFFECTS, LOADED, NEEDS, PUBLISHED_WITH
+from linkage_ros.effects.stage import brings, EFFECTS, LOADED
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
@@ -94,23 +94,10 @@ class Variants:
             return None
 
 
-def bringing(name: str, named: Iterable[str]) -> tuple[str, ...]:
-    """Return the effects, of those named, that bring another in."""
-    return tuple(
-        other
-        for other in EFFECTS
-        if other in named and name in (*NEEDS.get(other, ()), *_with_it(other))
-    )
-
-
-def _with_it(effect: str) -> tuple[str, ...]:
-    return PUBLISHED_WITH.get(effect, ())
-
-
 def _with(member: Member, named: Names) -> Member:
     """Return a linkage with these effects, of those that it has or that they bring in."""
     own = member.effects
-    brought = {need for effect in own for need in (*NEEDS.get(effect, ()), *_with_it(effect))}
+    brought = {need for effect in own for need in brings(effect)}
     effects = {
         name: own[name] if name in own else import_module(EFFECTS[name]).PARAMETERS()
         for name in EFFECTS

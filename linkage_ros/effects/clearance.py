@@ -40,13 +40,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot
-from operator import add
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Motion, Stage
+from linkage_ros.effects.stage import Motion, Stage, yielding
 from linkage_ros.errors import DefinitionError
 from linkage_ros.parameters import each, Number
-from linkage_ros.tuples import new
 
 _SMALLEST = 1e-12
 """A force below this part of the largest one is rounding, and has no direction."""
@@ -95,7 +93,7 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
     shift_of = context.reactions.shift
 
     def clearance(motion: Motion) -> Motion:
-        crank, position, velocity, acceleration, efforts, reactions, shift = motion
+        _, position, _, _, _, reactions, _ = motion
         if not reactions:
             return motion
         sizes = [hypot(fx, fy) for fx, fy, _ in reactions]
@@ -107,9 +105,6 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
                 fx, fy, _ = reactions[joint]
                 offsets[joint] = complex(-play * (fx / size), -play * (fy / size))
         moved = shift_of(position, offsets)
-        if moved is None:
-            return motion
-        shift = tuple(map(add, shift, moved)) if shift else moved
-        return new(Motion, (crank, position, velocity, acceleration, efforts, reactions, shift))
+        return motion if moved is None else yielding(motion, moved)
 
     return clearance

@@ -35,15 +35,13 @@ from __future__ import annotations
 from cmath import rect
 from collections.abc import Mapping
 from dataclasses import dataclass
-from operator import add
 from typing import NamedTuple
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Motion, Stage
+from linkage_ros.effects.stage import Motion, Stage, yielding
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.groups import Joint
 from linkage_ros.parameters import each, Number
-from linkage_ros.tuples import new
 
 _STIFFEST = 1e15
 
@@ -104,7 +102,7 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
     shift_of = context.reactions.shift
 
     def compliance(motion: Motion) -> Motion:
-        crank, position, velocity, acceleration, efforts, reactions, shift = motion
+        _, position, _, _, _, reactions, _ = motion
         if not reactions:
             return motion
         x = position[3][0]
@@ -120,10 +118,7 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
             for joint, sign in far:
                 offsets[joint] -= sign * stretch
         moved = shift_of(position, offsets)
-        if moved is None:
-            return motion
-        shift = tuple(map(add, shift, moved)) if shift else moved
-        return new(Motion, (crank, position, velocity, acceleration, efforts, reactions, shift))
+        return motion if moved is None else yielding(motion, moved)
 
     return compliance
 

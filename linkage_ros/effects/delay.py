@@ -45,9 +45,8 @@ from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
-from linkage_ros.effects.stage import Reading
+from linkage_ros.effects.stage import Reading, restamped
 from linkage_ros.parameters import choice, number
-from linkage_ros.tuples import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,10 +112,7 @@ class Delay:
             found = self._look(due)
         else:
             found = self._next(self._on_the_way, now, reading, due)
-        if found is None or self._measured:
-            return found
-        _, joints, rates, accelerations, efforts = found
-        return new(Reading, (now, joints, rates, accelerations, efforts))
+        return found if found is None or self._measured else restamped(found, now)
 
     @staticmethod
     def _next(

@@ -43,10 +43,9 @@ from dataclasses import dataclass
 from random import Random
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Reading
+from linkage_ros.effects.stage import Reading, restamped
 from linkage_ros.errors import DefinitionError
 from linkage_ros.parameters import choice, number
-from linkage_ros.tuples import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,5 +138,4 @@ class Dropout:
         last = self._last
         if last is None or not self._repeat:
             return None
-        _, joints, rates, accelerations, efforts = last
-        return new(Reading, (reading[0], joints, rates, accelerations, efforts))
+        return restamped(last, reading[0])

@@ -38,9 +38,8 @@ from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
-from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.effects.stage import Reading, restamped, Sensor
 from linkage_ros.parameters import choice, number
-from linkage_ros.tuples import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +75,6 @@ def sensor(parameters: JitterParameters, context: Context) -> Sensor:
     def jitter(now: int, reading: Reading) -> Reading | None:
         history.add(now, reading)
         found = history.between(max(now - earlier(), history.begin))
-        if found is None:
-            return None
-        _, joints, rates, accelerations, efforts = found
-        return new(Reading, (reading[0], joints, rates, accelerations, efforts))
+        return None if found is None else restamped(found, reading[0])
 
     return jitter

@@ -34,9 +34,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.effects.stage import Reading, restamped, Sensor
 from linkage_ros.parameters import choice, number
-from linkage_ros.tuples import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +87,7 @@ class RateLimit:
         elif now < self._due:
             if not self._repeat:
                 return None
-            _, joints, rates, accelerations, efforts = held
-            return new(Reading, (reading[0], joints, rates, accelerations, efforts))
+            return restamped(held, reading[0])
         unit, per = self._unit, self._per
         elapsed = now - self._begin
         following = ((2 * elapsed + 1) * unit - 1) // per + 1

@@ -45,11 +45,13 @@ An effect that publishes a message of its own has also
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
+from operator import add
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
+from linkage_ros.tuples import new
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.reactions import Reaction
@@ -93,6 +95,16 @@ PUBLISHED_WITH = {'acceleration': ('velocity',)}
 
 LOADED = ('effort', 'pin_forces', 'compliance', 'clearance')
 """Effects to which masses, loads and friction matter."""
+
+
+def brings(effect: str) -> tuple[str, ...]:
+    """Return what an effect brings in."""
+    return *NEEDS.get(effect, ()), *PUBLISHED_WITH.get(effect, ())
+
+
+def bringing(name: str, named: Container[str]) -> tuple[str, ...]:
+    """Return the effects, of those named, that bring another in."""
+    return tuple(other for other in EFFECTS if other in named and name in brings(other))
 
 
 class Motion(NamedTuple):
@@ -150,6 +162,19 @@ class Reading(NamedTuple):
     rates: tuple[float, ...]
     accelerations: tuple[float, ...]
     efforts: tuple[float, ...]
+
+
+def restamped(reading: Reading, stamp: int) -> Reading:
+    """Return a reading under another stamp, in [ns]."""
+    _, joints, rates, accelerations, efforts = reading
+    return new(Reading, (stamp, joints, rates, accelerations, efforts))
+
+
+def yielding(motion: Motion, moved: tuple[float, ...]) -> Motion:
+    """Return a motion whose published joints have moved further, in [rad] or [m]."""
+    crank, position, velocity, acceleration, efforts, reactions, shift = motion
+    shift = tuple(map(add, shift, moved)) if shift else moved
+    return new(Motion, (crank, position, velocity, acceleration, efforts, reactions, shift))
 
 
 DriveStage = Callable[[CrankState], CrankState]

@@ -25,9 +25,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.effects.stage import Reading, restamped, Sensor
 from linkage_ros.faults.fault import Switch
-from linkage_ros.tuples import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +46,6 @@ def sensor(_parameters: FreezeParameters, switch: Switch, _joints: Sequence[str]
         if not switch.on:
             last = reading
             return reading
-        return None if last is None else new(Reading, (reading[0], *last[1:]))
+        return None if last is None else restamped(last, reading[0])
 
     return freeze

@@ -133,7 +133,7 @@ def _scene(
         members=tuple(members),
         rate=_rate(content),
         wrapped=content.choice('angles', ('continuous', 'wrapped'), 'continuous') == 'wrapped',
-        seed=_whole(content, 'seed', 0, 0, 2**53),
+        seed=content.whole('seed', 0, least=0, most=2**53),
         faults=_faults(content, members),
         record=_record(content.section('record')) if 'record' in content else None,
         files=files,
@@ -266,18 +266,11 @@ def _rate(content: Section) -> float:
     return rate
 
 
-def _whole(content: Section, key: str, default: int, least: int, most: int) -> int:
-    value = content.number(key, default, least=least, most=most)
-    if not value.is_integer():
-        raise content.error(key, f'{value:g} is not whole', 'write a whole number')
-    return int(value)
-
-
 def _record(content: Section) -> RecordParameters:
     record = RecordParameters(
         directory=content.text('directory', 'runs'),
         name=content.text('name', ''),
-        queue=_whole(content, 'queue', 20_000, 100, 10_000_000),
+        queue=content.whole('queue', 20_000, least=100, most=10_000_000),
     )
     if record.name != Path(record.name).name or record.name == '..':
         raise content.error(

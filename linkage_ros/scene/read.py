@@ -19,11 +19,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING
-from difflib import get_close_matches
 from os.path import join
 from typing import Any
 
-from linkage_ros.errors import quoted
+from linkage_ros.errors import did_you_mean, quoted
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.parameters import (
     Choice,
@@ -132,22 +131,18 @@ def _of(inner: Section, key: str, kind: Each, parts: Parts, folder: str) -> Any:
 
 
 def _number(content: Section, key: str, kind: Number) -> float | int:
-    value = content.number(key, least=kind.least, most=kind.most, above=kind.above, unit=kind.unit)
-    if not kind.whole:
-        return value
-    if not value.is_integer():
-        raise content.error(key, f'{value:g} is not whole', 'write a whole number')
-    return int(value)
+    if kind.whole:
+        return content.whole(key, least=kind.least, most=kind.most, unit=kind.unit)
+    return content.number(key, least=kind.least, most=kind.most, above=kind.above, unit=kind.unit)
 
 
 def _known(content: Section, key: str, name: str, kind: str, parts: Parts) -> str:
     """Return a name, if there is such a part."""
     if name in parts[kind]:
         return name
-    near = get_close_matches(name, parts[kind], n=1)
     known = ', '.join(parts[kind]) or 'none'
     raise content.error(
         key,
         f'there is no {kind} {quoted(name)}',
-        f'did you mean {near[0]!r}?' if near else f'there are: {known}',
+        did_you_mean(name, parts[kind], f'there are: {known}'),
     )

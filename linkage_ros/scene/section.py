@@ -18,12 +18,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from difflib import get_close_matches
 from math import inf, isfinite
 from re import fullmatch
 from typing import Any, cast
 
-from linkage_ros.errors import FileError, quoted
+from linkage_ros.errors import did_you_mean, FileError, quoted
 
 
 class LinedDict(dict[str, Any]):
@@ -108,6 +107,21 @@ class Section:
                 f'write a finite number{bounds and f", {bounds}"}{unit and f" [{unit}]"}',
             )
         return float(value)
+
+    def whole(
+        self,
+        key: str,
+        default: int | None = None,
+        *,
+        least: float,
+        most: float,
+        unit: str = '',
+    ) -> int:
+        """Return a whole number within bounds."""
+        value = self.number(key, default, least=least, most=most, unit=unit)
+        if not value.is_integer():
+            raise self.error(key, f'{value:g} is not whole', 'write a whole number')
+        return int(value)
 
     def flag(self, key: str, default: bool | None = None) -> bool:
         """Return true or false."""
@@ -242,9 +256,8 @@ class Section:
         for key in self._content:
             if key not in self._taken:
                 names = sorted(self._taken | set(known))
-                near = get_close_matches(key, names, n=1)
                 known_names = f'known: {", ".join(names)}' if names else 'leave it out'
-                remedy = f'did you mean {near[0]!r}?' if near else known_names
+                remedy = did_you_mean(key, names, known_names)
                 raise self.error(key, 'unknown key', remedy)
 
     def _line_of(self, key: str) -> int:
