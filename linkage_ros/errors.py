@@ -55,6 +55,10 @@ class DefinitionError(LinkageError):
     """A linkage or scene that cannot be built; ``where`` is the dotted key within its file."""
 
 
+class SynthesisError(LinkageError):
+    """A linkage that was asked for and does not exist; ``where`` is what was asked, in words."""
+
+
 class FileError(LinkageError):
     """
     A file that cannot be used as it stands.

@@ -1,0 +1,142 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A four-bar that was designed: its pins, link by link, and what it was wanted for.
+
+Each link has the frame that the wanted values are in: the crank's angle is the one that was asked
+for, also where the crank's pin does not lie on the x axis of its frame (a free zero), or lies
+behind the pivot (a negative length, a link that points the other way).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from linkage_ros.kinematics.linkage import (
+    GROUND,
+    Input,
+    Linkage,
+    Point,
+    Pose,
+    RevoluteJoint,
+)
+
+CRANK, COUPLER, ROCKER = 'crank', 'coupler', 'rocker'
+
+Assembly = Literal['left', 'right']
+
+
+@dataclass(frozen=True, slots=True)
+class FourBar:
+    """
+    A four-bar with pivots where they stand; all places in [m].
+
+    Attributes
+    ----------
+    pivots
+        Of crank and rocker, O2 and O4, in the ground's frame.
+    crank
+        The crank's pin A in the crank's frame, whose origin is O2.
+    coupler
+        The coupler's pins A and B in the coupler's frame.
+    rocker
+        The rocker's pin B in the rocker's frame, whose origin is O4.
+    side
+        The side of A→O4 on which B lies.
+    traced
+        A point P of the coupler, in its frame; None where none matters.
+
+    """
+
+    pivots: tuple[complex, complex]
+    crank: complex
+    coupler: tuple[complex, complex]
+    rocker: complex
+    side: Assembly
+    traced: complex | None = None
+
+    @property
+    def lengths(self) -> tuple[float, float, float, float]:
+        """Return the lengths of crank, coupler, rocker and ground, in [m]."""
+        (o2, o4), (a, b) = self.pivots, self.coupler
+        return abs(self.crank), abs(b - a), abs(self.rocker), abs(o4 - o2)
+
+    def linkage(self, start: float | None = None) -> Linkage:
+        """
+        Return it as any other linkage.
+
+        Parameters
+        ----------
+        start
+            Crank angle that it begins with, in [rad]; none where nothing is said.
+
+        """
+        (o2, o4), (a, b) = self.pivots, self.coupler
+        coupler = {'A': _point(a), 'B': _point(b)}
+        if self.traced is not None:
+            coupler['P'] = _point(self.traced)
+        return Linkage(
+            links={
+                GROUND: {'O2': _point(o2), 'O4': _point(o4)},
+                CRANK: {'O2': (0.0, 0.0), 'A': _point(self.crank)},
+                COUPLER: coupler,
+                ROCKER: {'O4': (0.0, 0.0), 'B': _point(self.rocker)},
+            },
+            inputs=(Input('crank_joint', GROUND, CRANK),),
+            assembly={'B': self.side},
+            joints={
+                'coupler_joint': RevoluteJoint(CRANK, COUPLER),
+                'rocker_joint': RevoluteJoint(GROUND, ROCKER),
+            },
+            sliders={},
+            traced=('P',) if self.traced is not None else (),
+            pose=None if start is None else Pose((start,), {}),
+        )
+
+
+class Wanted(NamedTuple):
+    """
+    One position that was asked for.
+
+    Attributes
+    ----------
+    crank
+        The crank's angle there, given or found, in [rad].
+    rocker
+        The rocker's angle, in [rad]; None where it was not asked for.
+    coupler
+        The coupler's angle to the ground, in [rad]; None where it was not asked for.
+    place
+        Where the traced point shall be, in the ground's frame, in [m]; None likewise.
+
+    """
+
+    crank: float
+    rocker: float | None = None
+    coupler: float | None = None
+    place: complex | None = None
+
+
+class Design(NamedTuple):
+    """A four-bar and the positions that it was designed for, in the order asked for."""
+
+    four_bar: FourBar
+    wanted: tuple[Wanted, ...]
+
+
+def _point(place: complex) -> Point:
+    return place.real, place.imag
