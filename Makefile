@@ -19,13 +19,16 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test bench accuracy gallery schema cost effects lint format clean
+.PHONY: help demo test bench accuracy synthesis round_trips gallery schema cost effects lint format
+.PHONY: clean
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
 	@echo 'make test      lint, then all tests'
 	@echo 'make bench     measure'
 	@echo 'make accuracy  prove the kinematics on 11 million cases (30 min)'
+	@echo 'make synthesis compute and draw what docs/synthesis.md says'
+	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
 	@echo 'make gallery   draw the linkages that come with the package'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
 	@echo 'make cost      measure what every effect costs, into docs/cost.md'
@@ -64,6 +67,12 @@ bench: $(STAMP)
 
 accuracy: $(STAMP)
 	@$(BIN)/python -m campaigns.accuracy
+
+synthesis: $(STAMP)
+	@$(BIN)/python -m docs.make_synthesis
+
+round_trips: $(STAMP)
+	@$(BIN)/python -m campaigns.synthesis
 
 gallery: $(STAMP)
 	@$(BIN)/python docs/make_gallery.py

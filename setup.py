@@ -53,6 +53,10 @@ def shared(folder):
 # ROS is an extra: on a robot rclpy comes from apt and pip must leave it alone.
 ROS = ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces']
 REPORT = ['matplotlib', 'rich']
+# Where a linkage is fitted or searched for; exact synthesis needs numpy only.
+DESIGN = ['scipy']
+# For studies that outgrow one machine.
+DASK = ['distributed']
 # The name `test` matters: colcon runs pytest only when it finds it in this extra.
 TEST = [
     'pytest',
@@ -65,6 +69,7 @@ TEST = [
     # What drives and forces are held against: splines, and an engine of rigid bodies.
     'scipy',
     'mujoco>=3',
+    *DASK,
 ]
 # What the speed of the kinematics is measured against.
 BENCH = ['pylinkage[numba]>=1.3,<1.4']
@@ -118,8 +123,10 @@ setup(
     extras_require={
         'ros': ROS,
         'report': REPORT,
+        'design': DESIGN,
+        'dask': DASK,
         'test': TEST,
-        'dev': [*ROS, *REPORT, *TEST, *BENCH, *STYLE, *COLCON],
+        'dev': [*ROS, *REPORT, *DESIGN, *DASK, *TEST, *BENCH, *STYLE, *COLCON],
     },
     zip_safe=True,
     entry_points={

@@ -23,6 +23,7 @@ behind the pivot (a negative length, a link that points the other way).
 
 from __future__ import annotations
 
+from cmath import rect
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -68,6 +69,37 @@ class FourBar:
     rocker: complex
     side: Assembly
     traced: complex | None = None
+
+    @classmethod
+    def of_lengths(
+        cls,
+        a: float,
+        b: float,
+        c: float,
+        d: float,
+        alpha: float = 0.0,
+        beta: float = 0.0,
+        side: Assembly = 'left',
+    ) -> FourBar:
+        """
+        Return a four-bar whose ground lies on the x axis, its crank pivot in the origin.
+
+        Parameters
+        ----------
+        a, c
+            Lengths of crank and rocker; negative ones are links that point the other way.
+        b, d
+            Lengths of coupler and ground, above 0.
+        alpha, beta
+            Where the pins of crank and rocker lie in their frames, in [rad] from the x axis.
+        side
+            Of the assembly.
+
+        """
+        # A turn by nothing is left out: rect would put -0.0 or a rounding into the file.
+        crank = rect(a, alpha) if alpha else complex(a, 0.0)
+        rocker = rect(c, beta) if beta else complex(c, 0.0)
+        return cls((0j, complex(d, 0.0)), crank, (0j, complex(b, 0.0)), rocker, side)
 
     @property
     def lengths(self) -> tuple[float, float, float, float]:
