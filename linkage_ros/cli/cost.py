@@ -63,7 +63,7 @@ effects:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     one = parser.add_mutually_exclusive_group(required=True)
-    one.add_argument('scene', nargs='?', help='the scene file')
+    one.add_argument('scene', nargs='?', help='the scene file, or a linkage file')
     one.add_argument(
         '--all', action='store_true', help='every effect, alone, on the four-bar that is shipped'
     )

@@ -31,7 +31,7 @@ from linkage_ros.ros.run import run_linkage_node
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('scene', help='the scene file')
+    parser.add_argument('scene', help='the scene file; or a linkage file, which it moves')
     add_run_arguments(parser)
     parser.add_argument(
         '--ros-args', nargs=argparse.REMAINDER, default=[], help='remappings, parameters, QoS'

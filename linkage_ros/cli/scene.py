@@ -30,7 +30,7 @@ from linkage_ros.cli.tables import show
 from linkage_ros.errors import did_you_mean, FileError, LinkageError
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.linkage_schema import linkage_schema
-from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.load import kind_of, load_scene
 from linkage_ros.scene.scene_schema import scene_schema
 from linkage_ros.scene.schema import as_text
 from linkage_ros.scene.section import Section
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'said at once; elsewhere the first thing.'
     )
     one = parser.add_mutually_exclusive_group(required=True)
-    one.add_argument('file', nargs='?', help='the scene file')
+    one.add_argument('file', nargs='?', help='the scene file, or a linkage file')
     one.add_argument(
         '--list',
         nargs='*',
@@ -107,6 +107,8 @@ def _violations(file: str) -> list[FileError]:
     from linkage_ros.cli.violations import violations
 
     content, _ = read_yaml(file)
+    if kind_of(content) == 'linkage':
+        return violations(content, linkage_schema())
     wrong = violations(content, scene_schema())
     if wrong:
         return wrong

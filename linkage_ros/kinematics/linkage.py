@@ -98,14 +98,15 @@ class SlideJoint:
 @dataclass(frozen=True, slots=True)
 class Pose:
     """
-    Where points lie, roughly, at given inputs: where an iteration starts.
+    Where the linkage starts; with points, where an iteration does.
 
     Attributes
     ----------
     inputs
         One value for each input, in [rad] or [m].
     points
-        Points in the frame of the ground, in [m].
+        Points of the links that no dyad covers, in the frame of the ground, roughly, in [m]; none
+        where there are no such links.
 
     """
 
@@ -154,7 +155,7 @@ class Linkage:
     traced
         Names of points whose curves matter.
     pose
-        Where an iteration starts; only for what no dyad covers.
+        Where it starts; where a dyad does not cover all of it, where the iteration does.
     masses
         Of links, by name; only where forces matter, and then of every link that moves.
 

@@ -171,17 +171,21 @@ class Way:
 
 def usual_inputs(closure: Closure) -> tuple[float, ...]:
     """
-    Return inputs at which a linkage shows what it is.
+    Return inputs at which a linkage shows what it is, or from which it starts.
 
-    60 degrees where the input turns fully; else two thirds of the way through its widest range,
-    since in the middle the links of a symmetric linkage often lie on each other. Of several
-    inputs, what the file's pose says; else 60 degrees each, where that is far from a toggle; else
-    what is farthest from one on a coarse grid.
+    What the file's pose says, if it closes there: of several inputs any pose, of one a pose
+    without points, since one with points is where an iteration starts best. Else of a single
+    input 60 degrees where it turns fully, or two thirds of the way through its widest range, since
+    in the middle the links of a symmetric linkage often lie on each other; and of several inputs
+    60 degrees each, where that is far from a toggle, or what is farthest from one on a coarse
+    grid.
     """
-    linkage = closure.linkage
-    if len(linkage.inputs) > 1:
-        if linkage.pose is not None:
-            return linkage.pose.inputs
+    linkage, pose = closure.linkage, closure.linkage.pose
+    several = len(linkage.inputs) > 1
+    # No joints: no loop that closes.
+    if pose and (several or not pose.points) and closure.position(*pose.inputs).joints:
+        return pose.inputs
+    if several:
         usual = (pi / 3.0,) * len(linkage.inputs)
         turning = not any(given.slider for given in linkage.inputs)
         if turning and _ease(closure, closure.position(*usual)) > _EASY:

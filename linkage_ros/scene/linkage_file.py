@@ -41,6 +41,11 @@ _HEAVIEST = 1e12
 """Masses beyond this, in [kg], and moments of inertia, in [kg·m²], are no machine's either."""
 
 
+def looks_like_linkage(content: Section) -> bool:
+    """Return whether a file that may hold anything has the keys of a linkage."""
+    return any(key in content for key in ('links', *_SHORTHANDS))
+
+
 def read_linkage(content: Section) -> Linkage:
     """
     Read a linkage and prove that it closes.
@@ -56,9 +61,9 @@ def read_linkage(content: Section) -> Linkage:
             written_out = expand(content.section(shorthand))
             content.finish()
             return _closable(content, _linkage(Section(content.file, '', written_out)), shorthand)
-    for key in content:
-        if key not in _KEYS:
-            content.finish((*_KEYS, *_SHORTHANDS))
+    for key in _KEYS:
+        content.taken(key)
+    content.finish(tuple(_SHORTHANDS))
     return _closable(content, _linkage(content))
 
 
@@ -106,7 +111,7 @@ def _input(content: Section) -> Input:
 
 def _pose(content: Section) -> Pose:
     inputs = tuple(content.numbers('inputs', most=_FARTHEST))
-    points = content.section('points')
+    points = content.section('points', required=False)
     pose = Pose(inputs, {name: points.point(name, most=_FARTHEST) for name in points})
     content.finish()
     return pose

@@ -174,7 +174,8 @@ def _slider() -> Schema:
 
 def _pose() -> Schema:
     return mapping(
-        'Where an iteration starts: for links that no dyad covers.',
+        'Where the linkage starts; with points, where the iteration of links does that no dyad '
+        'covers.',
         {
             'inputs': {
                 'description': 'a value for each input [rad or m]',
@@ -182,11 +183,11 @@ def _pose() -> Schema:
                 'items': number('a value', least=-_FARTHEST, most=_FARTHEST),
             },
             'points': named(
-                'points in the frame of the ground, roughly',
+                'points of iterated links in the frame of the ground, roughly',
                 point('[x, y] [m]', _FARTHEST),
             ),
         },
-        required=('inputs', 'points'),
+        required=('inputs',),
     )
 
 

@@ -22,7 +22,7 @@ from dataclasses import replace
 from importlib import import_module
 from os.path import isfile
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
@@ -30,7 +30,7 @@ from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.faults.fault import Fault, FAULTS
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_file import looks_like_linkage, read_linkage
 from linkage_ros.scene.loads import read_loads
 from linkage_ros.scene.read import parts_of, read_parameters
 from linkage_ros.scene.scene import Member, RecordParameters, Scene
@@ -49,12 +49,12 @@ Open = Callable[[Section], tuple[Section, bytes]]
 
 def load_scene(file: str | Path) -> Scene:
     """
-    Read a scene and the linkages that it names.
+    Read a scene and the linkages that it names; a linkage file stands for one that moves it.
 
     Parameters
     ----------
     file
-        The scene file; paths in it are relative to its folder.
+        The scene file; paths in it are relative to its folder. Or a linkage file.
 
     Raises
     ------
@@ -62,7 +62,10 @@ def load_scene(file: str | Path) -> Scene:
         With file, line, key, value and remedy.
 
     """
-    content, scene_bytes = read_yaml(file)
+    content, data = read_yaml(file)
+    name, folder = Path(file).stem, str(Path(file).parent)
+    if kind_of(content) == 'linkage':
+        return _stand_in(name, content, data, folder)
 
     def open_linkage(where: Section) -> tuple[Section, bytes]:
         linkage = Path(file).parent / where.text('linkage')
@@ -74,7 +77,54 @@ def load_scene(file: str | Path) -> Scene:
             )
         return read_yaml(linkage)
 
-    return _scene(Path(file).stem, content, open_linkage, scene_bytes, str(Path(file).parent))
+    return _scene(name, content, open_linkage, data, folder)
+
+
+def kind_of(content: Section) -> Literal['scene', 'linkage']:
+    """
+    Return what a file holds that may be a scene or a linkage.
+
+    Raises
+    ------
+    FileError
+        Where it is neither, or where keys of both are mixed.
+
+    """
+    if not ('linkage' in content or 'linkages' in content):
+        if looks_like_linkage(content):
+            for key in content:
+                if key in _OF_A_SCENE:
+                    raise content.error(
+                        key,
+                        'is a key of scenes, and this is a linkage',
+                        f'write it beside linkage: {Path(content.file).name} into another file',
+                    )
+            return 'linkage'
+        if not any(key in _OF_A_SCENE for key in content):
+            raise content.error(
+                '',
+                'is neither a scene nor a linkage',
+                'write linkage: FILE for a scene, links: {…} for a linkage',
+            )
+    return 'scene'
+
+
+def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
+    """Return the scene that a linkage file stands for."""
+    from linkage_ros.scene.stand_in import scene_text_for  # local import: not for scenes
+
+    try:
+        text = scene_text_for(read_linkage(content), LINKAGE_FILE).encode()
+    except DefinitionError as error:
+        raise content.error(error.where, error.reason, error.remedy) from None
+
+    def open_linkage(where: Section) -> tuple[Section, bytes]:
+        where.text('linkage')
+        return content, data
+
+    return _scene(
+        name, parse_yaml(text, f'{content.file}, as a scene'), open_linkage, text, folder
+    )
 
 
 def parse_scene(name: str, where: str, files: Mapping[str, bytes], folder: str = '') -> Scene:
@@ -156,6 +206,9 @@ def _scene(
 
 _OF_A_MEMBER = ('publish_input', 'drive', 'effects', 'loads')
 """What an entry of ``linkages`` may say for itself, and the scene for all that do not."""
+
+_OF_A_SCENE = ('rate', 'angles', 'seed', 'faults', 'record', *_OF_A_MEMBER)
+"""What a scene may say beside the linkages that it names."""
 
 
 def _member(

@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import acos, cos, degrees, hypot, pi, radians, remainder, sin, sqrt, tau
 from pathlib import Path
 import random
@@ -25,6 +26,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.four_bars import four_bars
+from linkage_ros.kinematics.linkage import Pose
 from linkage_ros.kinematics.ranges import InputRange
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.survey import (
@@ -89,6 +91,45 @@ def test_every_shipped_linkage_closes_to_rounding_all_over_its_range(file: Path)
     assert worst < 1e-14 * closure.scale
     assert closure.residual(closure.position(*at)) == worst
     assert count > 400
+
+
+# A pose, and where a linkage is shown and starts then; of a crank-rocker, and one that folds.
+POSES = {
+    'none': ((2.0, 7.0, 9.0, 6.0), None, radians(60.0)),
+    'a start': ((2.0, 7.0, 9.0, 6.0), Pose((0.436,), {}), 0.436),
+    'a start some turns away': ((2.0, 7.0, 9.0, 6.0), Pose((-20.0,), {}), -20.0),
+    'a start of one that folds': ((4.0, 8.0, 3.0, 6.0), Pose((2.5,), {}), 2.5),
+    # It closes beyond acos(27/48) only: from there to as far on the other side, two thirds.
+    'a start where it is open': (
+        (4.0, 8.0, 3.0, 6.0),
+        Pose((0.5,), {}),
+        acos(0.5625) + (tau - 2.0 * acos(0.5625)) * 2.0 / 3.0,
+    ),
+    'where an iteration would start': (
+        (2.0, 7.0, 9.0, 6.0),
+        Pose((0.436,), {'A': (1.8, 0.8)}),
+        radians(60.0),
+    ),
+}
+
+
+@pytest.mark.parametrize('kind', POSES)
+def test_a_pose_without_points_says_where_a_linkage_starts(kind: str) -> None:
+    lengths, pose, expected = POSES[kind]
+    linkage = replace(four_bar_linkage(lengths, 'left'), pose=pose)
+    assert usual_inputs(Closure(linkage)) == (pytest.approx(expected, abs=1e-14),)
+
+
+@pytest.mark.parametrize(
+    ('inputs', 'expected'),
+    [((1.3, 1.7), (1.3, 1.7)), ((pi, 0.0), (radians(60.0), radians(60.0)))],
+    ids=['closes', 'open: the elbows are 0.3 m apart, 0.22 at most'],
+)
+def test_several_inputs_start_from_their_pose(
+    inputs: tuple[float, float], expected: tuple[float, float]
+) -> None:
+    linkage = replace(shipped('five_bar').linkage, pose=Pose(inputs, {}))
+    assert usual_inputs(Closure(linkage)) == pytest.approx(expected)
 
 
 def test_the_other_inputs_are_held_along_a_way() -> None:

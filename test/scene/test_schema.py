@@ -287,7 +287,7 @@ BAD_LINKAGES = {
     'nothing to publish': WRITTEN_OUT[: WRITTEN_OUT.index(b'joints:')] + b'joints: {}',
     'joints missing': WRITTEN_OUT[: WRITTEN_OUT.index(b'joints:')],
     'paths of no names': WRITTEN_OUT.replace(b'traced: [P]', b'traced: [1]'),
-    'pose without points': WRITTEN_OUT + b'pose: {inputs: [0]}',
+    'pose without inputs': WRITTEN_OUT + b'pose: {points: {A: [0, 0]}}',
     'weightless': WRITTEN_OUT + b'masses: {crank: {mass: 0, center: [0, 0], inertia: 0}}',
     'mass without a place': WRITTEN_OUT + b'masses: {crank: {mass: 1, inertia: 0}}',
     'angle of no block': slider(

@@ -1,0 +1,225 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A linkage as the text of a linkage file, written so that reading it gives the same linkage.
+
+Short mappings stand on one line, as in the files that come with the package. Numbers are the
+shortest that read as the same floats; names are quoted where a reader of YAML 1.1 or 1.2 could
+take them for something else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+import json
+import os
+from pathlib import Path
+import re
+from secrets import token_hex
+from textwrap import wrap
+
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import parse_yaml
+
+_WIDTH = 99
+_WHOLE = 1e15
+"""Beyond it, whole numbers are easier to read with an exponent."""
+
+_PLAIN = re.compile(r'[^\W\d][\w.-]*')
+_WORDS = {'yes', 'no', 'on', 'off', 'true', 'false', 'null'}
+"""What YAML takes for something other than a name; 1.1 knows more of them than 1.2."""
+
+Content = float | str | list['Content'] | dict[str, 'Content']
+
+
+def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
+    """
+    Return the text of a linkage file.
+
+    Parameters
+    ----------
+    linkage
+        The linkage, with numbers that are finite and names that print.
+    comment
+        Paragraphs that stand at its head.
+
+    """
+    lines = list(_comment(comment))
+    for key, value in _content(linkage).items():
+        lines += _entry(key, value, '', in_rows=key in _IN_ROWS)
+    return '\n'.join(lines) + '\n'
+
+
+def write_linkage(linkage: Linkage, file: str | Path, comment: Sequence[str] = ()) -> None:
+    """
+    Write a linkage file, in the place of one that is there.
+
+    It is written beside its place and moved there, so that at every instant a whole file is there,
+    the old or the new.
+
+    Parameters
+    ----------
+    linkage, comment
+        As in `linkage_text`.
+    file
+        Where to; a symbolic link is followed.
+
+    Raises
+    ------
+    LinkageError
+        Where the file cannot be written, or where what it would say is no linkage.
+
+    """
+    data = linkage_text(linkage, comment).encode()
+    read_linkage(parse_yaml(data, str(file)))
+    try:
+        target = Path(file).resolve()
+        if target.exists() and not target.is_file():
+            raise LinkageError(file, 'is there already and is no file', 'name another file')
+        if target.exists() and not os.access(target, os.W_OK):
+            raise PermissionError(0, 'Permission denied')
+        _replace(target, data)
+    except (OSError, ValueError, RuntimeError) as error:  # the last for links in a circle
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise LinkageError(file, f'cannot be written ({reason})', 'name another file') from None
+
+
+def number_text(value: float) -> str:
+    """Return the shortest text that every YAML reader takes for the same float."""
+    value = float(value)
+    written = repr(value)
+    if value.is_integer() and abs(value) < _WHOLE and written != '-0.0':
+        return str(int(value))
+    mantissa, e, exponent = written.partition('e')
+    # YAML 1.1 takes no number for one that has an exponent and no decimal point.
+    return f'{mantissa}.0e{exponent}' if e and '.' not in mantissa else written
+
+
+def _replace(target: Path, data: bytes) -> None:
+    temporary = target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'
+    try:
+        with temporary.open('xb') as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(target)
+    except OSError:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+
+
+_IN_ROWS = ('links', 'sliders', 'joints', 'masses')
+"""Keys whose parts have a line each, however short they are."""
+
+
+def _content(linkage: Linkage) -> dict[str, Content]:
+    """Return what the file says, in its order; what is empty and may be absent is."""
+    inputs: list[Content] = [_input(given) for given in linkage.inputs]
+    content: dict[str, Content] = {
+        'links': {
+            link: {name: [*point] for name, point in points.items()}
+            for link, points in linkage.links.items()
+        },
+        'sliders': {name: _slider(slider) for name, slider in linkage.sliders.items()},
+        'input': inputs[0] if len(inputs) == 1 else inputs,
+        'assembly': dict(linkage.assembly),
+        'pose': _pose(linkage),
+        'joints': {name: _joint(joint) for name, joint in linkage.joints.items()},
+        'traced': [*linkage.traced],
+        'masses': {
+            link: {'mass': mass.mass, 'center': [*mass.center], 'inertia': mass.inertia}
+            for link, mass in linkage.masses.items()
+        },
+    }
+    needed = ('links', 'input', 'joints')
+    return {key: value for key, value in content.items() if value or key in needed}
+
+
+def _slider(slider: Slider) -> dict[str, Content]:
+    block: dict[str, Content] = (
+        {'block': slider.block, 'angle': slider.angle} if slider.block else {}
+    )
+    return {
+        'point': slider.point,
+        **block,
+        'along': slider.along,
+        'through': slider.through,
+        'direction': [*slider.direction],
+    }
+
+
+def _input(given: Input) -> dict[str, Content]:
+    if given.slider:
+        return {'joint': given.joint, 'slider': given.slider}
+    return {'joint': given.joint, 'parent': given.parent, 'child': given.child}
+
+
+def _joint(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
+    if isinstance(joint, SlideJoint):
+        return {'slider': joint.slider}
+    return {'parent': joint.parent, 'child': joint.child}
+
+
+def _pose(linkage: Linkage) -> dict[str, Content]:
+    if linkage.pose is None:
+        return {}
+    pose: dict[str, Content] = {'inputs': [*linkage.pose.inputs]}
+    if linkage.pose.points:
+        pose['points'] = {name: [*point] for name, point in linkage.pose.points.items()}
+    return pose
+
+
+def _comment(paragraphs: Sequence[str]) -> Iterator[str]:
+    for paragraph in paragraphs:
+        for line in paragraph.splitlines() or ['']:
+            printing = ''.join(c if c.isprintable() else ' ' for c in line)
+            # Words of any length stay whole: a comment may hold a command or a path.
+            wrapped = wrap(printing, _WIDTH - 2, break_long_words=False, break_on_hyphens=False)
+            yield from (f'# {part}' for part in wrapped) if wrapped else ['#']
+
+
+def _entry(name: str, value: Content, indent: str, *, in_rows: bool = False) -> Iterator[str]:
+    """Yield the lines of a key: one where it fits and need not be in rows, else one each part."""
+    key = f'{indent}{_name(name)}:'
+    line = f'{key} {_flow(value)}'
+    inner = indent + '  '
+    if not isinstance(value, dict | list) or not value or not (in_rows or len(line) > _WIDTH):
+        yield line
+        return
+    yield key
+    if isinstance(value, dict):
+        for part, of in value.items():
+            yield from _entry(part, of, inner)
+    else:
+        yield from (f'{inner}- {_flow(part)}' for part in value)
+
+
+def _flow(value: Content) -> str:
+    if isinstance(value, dict):
+        return f'{{{", ".join(f"{_name(key)}: {_flow(part)}" for key, part in value.items())}}}'
+    if isinstance(value, list):
+        return f'[{", ".join(map(_flow, value))}]'
+    return _name(value) if isinstance(value, str) else number_text(value)
+
+
+def _name(name: str) -> str:
+    if _PLAIN.fullmatch(name) and name.lower() not in _WORDS:
+        return name
+    return json.dumps(name, ensure_ascii=False)  # its escapes are YAML's too

@@ -1,0 +1,289 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A linkage written as a file is read as the same linkage, to the last bit; and whole, or not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import os
+from pathlib import Path
+import resource
+
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.linkage import Linkage, Mass, Pose, RevoluteJoint, SlideJoint
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_text import linkage_text, number_text, write_linkage
+from linkage_ros.scene.yaml_file import parse_yaml
+import pytest
+import yaml
+
+from .files import CONFIG, FOUR_BAR
+
+FILES = sorted((CONFIG / 'linkages').glob('*.yaml'))
+
+
+def read(data: bytes) -> Linkage:
+    return read_linkage(parse_yaml(data, 'linkage.yaml'))
+
+
+GALLERY = {file.stem: read(file.read_bytes()) for file in FILES}
+
+
+def reads_as(linkage: Linkage, text: str) -> bool:
+    """Return whether a text is read as a linkage: bits, signs of zero and order are the same."""
+    return repr(read(text.encode())) == repr(linkage)
+
+
+@pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
+def test_every_shipped_linkage_is_written_as_it_stands(file: Path) -> None:
+    linkage = GALLERY[file.stem]
+    written = linkage_text(linkage)
+    assert reads_as(linkage, written)
+    # By another reader, which knows nothing of linkages: the same but for what may be left out.
+    theirs = yaml.safe_load(file.read_text('utf-8'))
+    if 'links' in theirs:  # the shorthand is written out
+        said = {key: value for key, value in theirs.items() if value != {}}
+        assert yaml.safe_load(written) == said
+    assert max(map(len, written.splitlines())) <= 99
+
+
+ODD = [
+    'yes', 'NO', 'off', 'null', '~', 'true', 'False', '.nan', '-.inf', '0', '1e3', '-1.5', '0x10',
+    '1:30', '1_000', '2026-01-01', '<<', '=', ' ', ' a', 'a ', 'a b', 'a: b', 'a:', ':a', '#a',
+    'a #b', '- a', '-', '?', '? a', ',', '[', ']', '{}', '"', "'", '\\', '\\n', '!a', '&a', '*a',
+    '|', '>', '%a', '@', '`', '---', '...', 'é', 'a\u0301', '関節', '🦾', 'links', 'a.b',
+]  # fmt: skip
+
+NAMES = st.one_of(
+    st.sampled_from(ODD),
+    st.text(st.characters(codec='utf-8').filter(str.isprintable), min_size=1, max_size=8),
+)
+NUMBERS = st.floats(-1e9, 1e9)
+NEAR = st.floats(-0.1, 0.1)
+POINTS = st.tuples(NUMBERS, NUMBERS)
+
+
+@st.composite
+def linkages(draw: st.DrawFn) -> Linkage:
+    """Return a linkage of the gallery with other names and sizes, and further points and keys."""
+    linkage = GALLERY[draw(st.sampled_from([name for name in GALLERY if name != 'class_3']))]
+    old = {name for points in linkage.links.values() for name in points} | {
+        *linkage.links,
+        *linkage.sliders,
+        *linkage.joints,
+        *(given.joint for given in linkage.inputs),
+    }
+    old -= {'ground'}
+    fresh = draw(
+        st.lists(
+            NAMES.filter('ground'.__ne__),
+            min_size=len(old) + 1,
+            max_size=len(old) + 1,
+            unique=True,
+        )
+    )
+    new = dict(zip(sorted(old), fresh, strict=False)) | {'ground': 'ground', '': ''}
+    times = draw(st.floats(1e-3, 1e3))
+    links = {
+        new[link]: {new[name]: (times * x, times * y) for name, (x, y) in points.items()}
+        for link, points in linkage.links.items()
+    }
+    # A point of no use; far away it would make a slide's range too small to be found.
+    x, y = draw(st.tuples(NEAR, NEAR))
+    links[draw(st.sampled_from(sorted(links)))][fresh[-1]] = (times * x, times * y)
+    return Linkage(
+        links,
+        tuple(
+            replace(g, **{key: new[getattr(g, key)] for key in g.__slots__})
+            for g in linkage.inputs
+        ),
+        {new[name]: side for name, side in linkage.assembly.items()},
+        {
+            new[name]: SlideJoint(new[joint.slider])
+            if isinstance(joint, SlideJoint)
+            else RevoluteJoint(new[joint.parent], new[joint.child])
+            for name, joint in linkage.joints.items()
+        },
+        {
+            new[name]: replace(
+                slider,
+                **{key: new[getattr(slider, key)] for key in ('point', 'along', 'through')},
+                block=new[slider.block],
+            )
+            for name, slider in linkage.sliders.items()
+        },
+        tuple(draw(st.lists(st.sampled_from(fresh[-1:]), max_size=1))),
+        draw(
+            st.none()
+            | st.builds(
+                Pose,
+                st.tuples(*[NUMBERS] * len(linkage.inputs)),
+                st.dictionaries(st.sampled_from(fresh[-1:]), POINTS),
+            )
+        ),
+        draw(
+            st.dictionaries(
+                st.sampled_from(sorted({*links} - {'ground'})),
+                st.builds(
+                    Mass,
+                    st.floats(0.0, 1e12, exclude_min=True),
+                    POINTS,
+                    st.floats(0.0, 1e12),
+                ),
+            )
+        ),
+    )
+
+
+@settings(deadline=None)
+@given(linkages())
+def test_any_linkage_is_read_back(linkage: Linkage) -> None:
+    text = linkage_text(linkage, ['One.', 'Other.'])
+    assert reads_as(linkage, text)
+    # YAML 1.1 has other numbers and words; both see the same here.
+    assert yaml.safe_load(text) == parse_yaml(text.encode(), 'linkage.yaml').mapping
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+@example(-0.0)
+@example(1e15)
+@example(-1e-7)
+@example(5e-324)
+@example(1.7976931348623157e308)
+def test_any_number_is_read_back_to_the_last_bit(value: float) -> None:
+    text = f'x: [{number_text(value)}]'
+    (found,) = parse_yaml(text.encode(), 'x.yaml').numbers('x')
+    assert found.hex() == value.hex()
+    (theirs,) = yaml.safe_load(text)['x']
+    assert isinstance(theirs, int | float)
+    assert float(theirs).hex() == value.hex()
+
+
+@pytest.mark.parametrize(
+    ('value', 'text'),
+    [(0.0, '0'), (-0.0, '-0.0'), (-3.0, '-3'), (0.1, '0.1'), (1e-7, '1.0e-07'), (1e16, '1.0e+16')],
+)
+def test_how_numbers_look(value: float, text: str) -> None:
+    assert number_text(value) == text
+
+
+def test_what_is_too_long_for_a_line_has_rows() -> None:
+    third = 1.0 / 3.0
+    linkage = read(FOUR_BAR)
+    points = dict.fromkeys(('first', 'second', 'third'), (third, -third))
+    linkage = replace(
+        linkage, links={**linkage.links, 'coupler': linkage.links['coupler'] | points}
+    )
+    assert linkage_text(linkage).splitlines()[:10] == [
+        'links:',
+        '  ground: {O2: [0, 0], O4: [0.1, 0]}',
+        '  crank: {O2: [0, 0], A: [0.04, 0]}',
+        '  coupler:',
+        '    A: [0, 0]',
+        '    B: [0.12, 0]',
+        '    first: [0.3333333333333333, -0.3333333333333333]',
+        '    second: [0.3333333333333333, -0.3333333333333333]',
+        '    third: [0.3333333333333333, -0.3333333333333333]',
+        '  rocker: {O4: [0, 0], B: [0.08, 0]}',
+    ]
+
+
+def test_comments_stand_at_the_head_within_99_columns() -> None:
+    long = 'x' * 120
+    comment = ['word ' * 40, '', f'a {long} b', 'two\nlines', 'a\0bell\a']
+    text = linkage_text(read(FOUR_BAR), comment)
+    head = text[: text.index('links:')].splitlines()
+    assert head[0] == '# ' + ('word ' * 19).strip()
+    assert head[3:] == ['#', '# a', f'# {long}', '# b', '# two', '# lines', '# a bell']
+    assert reads_as(read(FOUR_BAR), text)
+
+
+def test_a_file_takes_the_place_of_the_one_before(tmp_path: Path) -> None:
+    file, link = tmp_path / 'linkage.yaml', tmp_path / 'link.yaml'
+    file.write_text('before')
+    link.symlink_to(file)
+    write_linkage(read(FOUR_BAR), link, ['Mine.'])
+    assert file.read_text() == linkage_text(read(FOUR_BAR), ['Mine.'])
+    assert link.is_symlink()
+    umask = os.umask(0)
+    os.umask(umask)
+    assert file.stat().st_mode & 0o777 == 0o666 & ~umask
+    assert sorted(tmp_path.iterdir()) == [link, file]
+
+
+# A name within the test's folder, and what is said of it.
+NOT_WRITTEN = {
+    'no/linkage.yaml': 'cannot be written (No such file or directory); name another file',
+    'file/linkage.yaml': 'cannot be written (Not a directory); name another file',
+    '.': 'is there already and is no file; name another file',
+    'pipe': 'is there already and is no file; name another file',
+    'circle': 'cannot be written (',
+    'n' * 300: 'cannot be written (File name too long); name another file',
+    'nul\0': 'cannot be written (embedded null byte); name another file',
+}
+
+
+@pytest.mark.parametrize('name', NOT_WRITTEN)
+def test_a_file_that_cannot_be_written(tmp_path: Path, name: str) -> None:
+    (tmp_path / 'file').write_text('')
+    os.mkfifo(tmp_path / 'pipe')
+    (tmp_path / 'circle').symlink_to(tmp_path / 'circle')
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(LinkageError) as caught:
+        write_linkage(read(FOUR_BAR), f'{tmp_path}/{name}')
+    assert NOT_WRITTEN[name] in str(caught.value)
+    assert str(caught.value).isprintable() or '\0' in name
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason='root may write everywhere')
+@pytest.mark.parametrize('read_only', ['.', 'linkage.yaml'])
+def test_what_is_read_only_stays(tmp_path: Path, read_only: str) -> None:
+    file = tmp_path / 'linkage.yaml'
+    file.write_text('before')
+    mode = (tmp_path / read_only).stat().st_mode
+    (tmp_path / read_only).chmod(mode & ~0o222)
+    try:
+        with pytest.raises(LinkageError, match=r'cannot be written \(Permission denied\)'):
+            write_linkage(read(FOUR_BAR), file)
+    finally:
+        (tmp_path / read_only).chmod(mode)
+    assert file.read_text() == 'before'
+
+
+def test_where_the_disk_is_full_the_file_before_stays(tmp_path: Path) -> None:
+    file = tmp_path / 'linkage.yaml'
+    file.write_text('before')
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        with pytest.raises(LinkageError, match=r'cannot be written \(File too large\)'):
+            write_linkage(read(FOUR_BAR), file)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert file.read_text() == 'before'
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_what_is_no_linkage_is_not_written(tmp_path: Path) -> None:
+    apart = replace(
+        read(FOUR_BAR), links=read(FOUR_BAR).links | {'rocker': {'O4': (0, 0), 'B': (9, 0)}}
+    )
+    with pytest.raises(LinkageError, match=r'linkage.yaml:1: links: the loops close at no value'):
+        write_linkage(apart, tmp_path / 'linkage.yaml')
+    assert list(tmp_path.iterdir()) == []
