@@ -29,11 +29,14 @@ COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
     'demo': 'run the demo scene with a crank of its own, on a ROS graph of its own',
     'plot': 'draw the joints of a bag over the angle of its crank',
+    'info': 'say what a bag holds, how well its loops closed, and where a toggle was nearest',
+    'export': 'write the joints of a bag, or one of its topics, to a CSV or Parquet file',
     'scene': 'say what a scene consists of; list all effects; print the schemas of the files',
     'cost': 'say what each effect of a scene costs on this machine',
     'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
     'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
     'draw': 'draw a linkage, and its joints over its range',
+    'synthesize': 'design a four-bar: from pairs of angles, a function, a curve or poses',
 }
 """Name of each subcommand, also that of its module in this folder, and what it does."""
 
@@ -43,7 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
     # First of all: from here on Ctrl-C ends a run by closing its bag.
     stop = stop_on_signals()
     arguments = sys.argv[1:] if arguments is None else arguments
-    commands = '\n'.join(f'  {name:<6} {text}' for name, text in COMMANDS.items())
+    commands = '\n'.join(f'  {name:<10} {text}' for name, text in COMMANDS.items())
     parser = argparse.ArgumentParser(
         prog='linkage',
         description=f'Planar linkages for ROS 2.\n\ncommands:\n{commands}',

@@ -17,39 +17,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from importlib.util import find_spec
-from itertools import pairwise
-from math import ceil, degrees
+from collections.abc import Sequence
+from math import degrees
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from linkage_ros.drawing.curves import Sweep, sweep
-from linkage_ros.drawing.labels import Label, place_labels
-from linkage_ros.drawing.shapes import Circle, Polygon, Segment, Shape, shapes, skeleton
+from linkage_ros.drawing.painting import (
+    bar_size,
+    COLOURS,
+    corners,
+    degree_step,
+    GHOST,
+    INK,
+    LAYERS,
+    NAME_INK,
+    Names,
+    outline,
+    paint,
+    save,
+    settings,
+)
+from linkage_ros.drawing.shapes import Circle, Polygon, Shape, shapes, skeleton
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.ranges import InputRange
 from linkage_ros.kinematics.survey import Way
 
-COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000')
-"""Okabe and Ito's, which colour-blind readers can tell."""
-
-_INK = '#1f2d3a'
-_FACES = {
-    'link': '#c3d3e2',
-    'plate': '#d3e0ecc0',
-    'input': '#f0a07a',
-    'block': '#fff6d6',
-    'tube': '#e8edf2',
-    'ground': '#ffffff',
-}
-_GHOST = '#cfcfcf'
 _GHOSTS = 5
-_STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
-_STROKES = {'rail': (_INK, 1.3), 'hatch': (_INK, 0.7), 'slot': ('#ffffff', 2.2)}
-_LAYERS = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
 
 
 class View(NamedTuple):
@@ -150,12 +146,6 @@ def _pose_text(closure: Closure, inputs: tuple[float, ...]) -> str:
     )
 
 
-def _corners(places: Iterable[complex]) -> tuple[complex, complex]:
-    """Return the lower left and the upper right corner of places."""
-    xs, ys = zip(*((p.real, p.imag) for p in places), strict=True)
-    return complex(min(xs), min(ys)), complex(max(xs), max(ys))
-
-
 def _places(shown: View) -> list[complex]:
     """Return all places through which something goes, in [m]."""
     places = [place for path in shown.sweep.paths.values() for place in path]
@@ -165,17 +155,9 @@ def _places(shown: View) -> list[complex]:
     return places
 
 
-def _outline(shape: Shape) -> tuple[complex, ...]:
-    if isinstance(shape, Segment):
-        return shape.start, shape.end
-    if isinstance(shape, Polygon):
-        return (*shape.corners, shape.corners[0])
-    return tuple(shape.centre + shape.radius * way for way in (1, 1j, -1, -1j, 1))
-
-
 def symbol_size(shown: View) -> float:
     """Return half the width of a bar, in [m]: what suits the picture and its shortest link."""
-    low, high = _corners(_places(shown))
+    low, high = corners(_places(shown))
     picture = abs(high - low)
     points = shown.closure.points(shown.position)
     bars = [
@@ -187,7 +169,7 @@ def symbol_size(shown: View) -> float:
         if one < other and points[link, one] != points[link, other]
     ]
     shortest = min(bars, default=picture)
-    return min(0.013 * picture, max(0.26 * shortest, 0.006 * picture))
+    return bar_size(picture, shortest)
 
 
 def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None:
@@ -200,22 +182,17 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
         Where matplotlib is not installed, or the file cannot be written.
 
     """
-    if find_spec('matplotlib') is None:
-        raise LinkageError(
-            'matplotlib', 'is not installed', 'pip install linkage_ros[report], or apt its package'
-        )
-    import matplotlib as mpl  # local import: an extra, and slow to load
-    from matplotlib.figure import Figure  # local import: as above
+    context = settings()
+    from matplotlib.figure import Figure  # local import: an extra, and slow to load
 
     size = symbol_size(shown)
     drawn = shapes(shown.closure, shown.position, size, shown.sweep.travels)
-    low, high = _corners([*_places(shown), *(p for shape in drawn for p in _outline(shape))])
+    low, high = corners([*_places(shown), *(p for shape in drawn for p in outline(shape))])
     margin = complex(3.0, 3.0) * size
     width, height = (high - low + 2.0 * margin).real, (high - low + 2.0 * margin).imag
     wide = min(max(4.9 * width / height, 3.0), 6.4)
     tall = min(max(wide * height / width, 3.2), 4.9)
-    settings: Any = {'font.size': 8.0, 'svg.hashsalt': 'linkage_ros', 'axes.linewidth': 0.6}
-    with mpl.rc_context(settings):
+    with context:
         figure = Figure(figsize=(wide + 4.9, tall + 0.5), dpi=110, layout='constrained')
         left, right = figure.subplots(1, 2, width_ratios=(wide, 4.2))
         left.set_title(
@@ -235,58 +212,7 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
         if names:
             figure.draw_without_rendering()  # from here on a text has its size
             _names(left, shown, drawn, size)
-        kind = file.suffix.lower()
-        metadata = {'.png': {'Software': None}, '.svg': {'Date': None}}.get(kind)
-        try:
-            figure.savefig(file, metadata=metadata)
-        except (OSError, ValueError) as error:
-            reason = (
-                error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-            )
-            raise LinkageError(
-                str(file), f'cannot be written ({reason})', 'name another picture with -o'
-            ) from None
-
-
-def paint(axes: Any, drawn: Sequence[Shape]) -> None:
-    """Paint shapes, the last on top."""
-    from matplotlib import patches  # local import: an extra, and slow to load
-
-    for shape in drawn:
-        if isinstance(shape, Polygon):
-            corners = [(p.real, p.imag) for p in shape.corners]
-            patch = patches.Polygon(
-                corners,
-                closed=True,
-                facecolor=_FACES[shape.role],
-                edgecolor=_INK,
-                linewidth=0.9,
-                joinstyle='round',
-                zorder=_LAYERS['shape'],
-            )
-            axes.add_patch(patch)
-        elif isinstance(shape, Circle):
-            centre = (shape.centre.real, shape.centre.imag)
-            axes.add_patch(
-                patches.Circle(
-                    centre,
-                    shape.radius,
-                    facecolor='white',
-                    edgecolor=_INK,
-                    linewidth=0.9,
-                    zorder=_LAYERS['shape'],
-                )
-            )
-        else:
-            colour, width = _STROKES[shape.role]
-            axes.plot(
-                [shape.start.real, shape.end.real],
-                [shape.start.imag, shape.end.imag],
-                color=colour,
-                linewidth=width,
-                solid_capstyle='round',
-                zorder=_LAYERS['shape'],
-            )
+        save(figure, file)
 
 
 def paint_background(axes: Any, shown: View) -> None:
@@ -296,11 +222,11 @@ def paint_background(axes: Any, shown: View) -> None:
             axes.plot(
                 [line.start.real, line.end.real],
                 [line.start.imag, line.end.imag],
-                color=_GHOST,
+                color=GHOST,
                 linewidth=1.0,
                 marker='o',
                 markersize=2.0,
-                zorder=_LAYERS['ghost'],
+                zorder=LAYERS['ghost'],
             )
     points = shown.closure.points(shown.position)
     for number, (name, path) in enumerate(shown.sweep.paths.items()):
@@ -311,11 +237,11 @@ def paint_background(axes: Any, shown: View) -> None:
             color=colour,
             linewidth=1.1,
             linestyle=(0, (5, 2)),
-            zorder=_LAYERS['path'],
+            zorder=LAYERS['path'],
         )
         place = next(place for (_, point), place in points.items() if point == name)
         axes.plot(
-            [place.real], [place.imag], 'o', color=colour, markersize=3.5, zorder=_LAYERS['label']
+            [place.real], [place.imag], 'o', color=colour, markersize=3.5, zorder=LAYERS['label']
         )
 
 
@@ -348,14 +274,14 @@ def _joints(axes: Any, shown: View) -> None:
     for turning, side in sides.items():
         side.set_ylabel('joint angle [°]' if turning else 'slide [m]')
         if turning:
-            side.yaxis.set_major_locator(MultipleLocator(_step(*side.get_ylim())))
+            side.yaxis.set_major_locator(MultipleLocator(degree_step(*side.get_ylim())))
         side.tick_params(labelsize=7, width=0.5)
         side.spines['top'].set_visible(False)
         side.margins(x=0.0)
     if len(kinds) < 2:
         axes.spines['right'].set_visible(False)
     if turning_input:
-        axes.xaxis.set_major_locator(MultipleLocator(_step(*axes.get_xlim())))
+        axes.xaxis.set_major_locator(MultipleLocator(degree_step(*axes.get_xlim())))
     axes.axvline(now, color='0.55', linewidth=0.8, linestyle=':')
     held = len(shown.inputs) > 1
     axes.set_xlabel(
@@ -374,41 +300,17 @@ def _joints(axes: Any, shown: View) -> None:
     )
 
 
-def _step(low: float, high: float) -> float:
-    """Return the step of an axis in degrees."""
-    return next((step for step in _STEPS if (high - low) / step <= 8.0), _STEPS[-1])
-
-
 def _names(axes: Any, shown: View, drawn: Sequence[Shape], size: float) -> None:
     """Write the names of pins and links where they hide little."""
-    from matplotlib.patheffects import withStroke  # local import: an extra, and slow to load
-
-    transform = axes.transData
-
-    def pixel(place: complex) -> complex:
-        x, y = transform.transform((place.real, place.imag))
-        return complex(x, y)
-
-    halo = [withStroke(linewidth=2.0, foreground='white')]
-    radius = abs(pixel(complex(size, 0.0)) - pixel(0j))
-    texts, labels = [], []
-
-    def want(text: str, anchors: tuple[complex, ...], clear: float, **style: Any) -> None:
-        written = axes.text(
-            0.0, 0.0, text, ha='center', va='center', zorder=_LAYERS['label'] + 1,
-            path_effects=halo, **style,
-        )  # fmt: skip
-        box = written.get_window_extent()
-        texts.append(written)
-        labels.append(Label(tuple(map(pixel, anchors)), box.width + 2.0, box.height, clear))
-
+    names = Names(axes)
+    radius = abs(names.pixel(complex(size, 0.0)) - names.pixel(0j))
     pins = {shape.name: shape.centre for shape in drawn if isinstance(shape, Circle)}
     points = shown.closure.points(shown.position)
     for (link, name), place in points.items():
         if link in shown.closure.linkage.links and link != GROUND:
             pins.setdefault(name, place)
     for name, place in pins.items():
-        want(name, (place,), 1.2 * radius, fontsize=7.5, fontweight='bold', color=_INK)
+        names.want(name, (place,), 1.2 * radius, fontsize=7.5, fontweight='bold', color=INK)
     for link, named in shown.closure.linkage.links.items():
         if link == GROUND:
             continue
@@ -416,37 +318,13 @@ def _names(axes: Any, shown: View, drawn: Sequence[Shape], size: float) -> None:
         bodies = [shape for shape in drawn if isinstance(shape, Polygon) and shape.name == link]
         middle = sum(places) / len(places)
         if bodies:
-            corners = bodies[-1].corners
-            middle = sum(corners) / len(corners)
+            edge = bodies[-1].corners
+            middle = sum(edge) / len(edge)
         anchors = [middle]
         if len(places) > 1:
             one, other = places[0], places[-1]
             anchors += [one + (other - one) * part for part in (0.35, 0.65, 0.25, 0.75)]
-        want(link, tuple(anchors), 1.1 * radius, fontsize=6.5, fontstyle='italic', color='#35608a')
-    obstacles = []
-    for shape in drawn:
-        for start, end in pairwise(map(pixel, _outline(shape))):
-            obstacles += _between(start, end)
-    for line in skeleton(shown.closure, shown.position):
-        obstacles += _between(pixel(line.start), pixel(line.end))
-    box = axes.get_window_extent()
-    frame = complex(box.x0, box.y0), complex(box.x1, box.y1)
-    back = transform.inverted()
-    for written, label, found in zip(
-        texts, labels, place_labels(labels, obstacles, frame), strict=True
-    ):
-        centre, anchor = found
-        written.set_position(back.transform((centre.real, centre.imag)))
-        away = centre - anchor
-        beside = max(abs(away.real) - 0.5 * label.width, abs(away.imag) - 0.5 * label.height)
-        if beside > label.clear + 0.4 * label.height:
-            start, end = (back.transform((p.real, p.imag)) for p in (anchor, centre))
-            axes.plot(
-                [start[0], end[0]], [start[1], end[1]],
-                color='#35608a', linewidth=0.5, zorder=_LAYERS['label'],
-            )  # fmt: skip
-
-
-def _between(start: complex, end: complex) -> list[complex]:
-    count = max(1, ceil(abs(end - start) / 4.0))
-    return [start + (end - start) * i / count for i in range(count)]
+        names.want(link, anchors, 1.1 * radius, fontsize=6.5, fontstyle='italic', color=NAME_INK)
+    lines = [outline(shape) for shape in drawn]
+    lines += [(line.start, line.end) for line in skeleton(shown.closure, shown.position)]
+    names.place(lines)

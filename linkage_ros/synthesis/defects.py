@@ -24,14 +24,18 @@ from __future__ import annotations
 
 from cmath import phase
 from collections.abc import Iterable
-from math import degrees
+from math import degrees, nan, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.kinematics.grashof import four_bar_type, FourBarType
-from linkage_ros.synthesis.course import course, least_transmission
+from linkage_ros.synthesis.course import Array, Course, course, least_transmission, lifted
 from linkage_ros.synthesis.design import Design
-from linkage_ros.synthesis.proof import Met, prove
+from linkage_ros.synthesis.proof import closure_of, Met, prove, SAME
 import numpy as np
+
+_IN_LINE = 1e-5
+"""Below this transmission angle coupler and rocker are in line, in [rad]; near a toggle the angle
+is as the root of the rounding of the lengths."""
 
 
 class Defect(NamedTuple):
@@ -82,75 +86,112 @@ class Assessment(NamedTuple):
 def assess(design: Design) -> Assessment:
     """Assess a design; its positions are analysed again, by `proof.prove`."""
     four_bar = design.four_bar
-    met = prove(design)
     o2, o4 = four_bar.pivots
     # From the angle of the crank's frame to the direction of the vector O2→A off the ground line.
     zero = phase(four_bar.crank) - phase(o4 - o2)
     lengths = np.array(four_bar.lengths)
-    cranks = np.array([wanted.crank for wanted in design.wanted])
-    found = course(lengths, cranks + zero, np.array([one.side == 'left' for one in met]))
-    defects = tuple(
-        defect
-        for defect in (
-            _open(met),
-            None if found.one_circuit else _circuit(met, bool(found.turns)),
-            None if found.one_branch or not found.one_circuit else _branch(met),
-            None if found.in_order or not found.one_circuit else _order(design),
-        )
-        if defect is not None
-    )
-    start = float(cranks[0])
+    directions = np.array([wanted.crank for wanted in design.wanted]) + zero
+    # With a single change point two turns are not the same: what is proved is the way it goes.
+    turns = tau * np.round((lifted(lengths, directions) - directions) / tau)
+    moved = [
+        one._replace(crank=one.crank + float(by))
+        for one, by in zip(design.wanted, turns, strict=True)
+    ]
+    met = prove(design._replace(wanted=tuple(moved)))
+    found = course(lengths, directions, np.array([one.side == 'left' for one in met]))
+    defects = _defects(design, met, found)
     if defects:
         travel = None
-        pieces = [least_transmission(lengths, d, d) for d in cranks + zero]
-        least, at = min((float(angle), float(d)) for angle, d in pieces)
-        at -= zero
+        # At one position after the other; there is no way between them.
+        ends = found.directions, found.directions
     else:
-        travel = (start, start + float(found.end - found.start))
-        angle, place = least_transmission(lengths, found.start, found.end)
-        least, at = float(angle), start + float(place - found.start)
+        travel = moved[0].crank, moved[-1].crank
+        ends = found.directions[:1], found.directions[-1:]
+    angles, places = least_transmission(lengths, *ends)
+    least, at = min(zip(angles.tolist(), (places - zero).tolist(), strict=True))
+    if travel and least < _IN_LINE:
+        defects = (
+            Defect(
+                'transmission',
+                f'coupler and rocker are in line at a crank angle of {_degrees(at)}, and the '
+                'rocker may go either way from there',
+            ),
+        )
     full = None
     if found.turns:
-        full = float(least_transmission(lengths, np.array(0.0), np.array(np.pi))[0])
-    return Assessment(
-        met,
-        four_bar_type(*four_bar.lengths),
-        bool(found.turns),
-        defects,
-        travel,
-        least,
-        at,
-        full,
-        max(four_bar.lengths) / min(four_bar.lengths),
-    )
+        full = float(least_transmission(lengths, np.array(0.0), np.array(pi))[0])
+    ratio = max(four_bar.lengths) / min(four_bar.lengths)
+    kind = _kind(four_bar.lengths)
+    return Assessment(met, kind, bool(found.turns), defects, travel, least, at, full, ratio)
 
 
-def _open(met: tuple[Met, ...]) -> Defect | None:
-    missed = [(number, one) for number, one in enumerate(met, 1) if not one.closed]
-    if not missed:
-        return None
-    worst = max(one.gap for _, one in missed)
+def _kind(lengths: tuple[float, float, float, float]) -> FourBarType:
+    try:
+        return four_bar_type(*lengths)
+    except ValueError:
+        return FourBarType('', 'no loop (one link is longer than the others together)', nan)
+
+
+def _defects(design: Design, met: tuple[Met, ...], found: Course) -> tuple[Defect, ...]:
+    """Name what keeps the linkage from its positions; one that cannot be assembled hides all."""
+    missed = [(number, one.gap) for number, one in enumerate(met, 1) if not one.closed]
+    if missed:
+        worst = max(gap for _, gap in missed)
+        return (
+            Defect(
+                'open',
+                f'{_positions(number for number, _ in missed)} cannot be assembled, the links '
+                f'miss each other by up to {worst:.3g} m',
+            ),
+        )
+    if not found.one_circuit:
+        return (_circuit(met, found),)
+    defects = []
+    if not found.one_branch:
+        defects.append(_branch(design, met))
+    if not found.in_order:
+        defects.append(_order(design, found))
+    return tuple(defects)
+
+
+def _branch(design: Design, met: tuple[Met, ...]) -> Defect:
+    crank = design.wanted[0].crank
+    closure = closure_of(design, met[0].side)
+    between = []
+    for interval in closure.input_ranges:
+        middle, half = (
+            0.5 * (interval.highest + interval.lowest),
+            0.5 * (interval.highest - interval.lowest),
+        )
+        if abs(remainder(crank - middle, tau)) <= half + SAME:
+            between = [
+                critical
+                for critical in closure.critical_inputs
+                if abs(remainder(critical - middle, tau)) <= half + SAME
+            ]
+    where = ' and '.join(sorted({_degrees(remainder(one, tau)) for one in between}))
     return Defect(
-        'open',
-        f'{_positions(number for number, _ in missed)} cannot be assembled, the links miss each '
-        f'other by up to {worst:.3g} m',
+        'branch',
+        f'{_sides(met)}; they meet only where coupler and rocker are in line, at crank angles of '
+        f'{where}, and a crank does not lead from one to the other',
     )
 
 
-def _branch(met: tuple[Met, ...]) -> Defect:
-    return Defect(
-        'branch', f'{_sides(met)}, and between the two lies a toggle that the crank cannot pass'
-    )
+def _circuit(met: tuple[Met, ...], found: Course) -> Defect:
+    if found.turns:
+        where = _sides(met)
+    else:
+        upper = np.sin(found.directions) >= 0.0
+        one, other = (_positions(np.flatnonzero(upper == end) + 1) for end in (True, False))
+        where = f'the crank moves in two ranges, with {one} in one and {other} in the other'
+    return Defect('circuit', f'{where}; only taking it apart leads from one to the other')
 
 
-def _circuit(met: tuple[Met, ...], turns: bool) -> Defect:
-    where = _sides(met) if turns else 'the positions lie in two ranges of the crank'
-    return Defect('circuit', f'{where}, and only taking it apart leads from one to the other')
-
-
-def _order(design: Design) -> Defect:
-    said = ', '.join(f'{degrees(wanted.crank):.4g}°' for wanted in design.wanted)
-    return Defect('order', f'a crank that goes one way does not come by in the order {said}')
+def _order(design: Design, found: Course) -> Defect:
+    directions: Array = found.directions - found.directions[0]
+    visited = np.argsort(np.mod(directions, tau) if found.turns else directions)
+    said = ', '.join(f'{i + 1} ({_degrees(design.wanted[i].crank)})' for i in visited)
+    return Defect('order', f'a crank that goes one way comes by the positions as {said}')
 
 
 def _sides(met: tuple[Met, ...]) -> str:
@@ -166,3 +207,7 @@ def _positions(numbers: Iterable[int]) -> str:
     if len(listed) == 1:
         return f'position {listed[0]}'
     return f'positions {", ".join(listed[:-1])} and {listed[-1]}'
+
+
+def _degrees(angle: float) -> str:
+    return f'{degrees(angle):.6g}°'

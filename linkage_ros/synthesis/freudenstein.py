@@ -23,42 +23,40 @@ numbers (F. Freudenstein, Approximate synthesis of four-bar linkages, Transactio
     k1·cos φ + k2·cos θ + k3 = cos(θ − φ)
     k1 = d/a,  k2 = −d/c,  k3 = (a² − b² + c² + d²)/(2ac)
 
-Three pairs fix them. The first equation is taken from the others, so that k3 falls out; what is
-left is a 2×2 system of differences of cosines. These are products,
-
-    cos u − cos v = −2·sin((u + v)/2)·sin((u − v)/2),
-
-so that pairs near each other lose no digit, and its determinants are worked out with the error of
-their products (C.-P. Jeannerod, N. Louvet and J.-M. Muller, Further analysis of Kahan's algorithm
-for the accurate computation of 2x2 determinants, Mathematics of Computation 82 (2013)). What error
-remains is that of the angles themselves: `ThreePairs.sensitivity` says how much.
+Three pairs fix them (`system.py`). What error the lengths have is that of the angles: each is
+within 4·2⁻⁵³ of its sensitivity κ, the sum of what a relative change of each angle makes of it
+(`sensitivity.py`), and where that says nothing any more, no digit is trusted. More pairs are met
+as well as may be. The coupler is real wherever the angles are: b² is the mean of the squares of
+what crank and rocker pin are apart in the pairs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
-from math import degrees, isfinite, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
-from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.design import Design, FourBar
+from linkage_ros.synthesis.double_double import Array
+from linkage_ros.synthesis.pairs import centred, check_pairs, dependent, MOVE, wanted_of
 from linkage_ros.synthesis.proof import assembled
+from linkage_ros.synthesis.sensitivity import condition, doubt, gradient
+from linkage_ros.synthesis.system import solved
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-Array = NDArray[np.float64]
+from numpy.typing import ArrayLike
 
 TRUSTED = 4.0
 """Units of roundoff times sensitivity that the error of a length stays within; measured."""
 
-_SPLITTER = 2.0**27 + 1.0
-_SAME = 1e-12
-"""Angles nearer than this are the same, in [rad]."""
-
-_LONGEST = 1e9
+LONGEST = 1e9
 """In grounds: a link beyond it is an infinite one but for rounding."""
+
+_NOISE = TRUSTED * UNIT_ROUNDOFF
+_SHAKEN = 0.1
+
+_BLOCK = 2048
+"""Threes of pairs that are worked on at once: they stay near the processor."""
 
 
 class Links(NamedTuple):
@@ -89,6 +87,9 @@ class ThreePairs(NamedTuple):
         As in `Links`.
     condition
         Of the matrix of rows (cos φ, cos θ, 1), by the 2-norm; (…).
+    doubt
+        Σ|x ∂y/∂x| over the six angles x; (…, 2). Of the logarithm y of the system's determinant,
+        and of the coupler's angle y in the first pair, in [rad].
     sensitivity
         Of each length L, Σ|x ∂L/∂x| + ``abs(L)`` over the six angles x; (…, 3). Times 2⁻⁵³ it is
         what rounding the angles alone can make of a length.
@@ -101,6 +102,7 @@ class ThreePairs(NamedTuple):
     k: Array
     lengths: Array
     condition: Array
+    doubt: Array
     sensitivity: Array
     gradient: Array
 
@@ -108,9 +110,21 @@ class ThreePairs(NamedTuple):
     def digits(self) -> Array:
         """Return how many digits of each length can be trusted, 0 to 16; (…, 3)."""
         with np.errstate(all='ignore'):
-            lost = TRUSTED * UNIT_ROUNDOFF * self.sensitivity / np.abs(self.lengths)
-            digits: Array = np.clip(np.nan_to_num(-np.log10(lost), nan=0.0), 0.0, 16.0)
-        return digits
+            return np.asarray(np.clip(-np.log10(self.lost), 0.0, 16.0))
+
+    @property
+    def lost(self) -> Array:
+        """
+        Return what part of each length may be the rounding of the angles; (…, 3).
+
+        It is 4·2⁻⁵³ of the sensitivity, and the square of the greatest such part that lengths,
+        determinant and direction of the coupler have, for what is not linear. Where that is a
+        tenth and more, the first derivatives say nothing any more: then it is 1 for all three.
+        """
+        with np.errstate(all='ignore'):
+            linear = _NOISE * self.sensitivity / np.abs(self.lengths)
+            shaken = np.maximum(linear.max(-1), _NOISE * self.doubt.max(-1))[..., None]
+            return np.where(shaken < _SHAKEN, linear + shaken * shaken, 1.0)
 
 
 def links(crank: ArrayLike, rocker: ArrayLike) -> Links:
@@ -125,18 +139,13 @@ def links(crank: ArrayLike, rocker: ArrayLike) -> Links:
         Angles θ and φ, in [rad]; (…, 3).
 
     """
-    theta, phi = np.asarray(crank, np.float64), np.asarray(rocker, np.float64)
-    with np.errstate(all='ignore'):
-        P, Q, R = _differences(theta, phi)
-        determinant = _determinant(P, Q)
-        k1 = _determinant(R, Q) / determinant
-        k2 = _determinant(P, R) / determinant
-        t, p = theta[..., 0], phi[..., 0]
-        k3 = np.cos(t - p) - k1 * np.cos(p) - k2 * np.cos(t)
-        a, c = 1.0 / k1, -1.0 / k2
-        # Not from k3, where long links leave little: the coupler closes the first position.
-        b = np.hypot(1.0 + c * np.cos(p) - a * np.cos(t), c * np.sin(p) - a * np.sin(t))
-    return Links(np.stack((k1, k2, k3), -1), np.stack((a, b, c), -1))
+    theta, phi = _columns(crank), _columns(rocker)
+    k, lengths = np.empty((2, *theta.shape))
+    for block in _blocks(theta.shape[1]):
+        system = solved(theta[:, block], phi[:, block])
+        k[:, block], lengths[:, block] = system.k, system.lengths
+    shape = np.shape(crank)
+    return Links(k.T.reshape(shape), lengths.T.reshape(shape))
 
 
 def three_pairs(crank: ArrayLike, rocker: ArrayLike) -> ThreePairs:
@@ -151,16 +160,30 @@ def three_pairs(crank: ArrayLike, rocker: ArrayLike) -> ThreePairs:
         Angles θ and φ, in [rad]; (…, 3).
 
     """
-    theta, phi = np.asarray(crank, np.float64), np.asarray(rocker, np.float64)
-    k, lengths = links(theta, phi)
-    with np.errstate(all='ignore'):
-        matrix = np.stack((np.cos(phi), np.cos(theta), np.ones_like(theta)), -1)
-        finite = np.isfinite(matrix).all((-2, -1))
-        condition = np.linalg.cond(np.where(finite[..., None, None], matrix, 0.0))
-        gradient = _gradient(theta, phi, k, lengths)
-        angles = np.abs(np.concatenate((theta, phi), -1))
-        sensitivity = (np.abs(gradient) @ angles[..., None])[..., 0] + np.abs(lengths)
-    return ThreePairs(k, lengths, condition, sensitivity, gradient)
+    theta, phi = _columns(crank), _columns(rocker)
+    count = theta.shape[1]
+    k, lengths, kappa = np.empty((3, 3, count))
+    conditions, doubts, slopes = np.empty(count), np.empty((2, count)), np.empty((3, 6, count))
+    for block in _blocks(count):
+        t, p = theta[:, block], phi[:, block]
+        system = solved(t, p)
+        k[:, block], lengths[:, block] = system.k, system.lengths
+        with np.errstate(all='ignore'):
+            conditions[block] = condition(system)
+            by_angle = gradient(system)
+            slopes[..., block] = by_angle[:3]
+            *sums, turned = (np.abs(by_angle) * np.abs(np.concatenate((t, p)))).sum(1)
+            kappa[:, block] = sums + np.abs(system.lengths)
+            doubts[:, block] = doubt(system), turned
+    shape = np.shape(crank)
+    return ThreePairs(
+        k.T.reshape(shape),
+        lengths.T.reshape(shape),
+        conditions.reshape(shape[:-1]),
+        doubts.T.reshape((*shape[:-1], 2)),
+        kappa.T.reshape(shape),
+        np.moveaxis(slopes, 2, 0).reshape((*shape, 6)),
+    )
 
 
 def exact(
@@ -179,187 +202,83 @@ def exact(
     Raises
     ------
     SynthesisError
-        Where two pairs are equal, or no four-bar of finite links has the three.
+        Where two pairs contradict or repeat each other, or no one four-bar of finite links has
+        the three.
 
     """
     check_pairs(crank, rocker, ground)
     found = three_pairs(crank, rocker)
+    if not _NOISE * found.doubt[0] < _SHAKEN:
+        raise dependent(crank, rocker)
     a, b, c = (float(length) for length in found.lengths)
-    if not isfinite(found.condition) or found.condition * UNIT_ROUNDOFF > 1.0:
-        raise SynthesisError(
-            'pairs',
-            'the three equations depend on each other, so that no four-bar or any number of them '
-            'fits',
-            'move one of the angles, or free the zero angles',
-        )
-    for link, length in (('crank', a), ('rocker', c)):
-        if not abs(length) < _LONGEST:
+    parts = _NOISE * found.sensitivity / np.abs(found.lengths)
+    for link, length, part in (('crank', a, parts[0]), ('rocker', c, parts[2])):
+        if not (part < 1.0 and abs(length) < LONGEST):
             raise SynthesisError(
-                'pairs',
-                f'the {link} would be infinitely long: a slider, not a link, does it',
-                'move one of the angles',
+                f'the {link}',
+                'would be infinitely long, and is a slider on a straight line then',
+                MOVE,
             )
-    if not all(digits >= 1.0 for digits in found.digits):
+    if not found.digits.all():
         raise SynthesisError(
-            'pairs',
-            f'the links cannot be told: rounding the angles alone changes one by '
-            f'{float(np.max(found.sensitivity / np.abs(found.lengths))) * UNIT_ROUNDOFF:.0%}',
-            'move one of the angles',
+            'the pairs',
+            f'do not tell how long the links are: rounding their angles changes one by '
+            f'{parts.max():.0%}',
+            'move the pairs apart',
         )
     four_bar = FourBar.of_lengths(a * ground, b * ground, c * ground, ground)
     return assembled(Design(four_bar, wanted_of(crank, rocker))), found
 
 
-def wanted_of(crank: Sequence[float], rocker: Sequence[float]) -> tuple[Wanted, ...]:
-    """Return pairs as positions that are wanted."""
-    return tuple(Wanted(t, p) for t, p in zip(crank, rocker, strict=True))
-
-
-def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) -> None:
-    """
-    Refuse pairs that no four-bar can have.
-
-    Raises
-    ------
-    SynthesisError
-        With the numbers of the pairs, counted from 1.
-
-    """
-    if not 0.0 < ground < _LONGEST:
-        raise SynthesisError('ground', f'{ground!r} m is no length', 'give it one above 0')
-    for number, pair in enumerate(zip(crank, rocker, strict=True), 1):
-        if not all(map(isfinite, pair)):
-            raise SynthesisError(f'pair {number}', f'{pair} is no pair', 'write two numbers')
-    for (i, one), (j, other) in combinations(enumerate(zip(crank, rocker, strict=True), 1), 2):
-        t, p = (abs(remainder(u - v, tau)) for u, v in zip(one, other, strict=True))
-        said = f'{degrees(one[0]):.10g}° → {degrees(one[1]):.10g}°'
-        if max(t, p) < _SAME:
-            raise SynthesisError(
-                f'pairs {i} and {j}', f'are the same, {said}', 'give each position once'
-            )
-
-
 def fit_equation(crank: Sequence[float], rocker: Sequence[float], ground: float) -> Design:
     """
-    Design the four-bar that comes nearest to more than three pairs, by Freudenstein's equation.
+    Design the four-bar that comes nearest to three pairs or more, by Freudenstein's equation.
 
     What is least is the sum of squares of what the equation leaves, not of the rocker's error;
     `angle_fit.fit_angles` starts from here.
 
+    Parameters
+    ----------
+    crank, rocker
+        As many angles each, in [rad].
+    ground
+        Length of the ground, in [m].
+
     Raises
     ------
     SynthesisError
-        Where the pairs do not fix a four-bar, or its coupler would be imaginary.
+        Where two pairs contradict or repeat each other, or all together do not fix a four-bar of
+        finite links.
 
     """
     check_pairs(crank, rocker, ground)
-    k = fitted(crank, rocker)
-    k1, k2, k3 = (float(value) for value in k)
-    if not min(abs(k1), abs(k2)) > 1.0 / _LONGEST:
-        raise SynthesisError(
-            'pairs', 'a link of the nearest four-bar would be infinitely long', 'move some angles'
-        )
+    P, Q, R = centred(crank, rocker)
+    sizes = np.array((np.linalg.norm(P), np.linalg.norm(Q)))
+    size = np.linalg.norm((crank, rocker))
+    k, _, rank, _ = np.linalg.lstsq(
+        np.stack((P, Q), 1) / sizes, R, max(UNIT_ROUNDOFF * size / sizes.min(), 1e-12)
+    )
+    if rank < 2:
+        raise dependent(crank, rocker)
+    k1, k2 = (k / sizes).tolist()
+    for link, inverse in (('crank', k1), ('rocker', k2)):
+        if not abs(inverse) * LONGEST > 1.0:
+            raise SynthesisError(
+                f'the {link}',
+                'of the nearest four-bar would be infinitely long, and is a slider then',
+                MOVE,
+            )
     a, c = 1.0 / k1, -1.0 / k2
-    square = (a - c) ** 2 + 1.0 + 2.0 * a * c * (1.0 - k3)
-    if not square > 0.0:
-        raise SynthesisError(
-            'pairs',
-            f'the coupler of the nearest four-bar would be imaginary, its square {square:.3g} '
-            "of the ground's",
-            'use fewer pairs, or nearer ones',
-        )
-    four_bar = FourBar.of_lengths(a * ground, square**0.5 * ground, c * ground, ground)
+    apart = 1.0 + c * np.exp(1j * np.array(rocker)) - a * np.exp(1j * np.array(crank))
+    b = float(np.sqrt((np.abs(apart) ** 2).mean()))
+    four_bar = FourBar.of_lengths(a * ground, b * ground, c * ground, ground)
     return assembled(Design(four_bar, wanted_of(crank, rocker)))
 
 
-def fitted(crank: ArrayLike, rocker: ArrayLike) -> Array:
-    """
-    Return k1, k2 and k3 that leave least of Freudenstein's equation; (3,).
-
-    Raises
-    ------
-    SynthesisError
-        Where the equations depend on each other.
-
-    """
-    theta, phi = np.asarray(crank, np.float64), np.asarray(rocker, np.float64)
-    matrix = np.stack((np.cos(phi), np.cos(theta), np.ones_like(theta)), -1)
-    k, _, rank, _ = np.linalg.lstsq(matrix, np.cos(theta - phi), rcond=None)
-    if rank < 3:
-        raise SynthesisError(
-            'pairs',
-            f'the {len(theta)} equations depend on each other',
-            'move some angles, or free the zero angles',
-        )
-    return np.asarray(k)
+def _columns(angles: ArrayLike) -> Array:
+    """Return threes of angles as (3, n)."""
+    return np.ascontiguousarray(np.asarray(angles, np.float64).reshape(-1, 3).T)
 
 
-def _two_product(x: Array, y: Array) -> tuple[Array, Array]:
-    """Return a product and its rounding error (T. J. Dekker, Numer. Math. 18 (1971))."""
-    product = x * y
-    big = _SPLITTER * x
-    x_high = big - (big - x)
-    big = _SPLITTER * y
-    y_high = big - (big - y)
-    x_low, y_low = x - x_high, y - y_high
-    error = ((x_high * y_high - product) + x_high * y_low + x_low * y_high) + x_low * y_low
-    return product, error
-
-
-def _two_sum(x: Array, y: Array) -> tuple[Array, Array]:
-    """Return a sum and its rounding error (D. E. Knuth, TAOCP vol. 2, 4.2.2)."""
-    total = x + y
-    part = total - x
-    return total, (x - (total - part)) + (y - part)
-
-
-def _differences(theta: Array, phi: Array) -> tuple[Array, Array, Array]:
-    """
-    Return what the second and third equation have over the first, each (…, 2), divided by −2.
-
-    Of cos φ, of cos θ and of cos(θ − φ). Differences of angles are taken with their rounding
-    errors: the third, of four angles, may be nothing but these.
-    """
-    theta_by, theta_rest = _two_sum(theta[..., 1:], -theta[..., :1])
-    phi_by, phi_rest = _two_sum(phi[..., 1:], -phi[..., :1])
-    by, rest = _two_sum(theta_by, -phi_by)
-    by += rest + (theta_rest - phi_rest)
-    theta_mean = 0.5 * (theta[..., 1:] + theta[..., :1])
-    phi_mean = 0.5 * (phi[..., 1:] + phi[..., :1])
-    return (
-        np.sin(phi_mean) * np.sin(0.5 * phi_by),
-        np.sin(theta_mean) * np.sin(0.5 * theta_by),
-        np.sin(theta_mean - phi_mean) * np.sin(0.5 * by),
-    )
-
-
-def _determinant(P: Array, Q: Array) -> Array:
-    """Return P0·Q1 − P1·Q0."""
-    one, one_error = _two_product(P[..., 0], Q[..., 1])
-    other, other_error = _two_product(P[..., 1], Q[..., 0])
-    return (one - other) + (one_error - other_error)
-
-
-def _gradient(theta: Array, phi: Array, k: Array, lengths: Array) -> Array:
-    """
-    Differentiate the lengths by the angles.
-
-    Row i of the system moves by g = −sin(θ − φ) + k2·sin θ with θᵢ, by sin(θ − φ) + k1·sin φ
-    with φᵢ; k by that times column i of the inverse, whose columns are the cross products of the
-    matrix's rows over their triple product, the determinant.
-    """
-    rows = np.stack((np.cos(phi), np.cos(theta), np.ones_like(theta)), -1)
-    normals = np.stack(
-        [np.cross(rows[..., (i + 1) % 3, :], rows[..., (i + 2) % 3, :]) for i in range(3)], -1
-    )
-    P, Q, _ = _differences(theta, phi)
-    inverse = normals / (4.0 * _determinant(P, Q))[..., None, None]
-    k1, k2, k3 = (k[..., i, None] for i in range(3))
-    by_theta = k2 * np.sin(theta) - np.sin(theta - phi)
-    by_phi = k1 * np.sin(phi) + np.sin(theta - phi)
-    of_k = np.concatenate((inverse * by_theta[..., None, :], inverse * by_phi[..., None, :]), -1)
-    a, b, c = (lengths[..., i, None] for i in range(3))
-    of_a, of_c = -a * a * of_k[..., 0, :], c * c * of_k[..., 1, :]
-    # b² = a² + c² + 1 − 2ac·k3
-    of_b = ((a - c * k3) * of_a + (c - a * k3) * of_c - a * c * of_k[..., 2, :]) / b
-    return np.stack((of_a, of_b, of_c), -2)
+def _blocks(count: int) -> list[slice]:
+    return [slice(start, start + _BLOCK) for start in range(0, count, _BLOCK)]

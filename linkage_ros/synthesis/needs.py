@@ -21,7 +21,9 @@ from math import degrees, inf, log
 from typing import NamedTuple
 
 from linkage_ros.errors import did_you_mean, SynthesisError
+from linkage_ros.synthesis.course import Array, Flags, mobility
 from linkage_ros.synthesis.defects import Assessment
+import numpy as np
 
 # For each word the ends of Barker's codes that it stands for.
 _KINDS = {
@@ -33,6 +35,14 @@ _KINDS = {
     'triple-rocker': ('RRR1', 'RRR2', 'RRR3', 'RRR4'),
 }
 _WORDS = (*_KINDS, 'grashof', 'non-grashof', 'turning')
+
+# Barker's codes by the shortest link where some link turns fully, by the longest where none does,
+# by the shortest at a change point. Of equal links, as in a parallelogram, none is asked for.
+_CODES = (
+    ('GCRR', 'GRCR', 'GRRC', 'GCCC'),
+    ('RRR2', 'RRR3', 'RRR4', 'RRR1'),
+    ('SCRR', 'SRCR', 'SRRC', 'SCCC'),
+)
 
 _FAR = 10.0
 """What a defect counts for beside a miss of a number by a part of it."""
@@ -110,10 +120,49 @@ def _missed(assessment: Assessment, needs: Needs) -> list[tuple[str, float]]:
     return found
 
 
+def distances(lengths: Array, transmission: Array, needs: Needs) -> Array:
+    """
+    Return for many four-bars without defects what `distance` returns for one.
+
+    Parameters
+    ----------
+    lengths
+        Of crank, coupler, rocker and ground, above 0; (…, 4).
+    transmission
+        The least angle over the travel, in [rad]; (…).
+    needs
+        What is needed.
+
+    """
+    total = np.zeros(transmission.shape)
+    if needs.kind:
+        total += ~_are(lengths, needs.kind)
+    if needs.transmission:
+        total += np.maximum(1.0 - transmission / needs.transmission, 0.0)
+    if needs.link_ratio < inf:
+        ratio = lengths.max(-1) / lengths.min(-1)
+        total += np.maximum(np.log(ratio / needs.link_ratio), 0.0)
+    return total
+
+
 def _is(assessment: Assessment, kind: str) -> bool:
-    code = assessment.kind.code
+    return assessment.turns if kind == 'turning' else _stands_for(kind, assessment.kind.code)
+
+
+def _are(lengths: Array, kind: str) -> Flags:
+    excess, turns = mobility(lengths)
     if kind == 'turning':
-        return assessment.turns
-    if kind in ('grashof', 'non-grashof'):
-        return code.startswith('RRR') == (kind == 'non-grashof')
+        return turns
+    row = np.where(excess > 0.0, 0, np.where(excess < 0.0, 1, 2))
+    link = np.where(excess < 0.0, lengths.argmax(-1), lengths.argmin(-1))
+    meant = np.array([[_stands_for(kind, code) for code in codes] for codes in _CODES])
+    found: Flags = meant[row, link]
+    return found
+
+
+def _stands_for(kind: str, code: str) -> bool:
+    if kind == 'grashof':
+        return code[:1] in ('G', 'S')
+    if kind == 'non-grashof':
+        return code in _CODES[1]
     return code.endswith(_KINDS[kind])

@@ -76,6 +76,16 @@ def test_a_run_is_remapped_recorded_and_drawn(
     assert svg.startswith('<?xml')
 
 
+def test_a_linkage_file_runs_as_it_is(linkage: Run, tmp_path: Path) -> None:
+    (tmp_path / 'designed.yaml').write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
+    answer = linkage('run', 'designed.yaml', '--seconds', '1', '--plain')
+    assert answer.returncode == 0, answer.stderr
+    assert 'designed: ticking at 1000 Hz; crank crank_joint driven by constant_rate' in (
+        answer.stdout + answer.stderr
+    )
+    assert not (tmp_path / 'runs').exists()
+
+
 def test_a_folder_that_exists_is_not_touched_and_the_run_goes_on(
     linkage: Run, tmp_path: Path, scene: Path
 ) -> None:

@@ -273,3 +273,29 @@ def test_one_thing_at_a_time(typed, capsys):
         run(*typed)
     assert caught.value.code == 2
     assert 'usage:' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('path', [FOUR_BAR, CONFIG / 'linkages/excavator_bucket.yaml'])
+def test_a_linkage_file_is_shown_as_the_scene_that_it_stands_for(path, capsys):
+    assert run(str(path)) == 0
+    said = [' '.join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert said[0] == str(path)
+    assert 'ticks 1000 a second' in said
+    assert 'recorded no' in said
+    stages = [line.split()[1] for line in said if line[:1].isdigit()]
+    assert stages == ['constant_rate' if path == FOUR_BAR else 'sine', 'velocity']
+
+
+def test_a_bad_linkage_file_is_one_by_the_schema_of_linkages(linkage: Run, tmp_path):
+    pytest.importorskip('jsonschema')
+    (tmp_path / 'bad.yaml').write_text(
+        'links: {ground: {A: 1}}\ntrcaed: []\njoints: {}\ninput: {joint: a, slider: b}\n'
+    )
+    answer = linkage('scene', 'bad.yaml')
+    assert answer.returncode == 2
+    said = answer.stderr.splitlines()
+    assert [line.partition(':')[2].partition(';')[0] for line in said] == [
+        ' bad.yaml:1: links.ground.A: 1 is not a list',
+        ' bad.yaml:2: trcaed: unknown key',
+        ' bad.yaml:3: joints: is empty',
+    ]

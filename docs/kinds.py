@@ -1,0 +1,179 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The chapter of docs/synthesis.md on kinds of tasks: what `linkage synthesize` makes of each."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from math import degrees, hypot
+from pathlib import Path
+from shlex import split
+from typing import NamedTuple
+
+from linkage_ros.cli.synthesis_tasks import Answer, answers, Search
+from linkage_ros.cli.synthesize import add_arguments, needs_of
+from linkage_ros.synthesis.needs import distance, misses
+
+from .markdown import prose
+
+_LINKS = ('crank', 'coupler', 'rocker', 'ground')
+_ROUNDING = 1e-9
+
+
+class Kind(NamedTuple):
+    """
+    A kind of task.
+
+    Attributes
+    ----------
+    name, picture
+        Its heading, and its picture's name.
+    words
+        What is asked for.
+    command
+        What is typed behind `linkage synthesize`.
+
+    """
+
+    name: str
+    picture: str
+    words: str
+    command: str
+
+
+_LOGARITHM = (
+    '--function "log10(x)" --range 1 2 --crank-range 45 105 --rocker-range 135 225 --ground 0.1'
+)
+
+KINDS = (
+    Kind(
+        'Three pairs',
+        'three_pairs',
+        'Crank and rocker stand at three pairs of angles. There is one four-bar for it, or none.',
+        '--pair 50 100 --pair 80 110 --pair 110 125 --ground 0.1',
+    ),
+    Kind(
+        'A function',
+        'function',
+        'The rocker shows the logarithm of what the crank is set to. It is right at three points, '
+        'spaced as Chebyshev has it so that the error between them stays small.',
+        _LOGARITHM,
+    ),
+    Kind(
+        'Five pairs, zeros free',
+        'five_pairs',
+        'The same function. Where only turns matter, and not from where they are counted, the '
+        'zeros of crank and rocker are two unknowns more, and the function is met at five points.',
+        f'{_LOGARITHM} --points 5 --free-zeros',
+    ),
+    Kind(
+        'A path',
+        'path',
+        'A point of the coupler goes through seven places, in their order, on a closed curve, '
+        'with a crank that turns one way.',
+        '--closed --usable --candidates 200000 --point 0.100 0.100 --point 0.130 0.120 '
+        '--point 0.170 0.125 --point 0.200 0.110 --point 0.190 0.090 --point 0.150 0.080 '
+        '--point 0.115 0.085',
+    ),
+    Kind(
+        'Three poses',
+        'poses',
+        'The coupler goes through three poses, place and angle, from two pivots that are given.',
+        '--pose 0.00 0.10 50 --pose 0.02 0.13 35 --pose 0.10 0.12 15 '
+        '--fixed-pivot 0.00 0.00 --fixed-pivot 0.10 0.00',
+    ),
+)
+
+
+def answer_to(kind: Kind) -> Answer:
+    """Return the first solution that the command line shows."""
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    typed = parser.parse_args(split(kind.command))
+    needs = needs_of(typed)
+    found = answers(
+        typed, Search(needs, typed.seed, typed.candidates, typed.best, typed.dask, _untold)
+    )
+    meeting = [one for one in found if not misses(one.assessment, needs)]
+    return min(meeting or found, key=lambda one: distance(one.assessment, needs))
+
+
+def chapter(folder: Path) -> Iterator[str]:
+    """Draw every kind of task, and yield the lines on them."""
+    from linkage_ros.drawing.design import draw_design
+
+    yield from prose("""
+        ## Four-bars by kind of task
+
+        What can be asked for, each with the first answer of `linkage synthesize`, drawn by its
+        `--draw`. What was wanted is blue.
+    """)
+    for kind in KINDS:
+        answer = answer_to(kind)
+        file = folder / f'{kind.picture}.svg'
+        draw_design(answer.design, answer.title, file, error=answer.curve)
+        yield from section(kind, answer)
+
+
+def section(kind: Kind, answer: Answer) -> Iterator[str]:
+    """Yield the lines on a kind of task."""
+    yield f'### {kind.name}'
+    yield ''
+    yield from prose(kind.words)
+    yield '```sh'
+    yield from _command(kind)
+    yield '```'
+    yield ''
+    yield f'![{kind.name}: {answer.title}](synthesis/{kind.picture}.svg)'
+    yield ''
+    yield from (f'- {fact}' for fact in _facts(answer))
+    yield ''
+
+
+def _facts(answer: Answer) -> Iterator[str]:
+    design, found = answer.design, answer.assessment
+    lengths = zip(_LINKS, design.four_bar.lengths, strict=True)
+    said = ', '.join(f'{link} {length:.4g} m' for link, length in lengths)
+    yield f'{said[0].upper()}{said[1:]}; {found.kind.name}'
+    if answer.curve is not None:
+        worst = max(abs(error) for error in answer.curve[1])
+        yield f'Rocker off by {degrees(worst):.2g}° at most, over the whole range'
+    elif any(wanted.place is not None for wanted in design.wanted):
+        off = [met.distance for met in found.met]
+        size = max(design.four_bar.lengths)
+        rms = hypot(*off) / len(off) ** 0.5
+        exact = max(off) < _ROUNDING * size
+        yield 'Places met exactly' if exact else f'Places missed by {1e3 * rms:.2g} mm rms'
+    yield f'Transmission angle {degrees(found.transmission):.1f}° at least, on the way'
+    for defect in found.defects:
+        yield f'**{defect.name}**: {defect.text}'
+
+
+def _command(kind: Kind) -> Iterator[str]:
+    """Yield the command in lines of a page's width."""
+    line = 'linkage synthesize'
+    for option in kind.command.split(' --'):
+        part = f' --{option.removeprefix("--")}'
+        if len(line) + len(part) > 96:
+            yield f'{line} \\'
+            line = ' ' * 3
+        line += part
+    yield line
+
+
+def _untold(_done: int, _of: int) -> None:
+    """Say nothing of the search."""

@@ -1,0 +1,329 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What ``linkage synthesize`` was asked for, worked out: one kind of task after the other."""
+
+from __future__ import annotations
+
+import argparse
+from cmath import phase
+from collections.abc import Iterator, Sequence
+from math import degrees, hypot, isfinite, pi, radians, remainder
+from typing import NamedTuple, TYPE_CHECKING
+
+from linkage_ros.cli.progress import Told
+from linkage_ros.cli.typed_numbers import numbers_of
+from linkage_ros.errors import LinkageError
+from linkage_ros.synthesis.defects import assess, Assessment
+from linkage_ros.synthesis.design import Design
+from linkage_ros.synthesis.freudenstein import exact, fit_equation, ThreePairs
+from linkage_ros.synthesis.needs import misses, Needs
+
+if TYPE_CHECKING:
+    from linkage_ros.synthesis.function import FunctionTask
+    from linkage_ros.synthesis.structural_error import StructuralError
+
+CANDIDATES = 200_000
+"""How many a search tries where nobody says."""
+
+_SHIFT = 0.01
+"""What the sensitivity is told for, in degrees: what a good protractor shows."""
+
+Angles = Sequence[float]
+
+
+class Answer(NamedTuple):
+    """
+    A solution.
+
+    Attributes
+    ----------
+    title
+        How it came about.
+    design, assessment
+        What it is, and what it is worth.
+    facts
+        How it was solved: what, and how much.
+    curve
+        Crank angles and the rocker's error there, in [rad]; None where there is no more than the
+        positions.
+
+    """
+
+    title: str
+    design: Design
+    assessment: Assessment
+    facts: Sequence[tuple[str, str]] = ()
+    curve: tuple[Sequence[float], Sequence[float]] | None = None
+
+
+class Search(NamedTuple):
+    """How to search, and for what."""
+
+    needs: Needs
+    seed: int
+    candidates: int
+    keep: int
+    address: str
+    progress: Told
+
+    def accepts(self, design: Design) -> bool:
+        """Return whether a design has what is needed."""
+        return not misses(assess(design), self.needs)
+
+
+def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
+    """
+    Return all solutions, the best first.
+
+    Raises
+    ------
+    LinkageError
+        Where there is none, or what was typed is no task.
+
+    """
+    tasks = {
+        '--pair': typed.pair or typed.pairs,
+        '--function': typed.function,
+        '--path': typed.path or typed.point,
+        '--pose': typed.pose,
+    }
+    named = [option for option, value in tasks.items() if value]
+    if len(named) != 1:
+        raise LinkageError(
+            ' and '.join(named) or 'linkage synthesize',
+            'stand for two tasks' if named else 'nothing is asked for',
+            f'name one of {", ".join(tasks)}',
+        )
+    work = {'--pair': _pairs, '--function': _function, '--path': _path, '--pose': _motion}
+    return work[named[0]](typed, search)
+
+
+def _pairs(typed: argparse.Namespace, search: Search) -> list[Answer]:
+    rows = typed.pair or numbers_of(typed.pairs, (2,))
+    crank, rocker = ([radians(row[i]) for row in rows] for i in (0, 1))
+    return _of_pairs(crank, rocker, typed, search)
+
+
+def _of_pairs(
+    crank: Angles, rocker: Angles, typed: argparse.Namespace, search: Search
+) -> list[Answer]:
+    ground, free = typed.ground, typed.free_zeros
+    count = len(crank)
+    if count < 3:
+        raise LinkageError(
+            'pairs', f'there are {count}', 'three make a four-bar, more a nearest one'
+        )
+    if count == 3 and free:
+        return _searched(crank, rocker, ground, search)
+    if count == 3:
+        design, found = exact(crank, rocker, ground)
+        return [Answer('three pairs, exact', design, assess(design), list(_worth(found, ground)))]
+    if count <= 5 and free:
+        return _with_zeros(crank, rocker, ground)
+    return [_fitted(crank, rocker, ground, free)]
+
+
+def _worth(found: ThreePairs, ground: float) -> list[tuple[str, str]]:
+    k1, k2, k3 = found.k
+    slopes = abs(found.gradient).max(-1) / abs(found.lengths) * radians(_SHIFT)
+    digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, found.digits, strict=True)]
+    moves = [f'{link} {value:.2g}' for link, value in zip(_LINKS, 100.0 * slopes, strict=True)]
+    return [
+        ('k1, k2, k3', f'{k1:.12g}, {k2:.12g}, {k3:.12g}'),
+        ('condition', f'{found.condition:.4g}'),
+        ('digits to trust', f'{", ".join(digits)}, of lengths worked out from these angles'),
+        (f'{_SHIFT}° on one angle', f'moves {" %, ".join(moves)} %, at most'),
+    ]
+
+
+_LINKS = ('crank', 'coupler', 'rocker')
+
+
+def _searched(crank: Angles, rocker: Angles, ground: float, search: Search) -> list[Answer]:
+    from linkage_ros.synthesis.zero_search import search_zeros
+
+    designs = search_zeros(
+        crank,
+        rocker,
+        ground,
+        search.needs,
+        seed=search.seed,
+        count=search.candidates,
+        keep=search.keep,
+        progress=search.progress,
+        address=search.address,
+    )
+    return [_turned('three pairs', design) for design in designs]
+
+
+def _turned(what: str, design: Design) -> Answer:
+    """Return a solution whose zeros were free, which its title names."""
+    four_bar = design.four_bar
+    zeros = [
+        f'{link} at {degrees(remainder(phase(pin), pi)):+.6g}°'
+        for link, pin in (('crank', four_bar.crank), ('rocker', four_bar.rocker))
+        if pin.imag
+    ]
+    title = f'{what}, zero of {" and ".join(zeros)}' if zeros else what
+    return Answer(title, design, assess(design))
+
+
+def _with_zeros(crank: Angles, rocker: Angles, ground: float) -> list[Answer]:
+    from linkage_ros.synthesis.free_zeros import five_pairs, four_pairs
+
+    solve, what = (four_pairs, 'four pairs') if len(crank) == 4 else (five_pairs, 'five pairs')
+    found = []
+    for one in solve(crank, rocker, ground):
+        answer = _turned(what, one.design)
+        found.append(answer._replace(facts=[('condition', f'{one.condition:.4g}')]))
+    return sorted(found, key=_usefulness)
+
+
+def _usefulness(answer: Answer) -> tuple[int, float]:
+    return len(answer.assessment.defects), answer.assessment.link_ratio
+
+
+def _fitted(crank: Angles, rocker: Angles, ground: float, free: bool) -> Answer:
+    from linkage_ros.synthesis.angle_fit import fit_angles
+
+    start = fit_equation(crank, rocker, ground)
+    design = fit_angles(start, free_zeros=free)
+    answer = _turned(f'{len(crank)} pairs, nearest', design)
+    met = answer.assessment.met
+    facts = [
+        ('rocker off, by the equation', _errors([one.angle for one in assess(start).met])),
+        ('rocker off, fitted', _errors([one.angle for one in met])),
+    ]
+    return answer._replace(
+        facts=facts, curve=([one.crank for one in design.wanted], [one.angle for one in met])
+    )
+
+
+def _errors(angles: Angles) -> str:
+    rms = hypot(*angles) / len(angles) ** 0.5
+    return f'{degrees(rms):.4g}° rms, {degrees(max(map(abs, angles))):.4g}° at most'
+
+
+def _function(typed: argparse.Namespace, search: Search) -> list[Answer]:
+    from linkage_ros.synthesis.expression import Expression
+    from linkage_ros.synthesis.function import chebyshev, FunctionTask, pairs, wanted_rocker
+    from linkage_ros.synthesis.structural_error import structural_error
+
+    for name in ('range', 'crank_range', 'rocker_range'):
+        if getattr(typed, name) is None:
+            option = f'--{name.replace("_", "-")}'
+            raise LinkageError('--function', f'{option} is missing', f'add {option} FROM TO')
+    task = FunctionTask(
+        Expression(typed.function),
+        tuple(typed.range),
+        _radians(typed.crank_range),
+        _radians(typed.rocker_range),
+    )
+    low, high = typed.range
+    points = typed.at or chebyshev(low, high, typed.points)
+    found = []
+    for answer in _of_pairs(*pairs(task, points), typed=typed, search=search):
+        error = structural_error(
+            answer.design, lambda angles: wanted_rocker(task, angles), *task.crank_range
+        )
+        told = list(_structural(task, error))
+        curve = list(error.crank), list(error.error)
+        found.append(answer._replace(facts=[*answer.facts, *told], curve=curve))
+    return found
+
+
+def _structural(task: FunctionTask, error: StructuralError) -> Iterator[tuple[str, str]]:
+    from linkage_ros.synthesis.function import on_scale
+
+    if error.opens_at is not None:
+        opens = degrees(error.opens_at)
+        yield 'structural error', f'the loop opens on the way, with the crank at {opens:.6g}°'
+    if isfinite(error.greatest):
+        worst = on_scale(task, error.at, error.greatest)
+        greatest, rms = degrees(error.greatest), degrees(error.rms)
+        yield 'structural error', f'{greatest:+.4g}° at most, {rms:.4g}° rms'
+        part = f'{worst.error:+.4g}, {worst.percent:+.3g} % of its range'
+        yield '', f'at x = {worst.x:.6g}, where y = {worst.y:.6g} is off by {part}'
+
+
+def _radians(angles: Sequence[float]) -> tuple[float, float]:
+    start, end = map(radians, angles)
+    return start, end
+
+
+def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
+    from linkage_ros.synthesis.path import generate_path
+    from linkage_ros.synthesis.path_task import PathTask
+
+    rows = typed.point or numbers_of(typed.path, (2, 3))
+    timing = typed.timing
+    if len(rows[0]) == 3:
+        timing = [row[2] for row in rows]
+    task = PathTask(
+        tuple(complex(row[0], row[1]) for row in rows),
+        typed.closed,
+        None if timing is None else tuple(map(radians, timing)),
+        typed.free_zeros,
+    )
+    paths = generate_path(
+        task,
+        seed=search.seed,
+        count=search.candidates,
+        keep=search.keep,
+        accept=search.accepts,
+        progress=search.progress,
+        address=search.address,
+    )
+    return [
+        Answer(
+            f'{len(rows)} points of a curve',
+            one.design,
+            assess(one.design),
+            [('points off', f'{one.rms:.4g} m rms, {one.greatest:.4g} m at most')],
+        )
+        for one in paths.found or paths.refused
+    ]
+
+
+def _motion(typed: argparse.Namespace, _search: Search) -> list[Answer]:
+    from linkage_ros.synthesis.motion import from_fixed_pivots, from_moving_pivots
+    from linkage_ros.synthesis.poses import Pose
+
+    fixed, moving = typed.fixed_pivot, typed.moving_pivot
+    if bool(fixed) == bool(moving):
+        raise LinkageError(
+            '--pose',
+            'fixed and moving pivots are given' if fixed else 'no pivots are given',
+            'name --fixed-pivot twice or --moving-pivot twice',
+        )
+    kind = 'fixed' if fixed else 'moving'
+    pivots = [complex(*place) for place in fixed or moving]
+    if len(pivots) != 2:
+        reason = f'was given {len(pivots)} time(s)'
+        raise LinkageError(f'--{kind}-pivot', reason, "name the crank's and the rocker's")
+    poses = [Pose(complex(x, y), radians(angle)) for x, y, angle in typed.pose]
+    solve = from_fixed_pivots if fixed else from_moving_pivots
+    design, links = solve(poses, *pivots)
+    (one, one_digits), (other, other_digits) = (
+        (f'({pivot.real:.10g}, {pivot.imag:.10g})', f'{digits:.0f}')
+        for pivot, digits in zip(links.pivots.tolist(), links.digits.tolist(), strict=True)
+    )
+    found = ('O2 and O4 in the ground', 'A and B in the coupler')[bool(fixed)]
+    facts = [
+        (found, f'{one} and {other} m'),
+        ('digits to trust', f'{one_digits} and {other_digits}'),
+    ]
+    return [Answer(f'three poses, from {kind} pivots', design, assess(design), facts)]

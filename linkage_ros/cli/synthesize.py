@@ -1,0 +1,245 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Design a four-bar: from pairs of angles, a function, a traced curve or poses of the coupler.
+
+Angles are typed and shown in degrees, lengths in metres.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from math import inf, radians
+from pathlib import Path
+from shlex import quote
+import sys
+from threading import Event
+
+from linkage_ros.cli.progress import progress
+from linkage_ros.cli.synthesis_tables import tables
+from linkage_ros.cli.synthesis_tasks import Answer, answers, CANDIDATES, Search
+from linkage_ros.cli.tables import show
+from linkage_ros.errors import LinkageError
+from linkage_ros.scene.linkage_text import write_linkage
+from linkage_ros.synthesis.needs import distance, misses, Needs
+
+_NOT_MET = 1
+"""Exit code where there are solutions and none has what is needed."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    _add_tasks(parser)
+    _add_freedoms(parser)
+    needs = parser.add_argument_group('what a solution needs')
+    needs.add_argument(
+        '--need', default='', metavar='KIND', help='crank-rocker, double-crank, grashof, …'
+    )
+    needs.add_argument(
+        '--min-transmission',
+        type=float,
+        default=0.0,
+        metavar='DEG',
+        help='least transmission angle from the first to the last position, in degrees',
+    )
+    needs.add_argument(
+        '--max-link-ratio',
+        type=float,
+        default=inf,
+        metavar='RATIO',
+        help='longest link to shortest',
+    )
+    needs.add_argument('--usable', action='store_true', help='no order, branch or circuit defect')
+    written = parser.add_argument_group('what is written')
+    written.add_argument(
+        '-o', '--output', type=Path, metavar='FILE', help='linkage file of the solution'
+    )
+    written.add_argument(
+        '--pick', type=int, default=1, metavar='N', help='the solution to write (here the first)'
+    )
+    written.add_argument(
+        '--draw',
+        type=Path,
+        metavar='FILE',
+        help='PNG, SVG or PDF: the solution at its positions; of several FILE-1, FILE-2, …',
+    )
+
+
+def _add_tasks(parser: argparse.ArgumentParser) -> None:
+    pairs = parser.add_argument_group('pairs of crank and rocker angles')
+    pairs.add_argument(
+        '--pair',
+        nargs=2,
+        type=float,
+        action='append',
+        metavar=('CRANK', 'ROCKER'),
+        help='angles of crank and rocker in one position, in degrees; three or more times',
+    )
+    pairs.add_argument('--pairs', type=Path, metavar='FILE', help='CSV of two columns, in degrees')
+    pairs.add_argument(
+        '--ground', type=float, default=1.0, metavar='M', help='length of the ground (here 1)'
+    )
+    function = parser.add_argument_group('a function')
+    function.add_argument('--function', metavar='FORMULA', help='of x, such as "log10(x)"')
+    function.add_argument('--range', nargs=2, type=float, metavar=('X0', 'X1'), help='of x')
+    for link in ('crank', 'rocker'):
+        function.add_argument(
+            f'--{link}-range',
+            nargs=2,
+            type=float,
+            metavar=('FROM', 'TO'),
+            help=f"the {link}'s angles over the range, in degrees",
+        )
+    function.add_argument(
+        '--points', type=_whole, default=3, metavar='N', help='points, by Chebyshev (here 3)'
+    )
+    function.add_argument(
+        '--at', nargs='+', type=float, metavar='X', help='points of your own, instead'
+    )
+    path = parser.add_argument_group('a traced curve')
+    path.add_argument(
+        '--point', nargs=2, type=float, action='append', metavar=('X', 'Y'), help='in metres'
+    )
+    path.add_argument(
+        '--path',
+        type=Path,
+        metavar='FILE',
+        help='CSV: x, y in metres, and the crank angle in degrees where that is wanted too',
+    )
+    path.add_argument('--closed', action='store_true', help='the last point leads to the first')
+    path.add_argument(
+        '--timing',
+        nargs='+',
+        type=float,
+        metavar='CRANK',
+        help="the crank's angle at each point, in degrees",
+    )
+    motion = parser.add_argument_group('poses of the coupler')
+    motion.add_argument(
+        '--pose',
+        nargs=3,
+        type=float,
+        action='append',
+        metavar=('X', 'Y', 'ANGLE'),
+        help='in metres and degrees; three times',
+    )
+    for kind, frame in (('fixed', 'ground'), ('moving', 'coupler')):
+        motion.add_argument(
+            f'--{kind}-pivot',
+            nargs=2,
+            type=float,
+            action='append',
+            metavar=('X', 'Y'),
+            help=f"in the {frame}'s frame; twice: crank's and rocker's",
+        )
+
+
+def _add_freedoms(parser: argparse.ArgumentParser) -> None:
+    freedoms = parser.add_argument_group('what is free, and the search')
+    freedoms.add_argument(
+        '--free-zeros',
+        action='store_true',
+        help='only how far crank and rocker turn matters, not from where: with three pairs the '
+        'best are searched for, with four and five all are listed, with more they are fitted',
+    )
+    freedoms.add_argument('--seed', type=_whole, default=0, help='of the search (here 0)')
+    freedoms.add_argument(
+        '--candidates',
+        type=_whole,
+        default=CANDIDATES,
+        metavar='N',
+        help=f'how many are tried in a search (here {CANDIDATES})',
+    )
+    freedoms.add_argument(
+        '--best', type=_whole, default=3, metavar='K', help='how many are listed (here 3)'
+    )
+    freedoms.add_argument(
+        '--dask',
+        default='',
+        metavar='ADDRESS',
+        help='scheduler of a Dask cluster that shares the search, as tcp://host:8786',
+    )
+
+
+def run(arguments: argparse.Namespace, _stop: Event) -> int:
+    """Design; return 1 where no solution has what is needed."""
+    needs = needs_of(arguments)
+    with progress('candidates') as told:
+        typed = arguments
+        search = Search(needs, typed.seed, typed.candidates, typed.best, typed.dask, told)
+        found = answers(typed, search)
+    meeting = [one for one in found if not misses(one.assessment, needs)]
+    if not meeting:
+        print(f'None of {len(found)} solution(s) has what is needed. Nearest to it:\n')
+    nearest = sorted(found, key=lambda one: distance(one.assessment, needs))
+    shown = (meeting or nearest)[: arguments.best]
+    _show(shown, needs)
+    _draw(arguments.draw, shown)
+    if not meeting:
+        return _NOT_MET
+    if arguments.output is not None:
+        _write(arguments, shown)
+    return 0
+
+
+def _whole(text: str) -> int:
+    number = int(text)
+    if not 0 <= number < 2**53:
+        raise argparse.ArgumentTypeError(f'{text} is no number to count by; write 0 or more')
+    return number
+
+
+def needs_of(typed: argparse.Namespace) -> Needs:
+    """Return what a solution needs; whatever is needed, it must be free of defects then."""
+    needs = Needs(typed.need, radians(typed.min_transmission), typed.max_link_ratio)
+    needs.check()
+    return needs._replace(usable=typed.usable or needs != Needs())
+
+
+def _show(shown: Sequence[Answer], needs: Needs) -> None:
+    for number, answer in enumerate(shown, 1):
+        title = answer.title if len(shown) == 1 else f'{number}: {answer.title}'
+        for table in tables(answer, title, needs):
+            show(table)
+            print()
+
+
+def _draw(file: Path | None, shown: Sequence[Answer]) -> None:
+    if file is None:
+        return
+    from linkage_ros.drawing.design import draw_design
+
+    for number, answer in enumerate(shown, 1):
+        own = file if len(shown) == 1 else file.with_stem(f'{file.stem}-{number}')
+        draw_design(answer.design, answer.title, own, error=answer.curve)
+        print(own)
+
+
+def _write(arguments: argparse.Namespace, shown: Sequence[Answer]) -> None:
+    if not 1 <= arguments.pick <= len(shown):
+        raise LinkageError(
+            f'--pick {arguments.pick}',
+            f'there are {len(shown)} solution(s)',
+            f'name one of 1 to {len(shown)}',
+        )
+    answer = shown[arguments.pick - 1]
+    first = answer.design.wanted[0].crank
+    command = ' '.join(['linkage synthesize', *map(quote, sys.argv[2:])])
+    defects = [f'{one.name} defect: {one.text}' for one in answer.assessment.defects]
+    lines = [f'Designed: {answer.title}', command, *defects]
+    write_linkage(answer.design.four_bar.linkage(first), arguments.output, lines)
+    print(arguments.output)

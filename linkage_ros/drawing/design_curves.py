@@ -1,0 +1,201 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What is drawn beside a design: a link's angle over the crank's, and below it what it misses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees, tau
+from typing import Any
+
+from linkage_ros.drawing.design_poses import Array, Branch, Pose
+from linkage_ros.drawing.painting import degree_step, INK, Names, OTHER, OTHER_TEXT, WANTED
+import numpy as np
+from numpy.typing import ArrayLike
+
+_UNITS = (('m', 1.0), ('mm', 1e3), ('µm', 1e6), ('nm', 1e9))
+_ROUNDING = 1e-9
+"""What is missed by less, of the linkage's size, is not missed."""
+
+_EVERY = 6
+"""Of the points of a curve, when room for a number is looked for."""
+
+_NUMBERED = 12
+"""Of more positions each second is numbered, or each third, and so on."""
+
+
+def numbered(number: int, count: int) -> bool:
+    """Return whether a position has its number written to it."""
+    return (number - 1) % (1 + (count - 1) // _NUMBERED) == 0
+
+
+def paint_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -> None:
+    """Plot the rocker's angle over the crank's, or the coupler's where that is what was wanted."""
+    from matplotlib.ticker import MultipleLocator  # local import: an extra, and slow to load
+
+    coupler = _of_coupler(poses)
+    link = 'coupler' if coupler else 'rocker'
+    both = len({branch.own for branch in branches}) > 1
+    told: set[str] = set()
+
+    def once(text: str) -> str:
+        said = '' if text in told else text
+        told.add(text)
+        return said
+
+    for branch in sorted(branches, key=lambda branch: not branch.own):
+        angles, marks = _placed(branch, poses)
+        side = ', other assembly' if not branch.own else ', own assembly' if both else ''
+        axes.plot(
+            np.degrees(branch.crank),
+            np.degrees(angles),
+            color=INK if branch.own else OTHER,
+            linewidth=1.5 if branch.own else 0.9,
+            zorder=2.5 if branch.own else 2.0,
+            label=once(f'{link}{side}'),
+        )
+        if branch.limited:
+            for end in (branch.crank[0], branch.crank[-1]):
+                axes.axvline(
+                    degrees(end), color='0.45', linewidth=0.8, linestyle=(0, (1, 2)),
+                    label=once('end of the range'), zorder=0,
+                )  # fmt: skip
+        for pose, mark in marks:
+            wanted = _wanted(pose, coupler)
+            axes.plot(
+                [mark.real], [mark.imag],
+                marker='o', linestyle='', markersize=5.5, markeredgewidth=1.4,
+                markerfacecolor='white' if wanted is None else WANTED,
+                markeredgecolor=(INK if wanted is None else WANTED) if branch.own else OTHER,
+                zorder=5, label=once('position' if wanted is None else 'wanted'),
+            )  # fmt: skip
+    _degrees(axes, f'{link} angle [°]')
+    axes.yaxis.set_major_locator(MultipleLocator(degree_step(*axes.get_ylim())))
+
+
+def number_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -> None:
+    """Write the numbers of the positions into that plot, once it is laid out."""
+    names = Names(axes)
+    lines = []
+    for branch in branches:
+        angles, marks = _placed(branch, poses)
+        lines.append([complex(*at) for at in np.degrees((branch.crank, angles)).T[::_EVERY]])
+        for pose, mark in marks:
+            if numbered(pose.number, len(poses)):
+                ink = INK if branch.own else OTHER_TEXT
+                style = {'fontsize': 7.5, 'fontweight': 'bold', 'color': ink}
+                names.want(str(pose.number), (mark,), 6.0, **style)
+    names.place(lines)
+
+
+def paint_error(axes: Any, error: tuple[ArrayLike, ArrayLike], poses: Sequence[Pose]) -> None:
+    """Plot the error of the rocker's angle over the crank's, and mark the positions on it."""
+    crank, missed = (np.asarray(values, np.float64) for values in error)
+    order = np.argsort(crank, kind='stable')
+    crank, missed = np.degrees(crank[order]), np.degrees(missed[order])
+    axes.axhline(0.0, color='0.45', linewidth=0.7)
+    if len(crank) > len(poses):
+        axes.plot(crank, missed, color=INK, linewidth=1.3)
+    else:
+        axes.vlines(crank, 0.0, missed, color=INK, linewidth=1.3)
+    for pose in poses:
+        at = degrees(pose.wanted.crank)
+        if crank[0] - 1e-6 <= at <= crank[-1] + 1e-6:
+            axes.plot(
+                [at], [np.interp(at, crank, missed)], 'o', color=WANTED, markersize=4.5, zorder=5
+            )
+    _degrees(axes, 'error of the rocker [°]')
+    axes.margins(x=0.03)
+
+
+def paint_distances(axes: Any, poses: Sequence[Pose]) -> None:
+    """Plot how far the traced point is from each of its places."""
+    from matplotlib.ticker import MaxNLocator  # local import: an extra, and slow to load
+
+    missed = np.array([pose.met.distance for pose in poses])
+    unit, factor = next(
+        ((unit, factor) for unit, factor in _UNITS if missed.max(initial=0.0) * factor >= 1.0),
+        _UNITS[-1],
+    )
+    numbers = [pose.number for pose in poses]
+    axes.vlines(numbers, 0.0, missed * factor, color=INK, linewidth=1.3)
+    axes.plot(numbers, missed * factor, 'o', color=WANTED, markersize=4.5)
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel(f'distance [{unit}]')
+    axes.set_xlabel('point')
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    _plain(axes)
+
+
+def misses_places(poses: Sequence[Pose]) -> bool:
+    """Return whether places were wanted and are missed by more than rounding."""
+    size = sum(abs(place) for place in poses[0].points.values())
+    return any(pose.met.distance > _ROUNDING * size for pose in poses)
+
+
+def _wanted(pose: Pose, coupler: bool) -> float | None:
+    return pose.wanted.coupler if coupler else pose.wanted.rocker
+
+
+def _on(branch: Branch, crank: float) -> float | None:
+    """Return a crank angle with the turns that bring it into a branch's range, if it is in it."""
+    low, high = float(branch.crank[0]), float(branch.crank[-1])
+    x = crank - tau * round((crank - 0.5 * (low + high)) / tau)
+    return x if low - _ROUNDING <= x <= high + _ROUNDING else None
+
+
+def _of_coupler(poses: Sequence[Pose]) -> bool:
+    return any(pose.wanted.coupler is not None for pose in poses)
+
+
+def _placed(branch: Branch, poses: Sequence[Pose]) -> tuple[Array, list[tuple[Pose, complex]]]:
+    """
+    Return a branch's angles in the turn that was wanted, and its positions in that plot.
+
+    Angles of the link in [rad]; positions as crank angle + i·(the link's angle), in degrees.
+    """
+    coupler = _of_coupler(poses)
+    angles = branch.coupler if coupler else branch.rocker
+    found = []
+    for pose in poses:
+        x = _on(branch, pose.wanted.crank)
+        if pose.own == branch.own and x is not None:
+            y = float(np.interp(x, branch.crank, angles))
+            found.append((pose, x, y, _wanted(pose, coupler)))
+    behind = [((wanted or 0.0) - y) / tau for _, _, y, wanted in found]
+    shift = tau * round(float(np.median(behind))) if behind else 0.0
+    marks = []
+    for pose, x, y, wanted in found:
+        there = y + shift
+        at = there if wanted is None else wanted + tau * round((there - wanted) / tau)
+        marks.append((pose, complex(degrees(x), degrees(at))))
+    return angles + shift, marks
+
+
+def _degrees(axes: Any, label: str) -> None:
+    from matplotlib.ticker import MultipleLocator  # local import: an extra, and slow to load
+
+    axes.set_xlabel('crank angle [°]')
+    axes.set_ylabel(label)
+    axes.xaxis.set_major_locator(MultipleLocator(degree_step(*axes.get_xlim())))
+    _plain(axes)
+
+
+def _plain(axes: Any) -> None:
+    axes.tick_params(labelsize=7, width=0.5)
+    for side in ('top', 'right'):
+        axes.spines[side].set_visible(False)
+    axes.grid(alpha=0.25, linewidth=0.5)

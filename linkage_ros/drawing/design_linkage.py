@@ -1,0 +1,216 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A design in its plane: its positions, what was wanted, and a short link once more, larger."""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from collections.abc import Sequence
+from math import degrees, remainder, tau
+from typing import Any
+
+from linkage_ros.drawing.curves import drawn_once
+from linkage_ros.drawing.design_curves import numbered
+from linkage_ros.drawing.design_poses import Branch, Pose
+from linkage_ros.drawing.painting import (
+    INK,
+    LAYERS,
+    Names,
+    OTHER,
+    OTHER_TEXT,
+    outline,
+    paint,
+    TRACE,
+    WANTED,
+)
+from linkage_ros.drawing.shapes import shapes, skeleton
+from linkage_ros.synthesis.design import COUPLER, CRANK, Design, FourBar, ROCKER
+
+_BEHIND = '#a3a3a3'
+_BEHIND_TEXT = '#5f5f5f'
+
+_EVERY = 6
+"""Of the places of a path, when room for a number is looked for."""
+
+
+def paint_wanted(axes: Any, design: Design, shown: Sequence[Pose], picture: float) -> None:
+    """Paint rays to where rocker pins were wanted, crosses at places, frames of poses."""
+    four_bar = design.four_bar
+    pivot = four_bar.pivots[1]
+    # Below all else, and wide: where a rocker is as wanted its line runs in the middle.
+    pale = {'color': WANTED, 'alpha': 0.3, 'linewidth': 3.5, 'zorder': 0.5}
+    rays = 'wanted rocker angle φ' + _zero(four_bar.rocker, 'its pin at φ')
+    places, frames = 'wanted place of P', 'wanted pose at P (long: x axis)'
+    for one in design.wanted:
+        if one.rocker is not None:
+            end = pivot + _ray(four_bar, one.rocker, picture)
+            axes.plot([pivot.real, end.real], [pivot.imag, end.imag], label=rays, **pale)
+            rays = ''
+        if one.place is not None and one.coupler is None:
+            axes.plot(
+                [one.place.real], [one.place.imag], linestyle='', marker='x', markersize=6.0,
+                markeredgewidth=1.5, color=WANTED, zorder=LAYERS['label'], label=places,
+            )  # fmt: skip
+            places = ''
+        if one.coupler is not None:
+            origin = one.place
+            if origin is None:
+                continue
+            for length, angle in ((0.09, 0.0), (0.055, 0.25 * tau)):
+                end = origin + rect(length * picture, one.coupler + angle)
+                axes.annotate(
+                    '', (end.real, end.imag), (origin.real, origin.imag),
+                    arrowprops={
+                        'arrowstyle': '-|>', 'color': WANTED, 'linewidth': 1.3,
+                        'shrinkA': 0.0, 'shrinkB': 0.0, 'mutation_scale': 7.0,
+                    },
+                    zorder=LAYERS['label'],
+                )  # fmt: skip
+            axes.plot([], [], color=WANTED, linewidth=1.3, label=frames)
+            frames = ''
+    turned = _zero(four_bar.crank, 'crank pin at θ')
+    if turned:
+        axes.plot([], [], ' ', label=turned.lstrip(', '))
+
+
+def paint_traces(axes: Any, ways: Sequence[Branch], drawn: Sequence[Pose]) -> None:
+    """Paint the path of the traced point on every assembly that meets a position."""
+    label = 'path of P'
+    for way in ways:
+        if way.trace and (way.own or not all(pose.own for pose in drawn)):
+            path = drawn_once(way.trace)
+            axes.plot(
+                [p.real for p in path], [p.imag for p in path],
+                color=TRACE if way.own else OTHER, linewidth=1.2 if way.own else 0.8,
+                linestyle=(0, (5, 2)), zorder=LAYERS['path'], label=label if way.own else '',
+            )  # fmt: skip
+            label = '' if way.own else label
+
+
+def paint_poses(axes: Any, drawn: Sequence[Pose], size: float) -> None:
+    """Paint the first as bodies and the others as lines."""
+    first, *others = drawn
+    told: set[str] = set()
+    for pose in others:
+        label = 'other positions' if pose.own else 'met on the other assembly'
+        for line in skeleton(pose.closure, pose.position):
+            axes.plot(
+                [line.start.real, line.end.real],
+                [line.start.imag, line.end.imag],
+                color=_ink(pose), linewidth=1.0 if pose.own else 1.3, marker='o', markersize=2.4,
+                zorder=LAYERS['ghost'] + (0.0 if pose.own else 0.5),
+                label='' if label in told else label,
+            )  # fmt: skip
+            told.add(label)
+    paint(axes, shapes(first.closure, first.position, size, {}))
+    if (COUPLER, 'P') in first.points:
+        place = first.points[COUPLER, 'P']
+        axes.plot([place.real], [place.imag], 'o', color=TRACE, markersize=4.0, zorder=7)
+
+
+def magnify(panel: Any, pose: Pose, link: str) -> None:
+    """Paint a position once more, about a link too short to be seen."""
+    middle, length = 0.5 * sum(_ends(pose, link).values()), _length(pose, link)
+    panel.set_aspect('equal')
+    panel.set_xlim(middle.real - 1.3 * length, middle.real + 1.3 * length)
+    panel.set_ylim(middle.imag - 1.3 * length, middle.imag + 1.3 * length)
+    paint(panel, shapes(pose.closure, pose.position, 0.13 * length, {}))
+    panel.set_xticks([])
+    panel.set_yticks([])
+    ink = INK if pose.own else OTHER
+    for spine in panel.spines.values():
+        spine.set_edgecolor(ink)
+        spine.set_linewidth(0.8 if pose.own else 1.6)
+    times = f'{link} at {pose.number}'
+    panel.set_title(
+        times if pose.own else f'{times}, other assembly',
+        fontsize=7.5, color=INK if pose.own else OTHER_TEXT,
+    )  # fmt: skip
+
+
+def name_ends(panel: Any, pose: Pose, link: str) -> None:
+    """Name the pins of a link that was magnified."""
+    names = Names(panel)
+    for name, place in _ends(pose, link).items():
+        radius = 0.13 * abs(names.pixel(1.0 + 0j) - names.pixel(0j)) * _length(pose, link)
+        names.want(name, (place,), 1.2 * radius, fontsize=7.5, color=INK)
+    lines = skeleton(pose.closure, pose.position)
+    names.place([(line.start, line.end) for line in lines])
+
+
+def write_numbers(
+    axes: Any, design: Design, drawn: Sequence[Pose], ways: Sequence[Branch], size: float
+) -> None:
+    """Write the numbers of positions and wanted values, and the names of the pivots."""
+    names = Names(axes)
+    one_size = abs(names.pixel(complex(size, 0.0)) - names.pixel(0j))
+    count = len(design.wanted)
+    for name, pivot in zip(('O2', 'O4'), design.four_bar.pivots, strict=True):
+        names.want(name, (pivot,), 1.3 * one_size, fontsize=7.5, color=INK)
+    for pose in drawn:
+        a, b = pose.points[CRANK, 'A'], pose.points[ROCKER, 'B']
+        together = abs(names.pixel(a) - names.pixel(b)) < 16.0
+        style = {
+            'fontsize': 8.0,
+            'fontweight': 'bold',
+            'color': (INK if pose is drawn[0] else _BEHIND_TEXT) if pose.own else OTHER_TEXT,
+        }
+        clear = 1.3 * one_size if pose is drawn[0] else 4.0
+        for pin in (0.5 * (a + b),) if together else (a, b):
+            names.want(str(pose.number), (pin,), clear, **style)
+    picture = abs(complex(*(axes.viewLim.max - axes.viewLim.min)))
+    blue = {'fontsize': 7.0, 'color': WANTED}
+    for number, one in enumerate(design.wanted, 1):
+        if not numbered(number, count):
+            continue
+        if one.rocker is not None:
+            end = design.four_bar.pivots[1] + _ray(design.four_bar, one.rocker, picture)
+            names.want(f'{degrees(one.rocker):.4g}°'.replace('-', '−'), (end,), 2.0, **blue)
+        if one.place is not None:
+            names.want(str(number), (one.place,), 5.0, **blue)
+    lines = [outline(shape) for shape in shapes(drawn[0].closure, drawn[0].position, size, {})]
+    lines += [way.trace[::_EVERY] for way in ways if way.trace]
+    for pose in drawn:
+        lines += [(line.start, line.end) for line in skeleton(pose.closure, pose.position)]
+    names.place(lines)
+
+
+def _ink(pose: Pose) -> str:
+    return _BEHIND if pose.own else OTHER
+
+
+def _ray(four_bar: FourBar, angle: float, picture: float) -> complex:
+    """Return the way from O4 through where the rocker's pin is wanted, and a little on."""
+    reach = abs(four_bar.rocker)
+    return rect(reach + 0.045 * picture, angle + phase(four_bar.rocker))
+
+
+def _zero(pin: complex, text: str) -> str:
+    """Return what is to be said of a link whose pin is not on its frame's x axis."""
+    angle = degrees(phase(pin))
+    if abs(remainder(angle, 360.0)) < 1e-9:
+        return ''
+    return f', {text} {"+" if angle > 0.0 else "−"} {abs(angle):.4g}°'
+
+
+def _ends(pose: Pose, link: str) -> dict[str, complex]:
+    found = {name: place for (carrier, name), place in pose.points.items() if carrier == link}
+    return {name: place for name, place in found.items() if name != 'P'}
+
+
+def _length(pose: Pose, link: str) -> float:
+    one, other = _ends(pose, link).values()
+    return abs(other - one)

@@ -1,0 +1,223 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What all pictures share: colours, how shapes are painted, where names go, how it is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from importlib.util import find_spec
+from itertools import pairwise
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+from linkage_ros.drawing.labels import Label, place_labels
+from linkage_ros.drawing.shapes import Circle, Polygon, Segment, Shape
+from linkage_ros.errors import LinkageError
+
+COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000')
+"""Okabe and Ito's, which colour-blind readers can tell."""
+
+WANTED, TRACE, OTHER = COLOURS[0], COLOURS[2], COLOURS[4]
+"""Of a design: what was asked for, what a point traces, what is on the other assembly."""
+
+OTHER_TEXT = '#a86b00'
+"""The last one's, dark enough for a text."""
+
+INK = '#1f2d3a'
+NAME_INK = '#35608a'
+GHOST = '#cfcfcf'
+LAYERS = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
+
+_FACES = {
+    'link': '#c3d3e2',
+    'plate': '#d3e0ecc0',
+    'input': '#f0a07a',
+    'block': '#fff6d6',
+    'tube': '#e8edf2',
+    'ground': '#ffffff',
+}
+_STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
+_STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
+_SETTINGS: Any = {'font.size': 8.0, 'svg.hashsalt': 'linkage_ros', 'axes.linewidth': 0.6}
+
+
+def settings() -> Any:
+    """
+    Return the context in which a picture is made.
+
+    Raises
+    ------
+    LinkageError
+        Where matplotlib is not installed.
+
+    """
+    if find_spec('matplotlib') is None:
+        raise LinkageError(
+            'matplotlib', 'is not installed', 'pip install linkage_ros[report], or apt its package'
+        )
+    import matplotlib as mpl  # local import: an extra, and slow to load
+
+    return mpl.rc_context(_SETTINGS)
+
+
+def save(figure: Any, file: Path) -> None:
+    """
+    Store a picture; the same one is the same bytes.
+
+    Raises
+    ------
+    LinkageError
+        Where the file cannot be written.
+
+    """
+    metadata = {'.png': {'Software': None}, '.svg': {'Date': None}}.get(file.suffix.lower())
+    try:
+        figure.savefig(file, metadata=metadata)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise LinkageError(
+            str(file), f'cannot be written ({reason})', 'name another picture with -o'
+        ) from None
+
+
+def corners(places: Iterable[complex]) -> tuple[complex, complex]:
+    """Return the lower left and the upper right corner of places."""
+    xs, ys = zip(*((p.real, p.imag) for p in places), strict=True)
+    return complex(min(xs), min(ys)), complex(max(xs), max(ys))
+
+
+def outline(shape: Shape) -> tuple[complex, ...]:
+    """Return the places that a shape's edge goes through."""
+    if isinstance(shape, Segment):
+        return shape.start, shape.end
+    if isinstance(shape, Polygon):
+        return (*shape.corners, shape.corners[0])
+    return tuple(shape.centre + shape.radius * way for way in (1, 1j, -1, -1j, 1))
+
+
+def bar_size(picture: float, shortest: float) -> float:
+    """Return half the width of a bar, in [m], for a picture and its shortest link."""
+    return min(0.013 * picture, max(0.26 * shortest, 0.006 * picture))
+
+
+def degree_step(low: float, high: float) -> float:
+    """Return the step of an axis in degrees."""
+    return next((step for step in _STEPS if (high - low) / step <= 8.0), _STEPS[-1])
+
+
+def paint(axes: Any, drawn: Sequence[Shape]) -> None:
+    """Paint shapes, the last on top."""
+    from matplotlib import patches  # local import: an extra, and slow to load
+
+    for shape in drawn:
+        if isinstance(shape, Polygon):
+            corners = [(p.real, p.imag) for p in shape.corners]
+            patch = patches.Polygon(
+                corners,
+                closed=True,
+                facecolor=_FACES[shape.role],
+                edgecolor=INK,
+                linewidth=0.9,
+                joinstyle='round',
+                zorder=LAYERS['shape'],
+            )
+            axes.add_patch(patch)
+        elif isinstance(shape, Circle):
+            centre = (shape.centre.real, shape.centre.imag)
+            axes.add_patch(
+                patches.Circle(
+                    centre,
+                    shape.radius,
+                    facecolor='white',
+                    edgecolor=INK,
+                    linewidth=0.9,
+                    zorder=LAYERS['shape'],
+                )
+            )
+        else:
+            colour, width = _STROKES[shape.role]
+            axes.plot(
+                [shape.start.real, shape.end.real],
+                [shape.start.imag, shape.end.imag],
+                color=colour,
+                linewidth=width,
+                solid_capstyle='round',
+                zorder=LAYERS['shape'],
+            )
+
+
+class Names:
+    """
+    Texts that go where they hide little, all placed together.
+
+    Parameters
+    ----------
+    axes
+        Of a figure that was laid out: only from then on a text has its size.
+
+    """
+
+    def __init__(self, axes: Any) -> None:
+        self._axes = axes
+        self._texts: list[Any] = []
+        self._labels: list[Label] = []
+
+    def pixel(self, place: complex) -> complex:
+        """Return where a place in [m] is, in pixels."""
+        x, y = self._axes.transData.transform((place.real, place.imag))
+        return complex(x, y)
+
+    def want(self, text: str, anchors: Sequence[complex], clear: float, **style: Any) -> None:
+        """Name one of some places, in [m], from a distance in pixels on; the first is the best."""
+        from matplotlib.patheffects import withStroke  # local import: an extra, and slow to load
+
+        written = self._axes.text(
+            0.0, 0.0, text, ha='center', va='center', zorder=LAYERS['label'] + 1,
+            path_effects=[withStroke(linewidth=2.0, foreground='white')], **style,
+        )  # fmt: skip
+        box = written.get_window_extent()
+        self._texts.append(written)
+        found = tuple(map(self.pixel, anchors))
+        self._labels.append(Label(found, box.width + 2.0, box.height, clear))
+
+    def place(self, lines: Iterable[Sequence[complex]]) -> None:
+        """Put them where they hide little of lines from place to place, in [m]."""
+        obstacles = []
+        for line in lines:
+            for start, end in pairwise(map(self.pixel, line)):
+                obstacles += _between(start, end)
+        box = self._axes.get_window_extent()
+        frame = complex(box.x0, box.y0), complex(box.x1, box.y1)
+        back = self._axes.transData.inverted()
+        for written, label, found in zip(
+            self._texts, self._labels, place_labels(self._labels, obstacles, frame), strict=True
+        ):
+            centre, anchor = found
+            written.set_position(back.transform((centre.real, centre.imag)))
+            away = centre - anchor
+            beside = max(abs(away.real) - 0.5 * label.width, abs(away.imag) - 0.5 * label.height)
+            if beside > label.clear + 0.4 * label.height:
+                start, end = (back.transform((p.real, p.imag)) for p in (anchor, centre))
+                self._axes.plot(
+                    [start[0], end[0]], [start[1], end[1]],
+                    color=NAME_INK, linewidth=0.5, zorder=LAYERS['label'],
+                )  # fmt: skip
+
+
+def _between(start: complex, end: complex) -> list[complex]:
+    count = max(1, ceil(abs(end - start) / 4.0))
+    return [start + (end - start) * i / count for i in range(count)]

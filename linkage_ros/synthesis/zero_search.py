@@ -1,0 +1,212 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Three pairs of which only the differences matter: where zero is, on crank and rocker, is free.
+
+Each pair of zeros (α, β) gives Freudenstein's equation another three pairs, θ + α and φ + β, and
+so another four-bar: a family of two parameters, of which most have a defect and few a good
+transmission angle. Random ones are tried by the million, and the best are followed to the place
+where they are best. Half a turn of a zero is the same link with the sign of its length changed, so
+that zeros from 0 to π are all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import degrees, hypot, isfinite, pi, remainder
+
+from linkage_ros.errors import SynthesisError
+from linkage_ros.synthesis.course import Array, Course, course, Flags, least_transmission
+from linkage_ros.synthesis.design import Design, FourBar
+from linkage_ros.synthesis.freudenstein import links
+from linkage_ros.synthesis.needs import distances, Needs
+from linkage_ros.synthesis.pairs import check_pairs, wanted_of
+from linkage_ros.synthesis.proof import assembled
+from linkage_ros.synthesis.study import Found, search
+import numpy as np
+
+_FAR = 90.0
+"""What missing a need counts for beside a degree of transmission angle: more than all of them."""
+
+_LARGEST = 1e6
+"""Links longer than so many grounds, or shorter than one of so many parts, are none."""
+
+_POOL = 4096
+"""How many of a search are looked at again; the best ones lie side by side."""
+
+_APART = 0.1
+"""Designs whose zeros are nearer than this, in [rad], are one."""
+
+_GRID = 7
+_ROUNDS = 24
+
+
+@dataclass(frozen=True, slots=True)
+class ZeroProblem:
+    """
+    What `study.search` tries: zeros of crank and rocker, (α, β), in [rad].
+
+    Attributes
+    ----------
+    crank, rocker
+        Three angles each, in [rad].
+    needs
+        What the design must have.
+
+    """
+
+    crank: tuple[float, ...]
+    rocker: tuple[float, ...]
+    needs: Needs
+
+    def sample(self, generator: np.random.Generator, count: int) -> Array:
+        """Return zeros at random; (count, 2)."""
+        return generator.uniform(0.0, pi, (count, 2))
+
+    def score(self, candidates: Array) -> Array:
+        """
+        Return what is missing of a transmission angle of 90 degrees, in degrees; (count,).
+
+        A need that is not met counts for more than that. Infinite where there is no four-bar, and
+        where one has a defect.
+        """
+        lengths, found, exists = self.courses(candidates)
+        ends = found.directions[:, 0], found.directions[:, -1]
+        angle, _ = least_transmission(lengths, *ends)
+        missed = distances(lengths, angle, self.needs)
+        score = (90.0 - np.degrees(angle)) + _FAR * (missed + (missed > 0.0))
+        return np.where(exists & found.usable, score, np.inf)
+
+    def courses(self, candidates: Array) -> tuple[Array, Course, Flags]:
+        """
+        Return the four-bars of zeros, and how they go through the pairs.
+
+        Returns
+        -------
+        lengths : (count, 4)
+            Of crank, coupler, rocker and ground; all 1 where there is no four-bar.
+        found : Course
+        exists : (count,)
+            Whether there is one.
+
+        """
+        theta, phi = self.crank + candidates[:, :1], self.rocker + candidates[:, 1:]
+        signed = links(theta, phi).lengths
+        size = np.abs(signed)
+        inside = (size < _LARGEST) & (size > 1.0 / _LARGEST)
+        exists: Flags = np.all(inside, axis=-1)
+        signed = np.where(exists[:, None], signed, 1.0)
+        lengths = np.concatenate((np.abs(signed), np.ones((len(signed), 1))), -1)
+        a, c = signed[:, :1], signed[:, 2:]
+        ax, ay = a * np.cos(theta), a * np.sin(theta)
+        bx, by = 1.0 + c * np.cos(phi), c * np.sin(phi)
+        left = (1.0 - ax) * (by - ay) + ay * (bx - ax) > 0.0
+        return lengths, course(lengths, theta + np.where(a < 0.0, pi, 0.0), left), exists
+
+
+def search_zeros(
+    crank: Sequence[float],
+    rocker: Sequence[float],
+    ground: float,
+    needs: Needs,
+    *,
+    seed: int,
+    count: int,
+    keep: int,
+    progress: Callable[[int, int], None] | None = None,
+    address: str = '',
+) -> tuple[Design, ...]:
+    """
+    Return the best four-bars for three pairs whose zeros are free, the best first.
+
+    Those that meet the needs come first, by their transmission angle; then the nearest. None has
+    a defect.
+
+    Parameters
+    ----------
+    crank, rocker
+        Three angles each, in [rad].
+    ground
+        Length of the ground, in [m].
+    needs
+        What the design must have.
+    seed, count, progress, address
+        As in `study.search`.
+    keep
+        How many to return, at most.
+
+    Raises
+    ------
+    SynthesisError
+        Where two pairs are equal, or none of all zeros that were tried gives a four-bar without
+        defects.
+
+    """
+    check_pairs(crank, rocker, ground)
+    needs.check()
+    problem = ZeroProblem(tuple(crank), tuple(rocker), needs)
+    found = search(problem, seed=seed, count=count, keep=_POOL, progress=progress, address=address)
+    found = [one for one in found if isfinite(one.score)]
+    if not found:
+        pairs = ', '.join(
+            f'{degrees(t):.6g}° → {degrees(p):.6g}°' for t, p in zip(crank, rocker, strict=True)
+        )
+        raise SynthesisError(
+            f'pairs {pairs}',
+            f'none of {count} zeros of crank and rocker gives a four-bar without a defect',
+            'try more of them, or move an angle',
+        )
+    spacing = pi / count**0.5
+    best = [_polished(problem, one, spacing) for one in _distinct(found)[: 4 * keep]]
+    return tuple(_design(problem, one.candidate, ground) for one in _distinct(sorted(best))[:keep])
+
+
+def _polished(problem: ZeroProblem, start: Found, radius: float) -> Found:
+    """Return the best place about a candidate: of a grid about it, then of finer ones."""
+    axis = np.linspace(-1.0, 1.0, _GRID)
+    grid = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
+    best = start
+    for _ in range(_ROUNDS):
+        candidates = np.array(best.candidate) + radius * grid
+        scores = problem.score(candidates)
+        i = int(scores.argmin())
+        if scores[i] < best.score:
+            best = Found(float(scores[i]), tuple(candidates[i].tolist()))
+        else:
+            radius *= 0.4
+    return best
+
+
+def _distinct(found: Sequence[Found]) -> list[Found]:
+    """Return the best of those that are near each other, of a list with the best first."""
+    kept: list[Found] = []
+    for one in found:
+        alpha, beta = one.candidate
+        if all(
+            hypot(remainder(alpha - p, pi), remainder(beta - q, pi)) >= _APART
+            for _, (p, q) in kept
+        ):
+            kept.append(one)
+    return kept
+
+
+def _design(problem: ZeroProblem, zeros: Sequence[float], ground: float) -> Design:
+    alpha, beta = zeros
+    theta = np.array(problem.crank) + alpha
+    a, b, c = links(theta, np.array(problem.rocker) + beta).lengths.tolist()
+    four_bar = FourBar.of_lengths(a * ground, b * ground, c * ground, ground, alpha, beta)
+    return assembled(Design(four_bar, wanted_of(problem.crank, problem.rocker)))

@@ -1,0 +1,270 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``linkage synthesize`` as its user types it: a linkage that runs, or why there is none."""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from math import acos, degrees, log10, radians, remainder
+from pathlib import Path
+import re
+
+import pytest
+
+from .conftest import on_terminal, Run
+
+SOURCE_003 = ['--pair', '25', '30', '--pair', '35', '40', '--pair', '50', '60', '--ground', '1.0']
+"""Freudenstein's three positions as a textbook has them; it prints a 5.598, b 0.176, c 4.88."""
+
+# To 50 digits and rounded, worked out apart from this package.
+EXACT_003 = {'crank': 5.5965383934988620854, 'coupler': 0.16985782027961906789}
+EXACT_003 |= {'rocker': 4.8786334643580194266, 'ground': 1.0}
+
+LOG = ['--function', 'log10(x)', '--range', '1', '2']
+RANGES = ['--crank-range', '45', '105', '--rocker-range', '135', '225']
+POSES = ['--pose', '0', '0', '0', '--pose', '1', '0.5', '20', '--pose', '1.5', '1.2', '50']
+MOVING = ['--moving-pivot', '0', '0', '--moving-pivot', '1', '0']
+
+
+def rocker_angle(a: complex, b: float, c: complex, d: float, crank: float) -> float:
+    """Return the rocker's angle in degrees, B on the left of A→O4: two circles that meet."""
+    pin = a * rect(1.0, radians(crank))
+    diagonal = d - pin
+    s = abs(diagonal)
+    at_pivot = acos((s * s + abs(c) ** 2 - b * b) / (2.0 * s * abs(c)))
+    return remainder(degrees(phase(-diagonal) - at_pivot - phase(c)), 360.0)
+
+
+def typed_pairs(a: complex, b: float, c: complex, d: float, cranks: list[float]) -> list[str]:
+    typed = []
+    for crank in cranks:
+        typed += ['--pair', str(crank), repr(rocker_angle(a, b, c, d, crank))]
+    return typed
+
+
+def length(link: str, text: str) -> float:
+    return float(re.search(rf'^{link} +(\S+)', text, re.MULTILINE).group(1))
+
+
+def proof(text: str) -> list[list[str]]:
+    """Return the rows of the first proof."""
+    lines = text.partition('Proof')[2].splitlines()[2:]
+    return [line.split() for line in lines[: lines.index('')]]
+
+
+def test_three_pairs_end_in_a_linkage_that_check_and_run_take(linkage: Run) -> None:
+    made = linkage('synthesize', *SOURCE_003, '-o', 'designed.yaml')
+    assert made.returncode == 0, made.stderr
+    for link, exact in EXACT_003.items():
+        assert length(link, made.stdout) == pytest.approx(exact, rel=1e-9)
+    for words in (
+        '0.178681879707, -0.204975431605, 1.02722248088',
+        'condition',
+        'digits to trust',
+        'branch defect',
+        'double rocker',
+    ):
+        assert words in made.stdout
+    assert [row[3] for row in proof(made.stdout)] == ['left', 'left', 'right']
+    assert all(abs(float(row[4])) < 1e-12 for row in proof(made.stdout))
+
+    checked = linkage('check', 'designed.yaml')
+    assert checked.returncode == 0, checked.stderr
+    assert '5.59654, 0.169858, 4.87863, 1' in checked.stdout
+    solved = linkage('solve', 'designed.yaml', '--at', '25', '--at', '35')
+    assert '30.000000' in solved.stdout
+    assert '40.000000' in solved.stdout
+    ran = linkage('run', 'designed.yaml', '--seconds', '2', '--plain')
+    assert ran.returncode == 0, ran.stderr
+    assert re.search(r'published +[1-9]\d* joint states', ran.stdout)
+
+
+def test_a_negative_length_is_told_as_the_reversed_link_that_it_means(
+    linkage: Run, tmp_path: Path
+) -> None:
+    pairs = typed_pairs(-0.5 + 0j, 1.2, 0.9 + 0j, 1.0, [20.0, 50.0, 95.0])
+    made = linkage('synthesize', *pairs, '-o', 'designed.yaml')
+    assert made.returncode == 0, made.stderr
+    assert '-0.5, reversed: it points away from its angle' in made.stdout
+    assert re.search(r'A: \[-0\.(5|49999)', (tmp_path / 'designed.yaml').read_text())
+    solved = linkage('solve', 'designed.yaml', '--at', '50')
+    shown = float(solved.stdout.split()[-1])
+    assert shown == pytest.approx(rocker_angle(-0.5 + 0j, 1.2, 0.9 + 0j, 1.0, 50.0), abs=1e-5)
+
+
+def test_more_pairs_are_fitted_and_the_error_is_told_and_drawn(
+    linkage: Run, tmp_path: Path
+) -> None:
+    # Seven pairs of a crank-rocker, two of them moved by 1°.
+    pairs = typed_pairs(0.4 + 0j, 1.2, 0.8 + 0j, 1.0, [10.0, 30.0, 50.0, 70.0, 90.0, 110.0, 130.0])
+    pairs[5] = str(float(pairs[5]) + 1.0)
+    pairs[14] = str(float(pairs[14]) - 1.0)
+    made = linkage('synthesize', *pairs, '--draw', 'fit.svg')
+    assert made.returncode == 0, made.stderr
+    by_equation, fitted = (
+        float(re.search(rf'rocker off, {how} +(\S+)°', made.stdout).group(1))
+        for how in ('by the equation', 'fitted')
+    )
+    assert fitted <= by_equation
+    assert fitted < 0.53  # the true linkage's: two of seven are off by 1°
+    assert (tmp_path / 'fit.svg').read_text().startswith('<?xml')
+
+
+def test_pairs_come_from_a_file_too(linkage: Run, tmp_path: Path) -> None:
+    (tmp_path / 'pairs.csv').write_text('crank,rocker\n25,30\n35,40\n# the last\n50,60\n')
+    from_file = linkage('synthesize', '--pairs', 'pairs.csv')
+    assert from_file.returncode == 0, from_file.stderr
+    assert from_file.stdout == linkage('synthesize', *SOURCE_003).stdout
+
+
+@pytest.mark.parametrize('count', [4, 5])
+def test_free_zeros_list_all_solutions_with_the_one_that_made_the_pairs(
+    linkage: Run, count: int
+) -> None:
+    zero = 0.0 if count == 4 else 0.3
+    crank, rocker = rect(0.45, zero), rect(0.9, 0.5)
+    angles = [15.0, 40.0, 70.0, 105.0, 150.0][:count]
+    pairs = typed_pairs(crank, 1.1, rocker, 1.0, angles)
+    made = linkage('synthesize', *pairs, '--free-zeros', '--best', '9')
+    assert made.returncode == 0, made.stderr
+    found = re.findall(
+        r'^crank +(\S+).*\ncoupler +(\S+).*\nrocker +(\S+)', made.stdout, re.MULTILINE
+    )
+    assert [
+        lengths
+        for lengths in found
+        if [float(one) for one in lengths] == pytest.approx([0.45, 1.1, 0.9], abs=1e-6)
+    ]
+
+
+def test_three_pairs_with_free_zeros_are_searched_for_what_is_needed(linkage: Run) -> None:
+    typed = ['--pair', '0', '0', '--pair', '30', '20', '--pair', '60', '45', '--free-zeros']
+    needs = ['--min-transmission', '60', '--max-link-ratio', '4']
+    made = linkage('synthesize', *typed, *needs, '--candidates', '50000', '--best', '1')
+    assert made.returncode == 0, made.stderr
+    assert float(re.search(r'transmission +(\S+)°', made.stdout).group(1)) >= 60.0
+    assert float(re.search(r'link ratio +([\d.]+)', made.stdout).group(1)) <= 4.0
+    assert 'none: order, branch and circuit are right' in made.stdout
+
+
+def test_a_function_tells_its_structural_error(linkage: Run, tmp_path: Path) -> None:
+    made = linkage('synthesize', *LOG, *RANGES, '--draw', 'log.svg', '-o', 'log.yaml')
+    assert made.returncode == 0, made.stderr
+    # P. L. Chebyshev's points of three: 1.5 ∓ 0.5·cos 30°, and the crank's angles there.
+    cranks = [45.0 + 60.0 * (x - 1.0) for x in (1.0669873, 1.5, 1.9330127)]
+    rockers = [135.0 + 90.0 * log10(1.0 + (crank - 45.0) / 60.0) / log10(2.0) for crank in cranks]
+    for row, crank, rocker in zip(proof(made.stdout), cranks, rockers, strict=True):
+        assert float(row[1].rstrip('°')) == pytest.approx(crank, abs=1e-3)
+        assert float(row[2].rstrip('°')) == pytest.approx(rocker, abs=1e-3)
+    assert 'structural error' in made.stdout
+    assert (tmp_path / 'log.svg').exists()
+
+
+def test_a_curve_is_found_again(linkage: Run, tmp_path: Path) -> None:
+    # The coupler point of a crank-rocker, by two circles that meet.
+    lines = ['x,y']
+    for step in range(12):
+        crank = 30.0 * step
+        pin = rect(0.3, radians(crank))
+        rocker = radians(rocker_angle(0.3 + 0j, 1.0, 0.9 + 0j, 1.0, crank))
+        coupler = 1.0 + rect(0.9, rocker) - pin
+        point = pin + coupler * (0.5 + 0.4j)
+        lines.append(f'{point.real!r},{point.imag!r}')
+    (tmp_path / 'curve.csv').write_text('\n'.join(lines))
+    made = linkage(
+        *('synthesize', '--path', 'curve.csv', '--closed', '--candidates', '30000'),
+        *('--best', '1', '--need', 'crank-rocker', '-o', 'found.yaml'),
+    )
+    assert made.returncode == 0, made.stderr
+    assert float(re.search(r'points off +(\S+) m rms', made.stdout).group(1)) < 1e-3
+    assert linkage('check', 'found.yaml').returncode == 0
+
+
+def test_three_poses_are_met_exactly(linkage: Run, tmp_path: Path) -> None:
+    made = linkage('synthesize', *POSES, *MOVING, '-o', 'poses.yaml', '--draw', 'poses.svg')
+    assert made.returncode == 0, made.stderr
+    for row in proof(made.stdout):
+        assert abs(float(row[-1])) < 1e-10
+        assert abs(float(row[-2])) < 1e-12
+    assert (tmp_path / 'poses.yaml').exists()
+
+
+def test_what_is_not_met_is_said_with_the_nearest_and_nothing_is_written(
+    linkage: Run, tmp_path: Path
+) -> None:
+    made = linkage(
+        'synthesize',
+        *SOURCE_003,
+        '--need',
+        'crank-rocker',
+        '--min-transmission',
+        '30',
+        *('-o', 'x.yaml'),
+    )
+    assert made.returncode == 1
+    assert made.stdout.startswith('None of 1 solution(s) has what is needed. Nearest to it:')
+    for words in ('branch defect', 'no crank-rocker', 'not 30°'):
+        assert words in made.stdout
+    assert not (tmp_path / 'x.yaml').exists()
+
+
+WRONG = [
+    # what is typed, what the answer names
+    ([], 'nothing is asked for; name one of --pair'),
+    (['--pair', '1', '2'], 'pairs: there are 1; three make a four-bar'),
+    ([*SOURCE_003, *POSES], '--pair and --pose: stand for two tasks'),
+    (['--pair', '25', '30', '--pair', '25', '30', '--pair', '1', '2'], 'pairs 1 and 2: are the'),
+    (['--pair', '25', '30', '--pair', '385', '30', '--pair', '1', '2'], 'pairs 1 and 2'),
+    (['--pair', '0', '0', '--pair', '20', '20', '--pair', '40', '40'], 'pairs'),
+    (['--pair', '0', '0', '--pair', '20', 'nan', '--pair', '40', '40'], 'pair 2'),
+    ([*SOURCE_003, '--ground', '-1'], 'ground'),
+    ([*SOURCE_003, '--need', 'crankrocker'], "did you mean 'crank-rocker'?"),
+    ([*SOURCE_003, '-o', 'no/such/folder/x.yaml'], 'no/such/folder'),
+    ([*SOURCE_003, '-o', 'x.yaml', '--pick', '2'], '--pick 2: there are 1 solution(s)'),
+    ([*SOURCE_003, '--draw', 'x.xyz'], 'x.xyz'),
+    (['--pairs', 'nothing.csv'], 'nothing.csv: cannot be read'),
+    (['--pairs', 'bad.csv'], 'line 3'),
+    (LOG, '--crank-range is missing'),
+    (['--function', '__import__("os")', '--range', '1', '2', *RANGES], '__import__'),
+    (['--function', 'log10(x)', '--range', '-1', '2', *RANGES], 'is not defined from x = -1 to 0'),
+    (['--function', 'log10(x)', '--range', '1', '1', *RANGES], 'range'),
+    (['--function', '1', '--range', '1', '2', *RANGES], 'function'),
+    ([*LOG, *RANGES, '--points', '2'], 'three make a four-bar'),
+    ([*LOG, *RANGES, '--at', '1', '1.5', '3'], '3'),
+    (['--point', '0', '0', '--point', '1', '0'], 'point'),
+    (['--point', '0', '0', '--point', '1', '0', '--point', '1', 'x'], 'x'),
+    (POSES, 'no pivots are given'),
+    ([*POSES, '--moving-pivot', '0', '0'], '--moving-pivot: was given 1 time(s)'),
+    ([*POSES[:8], *MOVING], 'poses'),
+    ([*POSES[:8], *POSES[:4], *MOVING], 'poses 1 and 3'),
+]
+
+
+@pytest.mark.parametrize(('typed', 'named'), WRONG, ids=[' '.join(row[0]) or '-' for row in WRONG])
+def test_wrong_input_is_answered_in_a_line(
+    linkage: Run, tmp_path: Path, typed: list[str], named: str
+) -> None:
+    (tmp_path / 'bad.csv').write_text('crank,rocker\n25,30\n35\n')
+    answer = linkage('synthesize', *typed)
+    assert answer.returncode == 2
+    assert named in answer.stderr
+    assert 'Traceback' not in answer.stderr
+
+
+def test_a_search_shows_how_far_it_is(tmp_path: Path) -> None:
+    typed = ['--pair', '0', '0', '--pair', '30', '20', '--pair', '60', '45', '--free-zeros']
+    shown = on_terminal(tmp_path, 'synthesize', *typed, '--candidates', '20000', '--best', '1')
+    assert 'transmission' in shown

@@ -1,0 +1,101 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Four-bars with compass and ruler: circles that meet, and positions that are known from it."""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from math import pi, radians, sqrt
+
+from linkage_ros.synthesis.design import Assembly, Design, FourBar, Wanted
+
+Lengths = tuple[float, float, float, float]
+"""Of crank, coupler, rocker and ground."""
+
+
+def cross(one: complex, other: complex) -> float:
+    return (one.conjugate() * other).imag
+
+
+def pins(lengths: Lengths, direction: float) -> list[complex] | None:
+    """
+    Return where B can be, left of A→O4 first, with O2 in the origin and O4 on the x axis.
+
+    The circle about A with the coupler meets the one about O4 with the rocker.
+    """
+    a, b, c, d = lengths
+    crank_pin = rect(a, direction)
+    across = d - crank_pin
+    s = abs(across)
+    along = (s * s + b * b - c * c) / (2.0 * s)
+    square = b * b - along * along
+    if square < 0.0:
+        return None
+    foot, height = crank_pin + across / s * along, across / s * 1j * sqrt(square)
+    return [foot + height, foot - height]
+
+
+def on(side: Assembly, lengths: Lengths, direction: float) -> complex:
+    """Return where B is on an assembly."""
+    found = pins(lengths, direction)
+    assert found is not None
+    return found[side == 'right']
+
+
+def design(
+    lengths: Lengths,
+    positions: list[tuple[float, Assembly]],
+    side: Assembly = 'left',
+    zeros: tuple[float, float] = (0.0, 0.0),
+    ground: float = 0.0,
+) -> Design:
+    """
+    Return a four-bar, wanted where it is at given directions of the crank on given assemblies.
+
+    Parameters
+    ----------
+    lengths
+        Of crank, coupler, rocker and ground.
+    positions
+        Directions of O2→A from O2→O4, in degrees, and assemblies.
+    side
+        The design's own assembly.
+    zeros
+        Where the pins of crank and rocker lie in their frames, in [rad].
+    ground
+        Direction of O2→O4 in the frame of the ground, in [rad].
+
+    """
+    a, b, c, d = lengths
+    alpha, beta = zeros
+    o2 = 0.3 - 0.2j if ground else 0j
+    four_bar = FourBar(
+        (o2, o2 + rect(d, ground)), rect(a, alpha), (0j, b + 0j), rect(c, beta), side
+    )
+    wanted = []
+    for angle, where in positions:
+        direction = radians(angle)
+        rocker = phase(on(where, lengths, direction) - d)
+        wanted.append(Wanted(direction + ground - alpha, rocker + ground - beta))
+    return Design(four_bar, tuple(wanted))
+
+
+def transmission(lengths: Lengths, direction: float) -> float:
+    """Return the acute angle between coupler and rocker."""
+    _, _, _, d = lengths
+    found = pins(lengths, direction)
+    assert found is not None
+    angle = abs(phase((rect(lengths[0], direction) - found[0]) / (d - found[0])))
+    return min(angle, pi - angle)

@@ -1,0 +1,259 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A function becomes pairs of angles: scales, Chebyshev's points, and what cannot be generated."""
+
+from __future__ import annotations
+
+from math import cos, inf, nan, pi, radians, sqrt
+
+from hypothesis import given, strategies
+from linkage_ros.errors import SynthesisError
+from linkage_ros.synthesis.expression import Expression
+from linkage_ros.synthesis.function import (
+    chebyshev,
+    FunctionTask,
+    on_scale,
+    pairs,
+    wanted_rocker,
+)
+from mpmath import mp
+import numpy as np
+from numpy.polynomial.chebyshev import chebval
+import pytest
+
+Case = tuple[str, tuple[float, float], tuple[float, float], tuple[float, float]]
+
+# Formulas that textbooks set, in 50 digits, with ranges of x, crank and rocker in degrees. No
+# printed solution could be read; what is expected is worked out here.
+TASKS: dict[str, tuple[Case, object]] = {
+    'log': (('log10(x)', (1, 2), (45, 105), (135, 225)), mp.log10),
+    'power': (('x^1.5', (1, 4), (30, 120), (60, 150)), lambda x: x * mp.sqrt(x)),
+    'sine': (('sin(x)', (0, pi / 2), (-15, 45), (30, 90)), mp.sin),
+    'reciprocal': (('1/x', (1, 2), (30, 120), (120, 30)), lambda x: 1 / x),
+    'down': (('exp(x)', (1, 0), (135, 55), (60, 130)), mp.exp),
+    'beyond its ends': (('x^2', (-1, 2), (0, 90), (30, 90)), lambda x: x * x),
+}
+
+
+def task_of(case: Case) -> FunctionTask:
+    text, xs, crank, rocker = case
+    return FunctionTask(
+        Expression(text), xs, tuple(map(radians, crank)), tuple(map(radians, rocker))
+    )
+
+
+LOG = task_of(TASKS['log'][0])
+
+
+@pytest.mark.parametrize('count', range(1, 12))
+@pytest.mark.parametrize(('low', 'high'), [(1.0, 2.0), (-3.0, 5.0), (2.0, 1.0), (1e6, 1e6 + 1)])
+def test_precision_points_lie_as_the_cosines_say(low: float, high: float, count: int) -> None:
+    found = chebyshev(low, high, count)
+    with mp.workdps(30):
+        middle, half = (mp.mpf(low) + high) / 2, (mp.mpf(high) - low) / 2
+        expected = [
+            float(middle - half * mp.cos((2 * j - 1) * mp.pi / (2 * count)))
+            for j in range(1, count + 1)
+        ]
+    assert found.tolist() == pytest.approx(expected, rel=4e-16)
+    # They are the zeros of Chebyshev's polynomial of that degree.
+    inner = (2.0 * found - low - high) / (high - low)
+    assert np.max(np.abs(chebval(inner, [0.0] * count + [1.0]))) < 1e-13 * max(abs(low), 1.0) * 10
+
+
+def test_three_points_lie_where_every_textbook_has_them() -> None:
+    by = 0.25 * sqrt(3.0)
+    assert chebyshev(1.0, 2.0, 3).tolist() == pytest.approx([1.5 - by, 1.5, 1.5 + by], rel=1e-15)
+
+
+def test_points_near_the_beginning_have_all_their_digits() -> None:
+    with mp.workdps(30):
+        expected = float(mp.sin(mp.pi / 4000) ** 2)
+    assert chebyshev(0.0, 1.0, 1000)[0] == pytest.approx(expected, rel=1e-15)
+
+
+def test_of_no_points_there_are_none_and_too_many_are_refused() -> None:
+    assert chebyshev(1.0, 2.0, 0).tolist() == chebyshev(1.0, 2.0, -3).tolist() == []
+    with pytest.raises(SynthesisError, match=r'^points: 1001 of them; 1000 do$'):
+        chebyshev(1.0, 2.0, 1001)
+
+
+@pytest.mark.parametrize('name', TASKS)
+def test_pairs_are_those_of_50_digits(name: str) -> None:
+    case, function = TASKS[name]
+    _, (x0, x1), cranks, rockers = case
+    xs = chebyshev(x0, x1, 5)
+    crank, rocker = pairs(task_of(case), xs)
+    with mp.workdps(50):
+        y0, y1 = function(mp.mpf(x0)), function(mp.mpf(x1))
+        for x, theta, phi in zip(xs, crank, rocker, strict=True):
+            x_exact = mp.mpf(float(x))
+            part = (x_exact - x0) / (mp.mpf(x1) - x0)
+            risen = (function(x_exact) - y0) / (y1 - y0)
+            c0, c1, r0, r1 = (mp.mpf(radians(angle)) for angle in (*cranks, *rockers))
+            assert theta == pytest.approx(float(c0 + (c1 - c0) * part), abs=2e-15)
+            assert phi == pytest.approx(float(r0 + (r1 - r0) * risen), abs=4e-15)
+    assert type(crank[0]) is type(rocker[0]) is float
+
+
+@pytest.mark.parametrize('name', TASKS)
+def test_ends_are_exactly_the_ends(name: str) -> None:
+    task = task_of(TASKS[name][0])
+    crank, rocker = pairs(task, task.x_range)
+    assert tuple(crank) == task.crank_range
+    assert tuple(rocker) == task.rocker_range
+    assert tuple(wanted_rocker(task, task.crank_range)) == task.rocker_range
+
+
+@pytest.mark.parametrize('name', TASKS)
+def test_the_wanted_curve_runs_through_the_pairs(name: str) -> None:
+    task = task_of(TASKS[name][0])
+    crank, rocker = pairs(task, chebyshev(*task.x_range, 9))
+    assert wanted_rocker(task, crank) == pytest.approx(rocker, abs=2e-15)
+
+
+def test_the_wanted_curve_keeps_the_shape_of_what_it_is_given() -> None:
+    angles = np.linspace(*LOG.crank_range, 6)
+    assert np.array_equal(
+        wanted_rocker(LOG, angles.reshape(2, 3)).ravel(), wanted_rocker(LOG, angles)
+    )
+
+
+finite = strategies.floats(-3.0, 3.0)
+
+
+@given(finite, finite, finite, finite, strategies.floats(0.0, 1.0))
+def test_an_even_function_turns_the_rocker_evenly(
+    c0: float, c1: float, r0: float, r1: float, part: float
+) -> None:
+    if min(abs(c1 - c0), abs(r1 - r0)) < 0.1:
+        return
+    task = FunctionTask(Expression('7 - 3*x'), (-1.0, 4.0), (c0, c1), (r0, r1))
+    crank = c0 + (c1 - c0) * part
+    assert wanted_rocker(task, crank) == pytest.approx(r0 + (r1 - r0) * part, abs=1e-13)
+
+
+def test_a_function_may_go_beyond_its_ends_and_the_rocker_with_it() -> None:
+    task = task_of(TASKS['beyond its ends'][0])
+    # x = 0 is a third of the way, and y there a third of its range below its beginning.
+    assert wanted_rocker(task, radians(30.0)) == pytest.approx(radians(10.0), abs=1e-15)
+
+
+def test_a_square_root_is_not_asked_for_what_is_below_its_range_by_rounding() -> None:
+    task = task_of(('sqrt(x - 0.1)', (0.1, 0.7), (10, 100), (20, 80)))
+    crank = np.linspace(*task.crank_range, 997)
+    assert np.isfinite(wanted_rocker(task, crank)).all()
+    assert np.isfinite(wanted_rocker(task, np.nextafter(crank, -inf))).all()
+
+
+def test_an_error_is_read_on_the_scale_of_the_function() -> None:
+    found = on_scale(LOG, radians(75.0), radians(-0.9))
+    assert found.x == pytest.approx(1.5)
+    assert found.y == pytest.approx(0.17609125905568124)
+    assert found.percent == pytest.approx(-1.0)
+    assert found.error == pytest.approx(-0.0030102999566398120)
+
+
+def test_an_error_along_a_rocker_that_turns_back_has_the_sign_that_it_has_for_y() -> None:
+    """1/x falls from 1 to 1/2, and the rocker from 120° to 30°: they go the same way."""
+    found = on_scale(task_of(TASKS['reciprocal'][0]), radians(30.0), radians(9.0))
+    assert found.error == pytest.approx(0.05)
+    assert found.percent == pytest.approx(-10.0)
+
+
+@pytest.mark.parametrize(
+    ('xs', 'message'),
+    [
+        ([1.1, 2.1], 'point 2: x = 2.1 lies outside of the range 1 to 2; choose it within'),
+        ([0.9], 'point 1: x = 0.9 lies outside of the range 1 to 2; choose it within'),
+        ([1.1, 1.5, 1.1], 'point 3: x = 1.1 comes a second time; give each point once'),
+        ([nan], 'point 1: x = nan lies outside of the range 1 to 2; choose it within'),
+    ],
+)
+def test_points_that_are_none_are_refused(xs: list[float], message: str) -> None:
+    with pytest.raises(SynthesisError) as caught:
+        pairs(LOG, xs)
+    assert str(caught.value) == message
+
+
+GOOD = ((0, 1), (45, 105), (135, 225))
+
+
+@pytest.mark.parametrize(
+    ('case', 'message'),
+    [
+        (
+            ('x', (1, 1), *GOOD[1:]),
+            'range: begins and ends at 1; let it end where it does not begin',
+        ),
+        (
+            ('x', (0, 1), (45, 45), GOOD[2]),
+            'crank range: begins and ends at 45; let it end where it does not begin',
+        ),
+        (
+            ('x', *GOOD[:2], (90, 90)),
+            'rocker range: begins and ends at 90; let it end where it does not begin',
+        ),
+        (
+            ('x', (0, 1), (0, 360), GOOD[2]),
+            'crank range: 0° to 360° is a full turn or more; keep it below 360°',
+        ),
+        (
+            ('x', *GOOD[:2], (200, -200)),
+            'rocker range: 200° to -200° is a full turn or more; keep it below 360°',
+        ),
+        (('x', (0, nan), *GOOD[1:]), 'range: 0 to nan is none; give it two numbers'),
+        (('x', (0, inf), *GOOD[1:]), 'range: 0 to inf is none; give it two numbers'),
+        (('x', (0, 1), (inf, 0), GOOD[2]), 'crank range: inf to 0.0 is none; give it two numbers'),
+        (
+            ('sin(x)', (0, pi), *GOOD[1:]),
+            (
+                "function 'sin(x)': is 0 both at x = 0 and at 3.141592654, so that both ends of "
+                'the rocker range would be one; let the range end where the function is another'
+            ),
+        ),
+        (
+            ('5', *GOOD),
+            (
+                "function '5': is 5 both at x = 0 and at 1, so that both ends of the rocker range "
+                'would be one; let the range end where the function is another'
+            ),
+        ),
+        (
+            ('x^2', (-1, 1.01), *GOOD[1:]),
+            (
+                "function 'x^2': goes from 1 to 1.0201, but 1.0201 up and down between: "
+                'the rocker would swing by 4567.61°; choose a range without its summits and '
+                'valleys, or a smaller rocker range'
+            ),
+        ),
+    ],
+)
+def test_what_cannot_be_generated_is_refused_in_one_line(case: Case, message: str) -> None:
+    with pytest.raises(SynthesisError) as caught:
+        task_of(case)
+    assert str(caught.value) == message
+
+
+def test_a_range_may_be_narrow() -> None:
+    task = FunctionTask(Expression('x^2'), (1.0, 1.0 + 1e-9), (0.0, 1.0), (0.0, 1.0))
+    assert wanted_rocker(task, 0.5) == pytest.approx(0.5, abs=1e-6)
+
+
+def test_chebyshev_points_of_the_angles_are_those_of_x() -> None:
+    """An even scale takes them along."""
+    crank, _ = pairs(LOG, chebyshev(1.0, 2.0, 4))
+    expected = [75.0 - 30.0 * cos((2 * j - 1) * pi / 8.0) for j in range(1, 5)]
+    assert np.degrees(crank) == pytest.approx(expected, rel=1e-14)

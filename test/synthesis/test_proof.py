@@ -1,0 +1,216 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A design is proved by the closure that a node runs, and put on the assembly that meets it."""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from dataclasses import replace
+from math import pi, radians, sqrt
+import random
+
+from linkage_ros.kinematics.status import Status
+from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.proof import assembled, proofs, prove
+from mpmath import mp, mpf
+import pytest
+
+from .by_hand import design, on
+
+# sources/003, exactly: 25° → 30°, 35° → 40°, 50° → 60°.
+THREE_PAIRS = Design(
+    FourBar.of_lengths(5.5965383934988620854, 0.16985782027961906789, 4.8786334643580194266, 1.0),
+    tuple(Wanted(radians(t), radians(p)) for t, p in ((25, 30), (35, 40), (50, 60))),
+)
+CRANK_ROCKER = (2.0, 7.0, 9.0, 6.0)
+
+
+def test_the_exact_design_of_the_text_meets_two_positions_left_and_one_right() -> None:
+    met = prove(THREE_PAIRS)
+    assert [one.side for one in met] == ['left', 'left', 'right']
+    assert all(one.status is Status.CLOSED for one in met)
+    assert max(abs(one.angle) for one in met) < 1e-13
+
+
+def test_the_links_as_printed_in_the_text_miss_its_angles() -> None:
+    """Of four-digit cosines: a = 5.598, b = 0.176, c = 4.88. Here by circles, with 40 digits."""
+    met = prove(THREE_PAIRS._replace(four_bar=FourBar.of_lengths(5.598, 0.176, 4.88, 1.0)))
+    with mp.workdps(40):
+        a, b, c = mpf('5.598'), mpf('0.176'), mpf('4.88')
+        for (t, p), one in zip(((25, 30), (35, 40), (50, 60)), met, strict=True):
+            crank_pin = a * mp.expj(mp.radians(t))
+            across = 1 - crank_pin
+            along = (abs(across) ** 2 + b**2 - c**2) / (2 * abs(across))
+            height = mp.sqrt(b**2 - along**2)
+            unit = across / abs(across)
+            ways = (crank_pin + unit * (along + 1j * h) for h in (height, -height))
+            errors = [mp.arg(way - 1) - mp.radians(p) for way in ways]
+            best = min(errors, key=abs)
+            assert one.angle == pytest.approx(float(best), abs=1e-13)
+            assert abs(best) > mpf('0.001')
+
+
+def test_an_error_is_what_the_linkage_has_over_what_was_asked() -> None:
+    exact = design(CRANK_ROCKER, [(40.0, 'left'), (90.0, 'left')])
+    asked = (
+        exact.wanted[0]._replace(rocker=exact.wanted[0].rocker - 0.25),
+        exact.wanted[1]._replace(rocker=exact.wanted[1].rocker + 0.001),
+    )
+    met = prove(exact._replace(wanted=asked))
+    assert [one.angle for one in met] == pytest.approx([0.25, -0.001])
+
+
+def test_whole_turns_make_no_error() -> None:
+    exact = design(CRANK_ROCKER, [(40.0, 'left')])
+    turned = Wanted(exact.wanted[0].crank - 4 * pi, exact.wanted[0].rocker + 6 * pi)
+    (met,) = prove(exact._replace(wanted=(turned,)))
+    assert met.angle == pytest.approx(0.0, abs=1e-14)
+
+
+def test_coupler_angles_and_places_are_proved() -> None:
+    """The coupler carries P at 3 + 1i of a frame whose x axis is at 20° to A→B."""
+    a, b, c, d = CRANK_ROCKER
+    tilt = rect(1.0, radians(20.0))
+    four_bar = FourBar((0j, d + 0j), a + 0j, (1j, 1j + b * tilt), c + 0j, 'left', 3 + 1j)
+    wanted = []
+    for angle in (30.0, 200.0):
+        pin = rect(a, radians(angle))
+        along = (on('right', CRANK_ROCKER, radians(angle)) - pin) / b
+        place = pin + (3 + 0j) * along / tilt
+        wanted.append(Wanted(radians(angle), None, phase(along / tilt), place))
+    met = prove(Design(four_bar, tuple(wanted)))
+    assert [one.side for one in met] == ['right', 'right']
+    assert all(abs(one.angle) < 1e-14 and one.distance < 1e-14 for one in met)
+
+    off = [w._replace(coupler=w.coupler + 0.5, place=w.place + 0.3 - 0.4j) for w in wanted]
+    for one in prove(Design(four_bar, tuple(off))):
+        assert one.angle == pytest.approx(-0.5)
+        assert one.distance == pytest.approx(0.5)
+
+
+def test_the_worse_of_rocker_and_coupler_is_told() -> None:
+    exact = design(CRANK_ROCKER, [(40.0, 'left')]).wanted[0]
+    coupler = phase(on('left', CRANK_ROCKER, exact.crank) - rect(2.0, exact.crank))
+    asked = Wanted(exact.crank, exact.rocker + 0.01, coupler - 0.02)
+    (met,) = prove(Design(FourBar.of_lengths(*CRANK_ROCKER), (asked,)))
+    assert met.angle == pytest.approx(0.02)
+
+
+def test_a_position_that_cannot_be_assembled_is_open_by_a_gap() -> None:
+    """With the crank outwards A is 9 m from O4, and the links reach 3."""
+    four_bar = FourBar.of_lengths(4.0, 2.0, 1.0, 5.0)
+    (met,) = prove(Design(four_bar, (Wanted(pi, 0.0),)))
+    assert not met.closed
+    assert met.status is Status.OPEN
+    assert met.gap == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize('off', [-3e-16, 0.0, 3e-16, 1e-14])
+def test_a_position_at_a_toggle_is_met_whatever_rounding_does_to_it(off: float) -> None:
+    """3, 4 and 5: at a right angle of the crank coupler and rocker are stretched."""
+    four_bar = FourBar.of_lengths(3.0, 2.0 - off, 3.0, 4.0)
+    for side in ('left', 'right'):
+        own = replace(four_bar, side=side)
+        (met,) = prove(Design(own, (Wanted(0.5 * pi, phase(3j - 4)),)))
+        assert met.closed
+        assert met.side == side, 'both assemblies are here'
+        assert abs(met.angle) < 1e-6
+
+
+def test_beyond_a_toggle_by_more_than_rounding_it_is_open() -> None:
+    four_bar = FourBar.of_lengths(3.0, 2.0 - 1e-6, 3.0, 4.0)
+    (met,) = prove(Design(four_bar, (Wanted(0.5 * pi, phase(3j - 4)),)))
+    assert met.status is Status.OPEN
+
+
+def test_where_nothing_but_the_crank_is_asked_for_the_own_assembly_does() -> None:
+    for side in ('left', 'right'):
+        four_bar = FourBar.of_lengths(*CRANK_ROCKER, side=side)
+        assert [one.side for one in prove(Design(four_bar, (Wanted(1.0), Wanted(2.0))))] == [
+            side,
+            side,
+        ]
+
+
+def test_a_place_that_both_assemblies_reach_is_met_on_the_own_one() -> None:
+    """A point traced 0.1 nm beside the crank's pin is the same on both, for all that matters."""
+    beside = 1e-10
+    lengths, direction = (2.0, 7.0, 9.0, 6.0), radians(40.0)
+    pin = rect(2.0, direction)
+    right = pin + beside * (on('right', lengths, direction) - pin) / 7.0
+    for side in ('left', 'right'):
+        four_bar = FourBar((0j, 6 + 0j), 2 + 0j, (0j, 7 + 0j), 9 + 0j, side, beside + 0j)
+        (met,) = prove(Design(four_bar, (Wanted(direction, place=right),)))
+        assert met.side == side
+        assert met.distance < 2.0 * beside
+
+
+@pytest.mark.parametrize(
+    ('sides', 'best'),
+    [
+        (['left', 'left', 'right'], 'left'),
+        (['left', 'right', 'right'], 'right'),
+        (['right', 'right', 'right'], 'right'),
+        (['right', 'left'], 'right'),
+        (['left', 'right'], 'left'),
+    ],
+)
+@pytest.mark.parametrize('given', ['left', 'right'])
+def test_a_design_is_put_on_the_assembly_that_meets_most(
+    sides: list, best: str, given: str
+) -> None:
+    angles = (40.0, 100.0, 250.0)
+    found = assembled(design(CRANK_ROCKER, list(zip(angles, sides)), side=given))  # noqa: B905
+    assert found.four_bar.side == best
+
+
+def test_a_position_at_a_toggle_has_no_vote() -> None:
+    lengths = (3.0, 2.0, 3.0, 4.0)
+    toggle = Wanted(0.5 * pi, phase(3j - 4))
+    elsewhere = design(lengths, [(50.0, 'right')])
+    found = assembled(elsewhere._replace(wanted=(toggle, *elsewhere.wanted)))
+    assert found.four_bar.side == 'right'
+    assert [one.side for one in prove(found)] == ['right', 'right']
+
+
+def test_of_a_design_that_only_comes_near_small_errors_do_not_name_the_assembly() -> None:
+    """Near the toggle at 90° both assemblies are a little off, and the other one less so."""
+    lengths = (3.0, 2.0, 3.0, 4.0)
+    left, right = (phase(on(side, lengths, radians(89.99)) - 4.0) for side in ('left', 'right'))
+    middle = 0.5 * (left + right) + 0.1 * (right - left)
+    four_bar = FourBar.of_lengths(*lengths)
+    (met,) = prove(Design(four_bar, (Wanted(radians(89.99), middle),)))
+    assert abs(right - middle) < abs(left - middle) < 2.0 * abs(right - middle)
+    assert met.side == 'left'
+
+
+def test_random_designs_in_odd_frames_are_met_where_they_were_made() -> None:
+    rng = random.Random(5)
+    for _ in range(200):
+        lengths = (*(rng.uniform(1.0, 3.0) for _ in range(3)), 2.0)
+        a, b, c, d = lengths
+        angle = rng.uniform(-180.0, 180.0)
+        s = sqrt(a * a + d * d - 2.0 * a * d * rect(1.0, radians(angle)).real)
+        if not abs(b - c) + 0.05 < s < b + c - 0.05:
+            continue
+        side = rng.choice(('left', 'right'))
+        zeros = rng.uniform(-3.0, 3.0), rng.uniform(-3.0, 3.0)
+        made = design(lengths, [(angle, side)], zeros=zeros, ground=rng.uniform(0.1, 3.0))
+        (met,) = prove(made)
+        assert met.side == side
+        assert abs(met.angle) < 1e-12
+        assert assembled(made).four_bar.side == side
+        left, right = proofs(made)
+        assert max(abs(left[0].angle), abs(right[0].angle)) > 1e-3, 'only one can be right'

@@ -1,0 +1,288 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The structural error of a design is that of the same four-bar with compass and ruler."""
+
+from __future__ import annotations
+
+from cmath import phase
+from collections.abc import Callable
+from dataclasses import replace
+from math import isnan, nan, pi, radians, sqrt, tau
+
+from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.freudenstein import exact
+from linkage_ros.synthesis.function import chebyshev, FunctionTask, pairs, wanted_rocker
+from linkage_ros.synthesis.structural_error import errors_at_positions, structural_error
+from mpmath import mp
+import numpy as np
+import pytest
+
+from . import by_hand
+from .test_function import task_of, TASKS
+
+CRANK_ROCKER = (2.0, 7.0, 9.0, 6.0)
+TOGGLES_AT_90 = (3.0, 2.0, 3.0, 4.0)
+
+
+def rocker_angles(lengths: by_hand.Lengths, crank: np.ndarray, side: str = 'left') -> np.ndarray:
+    """Return the rocker's angles of a four-bar with compass and ruler, without jumps."""
+    d = lengths[3]
+    angles = [phase(by_hand.on(side, lengths, float(angle)) - d) for angle in crank]
+    return np.unwrap(angles)
+
+
+def four_bar(lengths: by_hand.Lengths, side: str = 'left') -> Design:
+    return Design(FourBar.of_lengths(*lengths, side=side), ())
+
+
+class Generated:
+    """
+    A function generator of three points, worked out on its own with 40 digits.
+
+    The equations are solved by elimination as they stand, and the rocker found where two circles
+    meet: on the side on which it is at the first point.
+    """
+
+    def __init__(self, name: str) -> None:
+        case, self.function = TASKS[name]
+        task = task_of(case)
+        self.xs = [mp.mpf(x) for x in task.x_range]
+        self.cranks = [mp.mpf(angle) for angle in task.crank_range]
+        self.rockers = [mp.mpf(angle) for angle in task.rocker_range]
+        points = [mp.mpf(angle) for angle in pairs(task, chebyshev(*task.x_range, 3))[0]]
+        wanted = [self.wanted(theta) for theta in points]
+        rows = [[mp.cos(phi), mp.cos(theta), 1] for theta, phi in zip(points, wanted, strict=True)]
+        right = [mp.cos(theta - phi) for theta, phi in zip(points, wanted, strict=True)]
+        k1, k2, k3 = mp.lu_solve(mp.matrix(rows), mp.matrix(right))
+        self.a, self.c = 1 / k1, -1 / k2
+        self.b = mp.sqrt(self.a**2 + self.c**2 + 1 - 2 * self.a * self.c * k3)
+        self.points = points
+        self.sign = 1
+        if abs(self.error(points[0])) > mp.mpf('1e-20'):
+            self.sign = -1
+
+    def wanted(self, theta: mp.mpf) -> mp.mpf:
+        (x0, x1), (c0, c1), (r0, r1) = self.xs, self.cranks, self.rockers
+        x = x0 + (theta - c0) / (c1 - c0) * (x1 - x0)
+        y, y0, y1 = (self.function(value) for value in (x, x0, x1))
+        return r0 + (y - y0) / (y1 - y0) * (r1 - r0)
+
+    def error(self, theta: mp.mpf) -> mp.mpf:
+        across = 1 - self.a * mp.expj(theta)
+        s = abs(across)
+        along = (s**2 + self.b**2 - self.c**2) / (2 * s)
+        height = mp.sqrt(self.b**2 - along**2)
+        pin = (along + self.sign * height * 1j) * across / s - across
+        if self.c < 0:
+            pin = -pin
+        error = mp.arg(pin) - self.wanted(theta)
+        return error - 2 * mp.pi * mp.nint(error / (2 * mp.pi))
+
+
+def designed(name: str) -> tuple[FunctionTask, Design, Callable[[np.ndarray], np.ndarray]]:
+    task = task_of(TASKS[name][0])
+    design, _ = exact(*pairs(task, chebyshev(*task.x_range, 3)), 1.0)
+    return task, design, lambda crank: wanted_rocker(task, crank)
+
+
+@pytest.fixture(autouse=True)
+def _many_digits() -> object:
+    with mp.workdps(40):
+        yield
+
+
+@pytest.mark.parametrize('name', ['log', 'power', 'sine', 'reciprocal', 'down'])
+def test_the_error_of_a_function_generator_is_that_of_40_digits(name: str) -> None:
+    task, design, wanted = designed(name)
+    reference = Generated(name)
+    assert design.four_bar.lengths[:3] == pytest.approx(
+        [float(abs(length)) for length in (reference.a, reference.b, reference.c)], rel=1e-12
+    )
+    found = structural_error(design, wanted, *task.crank_range)
+    assert found.opens_at is None
+    assert (found.crank[0], found.crank[-1]) == task.crank_range
+    for angle, error in list(zip(found.crank, found.error, strict=True))[::9]:
+        assert error == pytest.approx(float(reference.error(mp.mpf(float(angle)))), abs=2e-14)
+    assert found.greatest == pytest.approx(float(reference.error(mp.mpf(found.at))), abs=2e-14)
+    # Nowhere on a grid of its own is it greater.
+    c0, c1 = reference.cranks
+    grid = [abs(reference.error(c0 + (c1 - c0) * i / 300)) for i in range(301)]
+    assert abs(found.greatest) > float(max(grid)) - 1e-14
+    squares = [(1 if 0 < i < 300 else mp.mpf('0.5')) * e * e for i, e in enumerate(grid)]
+    assert found.rms == pytest.approx(float(mp.sqrt(sum(squares) / 300)), rel=1e-3)
+
+
+@pytest.mark.parametrize('name', ['log', 'power', 'sine', 'reciprocal', 'down'])
+def test_it_is_0_at_the_precision_points_and_changes_its_sign_there(name: str) -> None:
+    task, design, wanted = designed(name)
+    found = structural_error(design, wanted, *task.crank_range)
+    for one in design.wanted:
+        (at,) = np.flatnonzero(found.crank == one.crank)
+        assert found.error[at] == pytest.approx(0.0, abs=1e-12)
+        # The next sample may be the same angle but for its rounding.
+        before, after = found.error[at - 2], found.error[at + 2]
+        assert before * after < 0.0
+        assert min(abs(before), abs(after)) > 1e-8
+    assert errors_at_positions(design) == pytest.approx([0.0] * 3, abs=1e-12)
+
+
+@pytest.mark.parametrize('amplitude', [1e-3, 1e-9])
+@pytest.mark.parametrize('side', ['left', 'right'])
+@pytest.mark.parametrize('direction', [1, -1])
+def test_a_known_error_is_found_with_its_summit_and_mean(
+    amplitude: float, side: str, direction: int
+) -> None:
+    def wanted(crank: np.ndarray) -> np.ndarray:
+        wave = np.sin(3.0 * (crank - 0.2))
+        return rocker_angles(CRANK_ROCKER, crank, side) - amplitude * wave
+
+    ends = (0.2, 0.2 + tau)[::direction]
+    found = structural_error(four_bar(CRANK_ROCKER, side), wanted, *ends)
+    assert abs(found.greatest) == pytest.approx(amplitude, abs=1e-14)
+    wave = 3.0 * (found.at - 0.2)
+    assert abs(np.sin(wave)) == pytest.approx(1.0, abs=1e-14 / amplitude + 1e-14)
+    assert np.sign(found.greatest) == np.sign(np.sin(wave))
+    assert found.rms == pytest.approx(amplitude / sqrt(2.0), rel=1e-4)
+
+
+def test_of_nearly_equal_summits_the_highest_is_told() -> None:
+    """The samples, half a degree apart, see other heights: the order of some is another there."""
+    period = tau / 5.0
+
+    def wave(crank: np.ndarray) -> np.ndarray:
+        return np.sin(tau * crank / period * 1.0137) * (1.0 + 1e-7 * crank)
+
+    found = structural_error(
+        four_bar(CRANK_ROCKER),
+        lambda crank: rocker_angles(CRANK_ROCKER, crank) - wave(crank),
+        0,
+        6,
+    )
+    dense = np.linspace(0.0, 6.0, 1_000_001)
+    heights = np.abs(wave(dense))
+    assert found.at == pytest.approx(dense[np.argmax(heights)], abs=1e-4)
+    assert abs(found.greatest) == pytest.approx(np.max(heights), abs=1e-10)
+
+
+def test_an_even_error_is_its_own_mean() -> None:
+    found = structural_error(
+        four_bar(CRANK_ROCKER), lambda crank: rocker_angles(CRANK_ROCKER, crank) + 0.25, 0.1, 1.3
+    )
+    assert found.error == pytest.approx(np.full_like(found.error, -0.25), abs=1e-14)
+    assert (found.greatest, found.rms) == pytest.approx((-0.25, 0.25))
+
+
+@pytest.mark.parametrize('turns', [-2, 1, 7])
+def test_whole_turns_make_no_error(turns: int) -> None:
+    def wanted(crank: np.ndarray) -> np.ndarray:
+        return rocker_angles(CRANK_ROCKER, crank) + turns * tau
+
+    found = structural_error(four_bar(CRANK_ROCKER), wanted, -1.0, 1.0)
+    assert abs(found.greatest) < 1e-14
+
+
+def test_half_a_turn_is_never_told_as_half_a_turn_back() -> None:
+    """A parallelogram's rocker stands as its crank does, to the last digit."""
+    design = four_bar((1.0, 2.0, 1.0, 2.0))
+    for by in (pi, -pi):
+        found = structural_error(design, lambda crank, by=by: crank + by, 0.5, 2.5)
+        assert np.abs(found.error) == pytest.approx(np.full_like(found.error, pi), abs=1e-14)
+        assert (found.error > -pi).all()
+
+
+@pytest.mark.parametrize(
+    ('low', 'high', 'opens_at'),
+    [
+        (-80.0, 80.0, None),
+        (80.0, -80.0, None),
+        (30.0, 120.0, 90.0),
+        (30.0, -120.0, -90.0),
+        (100.0, 30.0, 100.0),
+        (330.0, 500.0, 450.0),
+        (100.0, 200.0, 100.0),
+        (-90.0, 90.0, None),
+    ],
+)
+def test_where_the_loop_opens_on_the_way_is_told(
+    low: float, high: float, opens_at: float | None
+) -> None:
+    """3, 4 and 5: at ±90° coupler and rocker are stretched, 5 long."""
+    found = structural_error(four_bar(TOGGLES_AT_90), np.zeros_like, radians(low), radians(high))
+    if opens_at is None:
+        assert found.opens_at is None
+        return
+    assert found.opens_at == pytest.approx(radians(opens_at), abs=1e-12)
+    closes = np.cos(found.crank) > 0.0
+    assert np.array_equal(np.isfinite(found.error), closes)
+    assert isnan(found.greatest) == isnan(found.rms) == (not closes.any())
+
+
+def test_between_two_ranges_the_loop_is_open() -> None:
+    """Crank 4, ground 4: A must stay 3 from O4 at least, and 5 at most."""
+    lengths = (4.0, 4.0, 1.0, 4.0)
+    near = 2.0 * np.arcsin(3.0 / 8.0)
+    found = structural_error(four_bar(lengths), np.zeros_like, near + 0.1, -near - 0.1)
+    assert found.opens_at == pytest.approx(near, abs=1e-12)
+    assert np.array_equal(np.isfinite(found.error), np.abs(found.crank) > near)
+
+
+def test_the_greatest_is_looked_for_where_the_loop_closes() -> None:
+    """The rocker goes one way up to the toggle, and fastest there; then there is none."""
+    (start,) = rocker_angles(TOGGLES_AT_90, np.array([radians(60.0)]))
+    found = structural_error(
+        four_bar(TOGGLES_AT_90),
+        lambda crank: np.full_like(crank, start),
+        radians(60.0),
+        radians(120.0),
+    )
+    stretched = phase(3j - 4.0)
+    assert found.at == pytest.approx(radians(90.0), abs=1e-8)
+    assert found.greatest == pytest.approx(stretched - start, abs=1e-4)
+    assert abs(found.greatest) > 0.3
+
+
+def test_links_that_point_the_other_way_and_free_zeros_are_those_of_the_design() -> None:
+    positions = [(20.0, 'left'), (60.0, 'left'), (100.0, 'left')]
+    design = by_hand.design(CRANK_ROCKER, positions, zeros=(pi - 0.3, -2.0), ground=0.7)
+    assert errors_at_positions(design) == pytest.approx([0.0] * 3, abs=1e-13)
+    cranks = [one.crank for one in design.wanted]
+    rockers = [one.rocker for one in design.wanted]
+
+    def wanted(crank: np.ndarray) -> np.ndarray:
+        return np.interp(crank, cranks, np.unwrap(rockers))
+
+    found = structural_error(design, wanted, cranks[0], cranks[-1])
+    for crank in cranks:
+        assert found.error[found.crank == crank] == pytest.approx([0.0], abs=1e-13)
+    assert abs(found.greatest) > 1e-3
+
+
+def test_errors_at_positions_are_those_of_the_own_assembly() -> None:
+    design = by_hand.design(CRANK_ROCKER, [(40.0, 'left'), (90.0, 'right')])
+    errors = errors_at_positions(design)
+    assert errors[0] == pytest.approx(0.0, abs=1e-13)
+    left, right = (
+        phase(by_hand.on(side, CRANK_ROCKER, radians(90.0)) - CRANK_ROCKER[3])
+        for side in ('left', 'right')
+    )
+    assert errors[1] == pytest.approx((left - right + pi) % tau - pi)
+    other = errors_at_positions(design._replace(four_bar=replace(design.four_bar, side='right')))
+    assert other[1] == pytest.approx(0.0, abs=1e-13)
+
+
+def test_where_there_is_no_rocker_angle_there_is_no_error() -> None:
+    wanted = (Wanted(radians(100.0), 0.0), Wanted(0.5, None), Wanted(0.5, nan))
+    errors = errors_at_positions(four_bar(TOGGLES_AT_90)._replace(wanted=wanted))
+    assert np.isnan(errors).all()

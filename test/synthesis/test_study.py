@@ -1,0 +1,137 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A study finds the best of all its candidates, whoever works them out."""
+
+from dataclasses import dataclass
+import sys
+import tracemalloc
+
+from linkage_ros.synthesis.study import CHUNK, Found, search
+import numpy as np
+import pytest
+
+CAST = 3 * CHUNK + 7
+"""Candidates, of which the last chunk has only some."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """A bowl in steps, so that many candidates are worth the same; half of the plane is none."""
+
+    dimensions: int = 2
+    step: float = 0.25
+    none: float = np.inf
+
+    def sample(self, generator, count):
+        return generator.uniform(-1.0, 1.0, (count, self.dimensions))
+
+    def score(self, candidates):
+        scores = np.floor((candidates**2).sum(1) / self.step) * self.step
+        scores[candidates[:, 0] < 0.0] = self.none
+        return scores
+
+
+def every_candidate(problem, seed, count):
+    """Score and sort all there are, at once and by Python's own sort."""
+    chunks = [
+        problem.sample(np.random.default_rng([seed, chunk]), min(CHUNK, count - chunk * CHUNK))
+        for chunk in range(-(-count // CHUNK))
+    ]
+    found = [
+        (score, chunk, index, tuple(candidate))
+        for chunk, candidates in enumerate(chunks)
+        for index, (score, candidate) in enumerate(
+            zip(problem.score(candidates).tolist(), candidates.tolist(), strict=True)
+        )
+        if score < np.inf
+    ]
+    return [Found(score, candidate) for score, _, _, candidate in sorted(found)]
+
+
+@pytest.mark.parametrize('count', [0, 1, CHUNK - 1, CHUNK, CHUNK + 1, CAST])
+@pytest.mark.parametrize('keep', [1, 100, 10 * CHUNK])
+def test_the_best_are_kept_in_the_order_of_score_then_chunk_then_index(count, keep):
+    found = search(Steps(), seed=5, count=count, keep=keep)
+    assert found == every_candidate(Steps(), 5, count)[:keep]
+
+
+@pytest.mark.parametrize('none', [np.inf, np.nan])
+def test_what_is_impossible_is_never_kept(none):
+    found = search(Steps(none=none), seed=5, count=CHUNK, keep=CHUNK)
+    assert len(found) == len(every_candidate(Steps(), 5, CHUNK)) < CHUNK
+    assert all(each.candidate[0] >= 0.0 for each in found)
+
+
+def test_where_nothing_is_possible_nothing_is_found():
+    class Nothing(Steps):
+        def score(self, candidates):
+            return np.full(len(candidates), np.inf)
+
+    assert search(Nothing(), seed=5, count=CAST, keep=10) == []
+
+
+def test_another_seed_is_another_study():
+    studies = [search(Steps(), seed=seed, count=1000, keep=3) for seed in (1, 2, 2**40)]
+    assert studies[0] != studies[1] != studies[2] != studies[0]
+
+
+def test_progress_says_how_many_are_done_and_of_how_many():
+    told = []
+    search(Steps(), seed=5, count=CAST, keep=1, progress=lambda *now: told.append(now))
+    assert told == [(done, CAST) for done in (CHUNK, 2 * CHUNK, 3 * CHUNK, CAST)]
+
+
+def test_a_long_study_needs_no_more_memory_than_a_short_one():
+    assert _peak(40 * CHUNK) < 1.5 * _peak(4 * CHUNK)
+
+
+def _peak(count):
+    tracemalloc.start()
+    search(Steps(), seed=5, count=count, keep=50)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return peak
+
+
+def test_any_number_of_workers_finds_the_same():
+    distributed = pytest.importorskip('distributed')
+    # Workers cannot import this module, whose name only pytest knows: the classes go along. A
+    # local one keeps Dask from trying it by name.
+    pytest.importorskip('cloudpickle').register_pickle_by_value(sys.modules[__name__])
+
+    class SentAlong(Steps):
+        pass
+
+    studies = [{'count': CAST, 'keep': 100}, {'count': 70 * CHUNK + 1, 'keep': 1}]
+    here = [search(SentAlong(), seed=5, **study) for study in studies]
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, host='127.0.0.1', dashboard_address='127.0.0.1:0'
+    ) as cluster:
+        for workers in (1, 2):
+            cluster.scale(workers)
+            cluster.wait_for_workers(workers, timeout=30)
+            for study, expected in zip(studies, here, strict=True):
+                done = [0]
+                found = search(
+                    SentAlong(),
+                    seed=5,
+                    progress=lambda now, _: done.append(now),  # noqa: B023 -- called at once
+                    address=cluster.scheduler_address,
+                    **study,
+                )
+                assert found == expected
+                assert done == sorted(done)
+                assert done[-1] == study['count']
