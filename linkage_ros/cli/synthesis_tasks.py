@@ -30,6 +30,7 @@ from linkage_ros.synthesis.defects import assess, Assessment
 from linkage_ros.synthesis.design import Design
 from linkage_ros.synthesis.freudenstein import exact, fit_equation, ThreePairs
 from linkage_ros.synthesis.needs import misses, Needs
+from linkage_ros.synthesis.proof import Met
 
 if TYPE_CHECKING:
     from linkage_ros.synthesis.function import FunctionTask
@@ -204,17 +205,22 @@ def _fitted(crank: Angles, rocker: Angles, ground: float, free: bool) -> Answer:
     answer = _turned(f'{len(crank)} pairs, nearest', design)
     met = answer.assessment.met
     facts = [
-        ('rocker off, by the equation', _errors([one.angle for one in assess(start).met])),
-        ('rocker off, fitted', _errors([one.angle for one in met])),
+        ('rocker off, by the equation', _errors(assess(start).met)),
+        ('rocker off, fitted', _errors(met)),
     ]
     return answer._replace(
         facts=facts, curve=([one.crank for one in design.wanted], [one.angle for one in met])
     )
 
 
-def _errors(angles: Angles) -> str:
-    rms = hypot(*angles) / len(angles) ** 0.5
-    return f'{degrees(rms):.4g}° rms, {degrees(max(map(abs, angles))):.4g}° at most'
+def _errors(met: Sequence[Met]) -> str:
+    closed = [one.angle for one in met if one.closed]
+    if not closed:
+        return 'no position can be assembled'
+    rms, most = hypot(*closed) / len(closed) ** 0.5, max(map(abs, closed))
+    missed = len(met) - len(closed)
+    beside = f'; {missed} position(s) cannot be assembled' if missed else ''
+    return f'{degrees(rms):.4g}° rms, {degrees(most):.4g}° at most{beside}'
 
 
 def _function(typed: argparse.Namespace, search: Search) -> list[Answer]:
@@ -277,6 +283,7 @@ def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
         typed.closed,
         None if timing is None else tuple(map(radians, timing)),
         typed.free_zeros,
+        search.needs.turning,
     )
     paths = generate_path(
         task,

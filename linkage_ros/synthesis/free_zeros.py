@@ -41,7 +41,7 @@ most, and one or three are real.
 
 A solution is polished by Newton's method on the differences. Its coupler is never imaginary: it
 closes the first pair, and the others with it. A zero turned by π is the same linkage with the
-link reversed: zeros are in (−π/2, π/2], and lengths have signs.
+link reversed: zeros are in [−π/2, π/2], and lengths have signs.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class FreeZeros(NamedTuple):
         Of crank, coupler and rocker, in [m]; crank and rocker are negative where the link points
         the other way.
     alpha, beta
-        Zeros of crank and rocker, in [rad], in (−π/2, π/2]: what the pin's angle has over the
+        Zeros of crank and rocker, in [rad], in [−π/2, π/2]: what the pin's angle has over the
         link's; 0 where it was not free.
     condition
         Of the differences' derivatives by k1, k2 and the free zeros, by the 2-norm, rows and
@@ -227,7 +227,7 @@ def five_pairs(
     P, Q, R = (vectors[4:, i] + 1j * vectors[4:, i + 1] for i in (0, 2, 4))
     form: Array = np.convolve(np.convolve(R, P), np.conj(Q)).imag
     p, q, r = map(np.linalg.norm, (P, Q, R))
-    if noise >= 1.0 or np.max(np.abs(form)) <= noise * (p * q + q * r + r * p):
+    if np.max(np.abs(form)) <= noise * (p * q + q * r + r * p):
         raise _undetermined(5)
     directions: list[tuple[Moved, float, float]] = []
     for s, t in _roots(form):

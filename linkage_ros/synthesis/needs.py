@@ -34,6 +34,7 @@ _KINDS = {
     'double-rocker': ('GRCR', 'SRCR'),
     'triple-rocker': ('RRR1', 'RRR2', 'RRR3', 'RRR4'),
 }
+_TURNING = ('crank-rocker', 'double-crank', 'drag-link', 'turning')
 _WORDS = (*_KINDS, 'grashof', 'non-grashof', 'turning')
 
 # Barker's codes by the shortest link where some link turns fully, by the longest where none does,
@@ -71,6 +72,11 @@ class Needs(NamedTuple):
     transmission: float = 0.0
     link_ratio: float = inf
     usable: bool = False
+
+    @property
+    def turning(self) -> bool:
+        """Return whether the crank must turn fully."""
+        return self.kind in _TURNING
 
     def check(self) -> None:
         """

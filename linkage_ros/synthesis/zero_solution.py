@@ -85,7 +85,7 @@ class Solution(NamedTuple):
     lengths
         Of crank, coupler and rocker, the first and the last signed; (3,).
     zeros
-        α and β, in (−π/2, π/2]; (2,).
+        α and β, in [−π/2, π/2]; (2,).
     condition, sensitivity
         As in `free_zeros.FreeZeros`.
 
@@ -224,12 +224,9 @@ def _inverse(matrix: Array) -> Array:
 
 
 def _acute(angle: float) -> tuple[float, float]:
-    """Return an angle less its half turns, in (−π/2, π/2], and −1.0 where these are odd."""
+    """Return an angle less its half turns, in [−π/2, π/2], and −1.0 where these are odd."""
     halves = round(angle / pi)
-    rest = angle - pi * halves
-    if rest <= -0.5 * pi:
-        rest, halves = rest + pi, halves - 1
-    return rest, -1.0 if halves % 2 else 1.0
+    return angle - pi * halves, -1.0 if halves % 2 else 1.0
 
 
 def _pins(solution: Solution) -> tuple[NDArray[np.complex128], Array]:

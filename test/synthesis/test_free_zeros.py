@@ -109,7 +109,7 @@ def case_of(values: list[float], crank: list[float], sides: list[int], free: Fre
     return Case(*values, crank, [float(phi) for phi in rocker], sensitivity, MOVED[free])
 
 
-def drawn(rng: np.random.Generator, free: Free, mixed: bool) -> Case:
+def drawn(rng: np.random.Generator, free: Free, mixed: bool = False, spread: float = pi) -> Case:
     """Draw a linkage with links of 0.1 to 10 grounds, either way, and as many pairs as needed."""
     count = 3 + len(free)
     while True:
@@ -118,7 +118,7 @@ def drawn(rng: np.random.Generator, free: Free, mixed: bool) -> Case:
         side = int(rng.choice((-1, 1)))
         crank = [
             theta
-            for theta in rng.uniform(-pi, pi, 40).tolist()
+            for theta in (rng.uniform(-pi, pi) + rng.uniform(-spread, spread, 40)).tolist()
             if abs(abs(b) - abs(c))
             < abs(1 - a * np.exp(1j * (theta + zeros[0])))
             < abs(b) + abs(c)
@@ -185,6 +185,20 @@ def test_a_linkage_is_among_the_solutions_of_its_pairs(
             check(case)
             told += 1
     assert told > 0.9 * count
+
+
+@pytest.mark.parametrize(('free', 'spread'), [(ROCKER, 0.01), (CRANK, 0.01), (BOTH, 0.1)])
+def test_pairs_near_each_other_are_worth_what_is_told(free: Free, spread: float) -> None:
+    rng = np.random.default_rng(3)
+    worst = 0.0
+    for _ in range(100):
+        case = drawn(rng, free, spread=spread)
+        lengths = zip(case.sensitivity[:3], (case.a, case.b, case.c), strict=True)
+        lost = U * max(own / abs(length) for own, length in lengths)
+        if lost < 1e-5:
+            assert min(error(case, one) for one in solve(case)) <= MULTIPLE
+            worst = max(worst, lost)
+    assert worst > 1e-7
 
 
 @settings(max_examples=300)
@@ -336,6 +350,43 @@ def test_four_pairs_have_as_many_solutions_as_the_determinant_changes_its_sign(m
     assert seen == {0, 2}
 
 
+def reason(crank: list[float], rocker: list[float]) -> str:
+    """Return why there are no solutions; '' where there are."""
+    try:
+        (four_pairs if len(crank) == 4 else five_pairs)(crank, rocker, 1.0)
+    except SynthesisError as none:
+        return str(none)
+    return ''
+
+
+def discriminant(theta: list[float], phi: list[Any]) -> Any:
+    """Return that of the determinant of four pairs, a quadratic in tan β."""
+    case = Case(1.0, 1.0, 1.0, 0.0, 0.0, theta, phi, [])
+    low, middle, high = (mp.det(mp.matrix(matrix(case, 0, y))) for y in (-1, 0, 1))
+    return ((high - low) / 2) ** 2 - 4 * ((high + low) / 2 - middle) * middle
+
+
+def test_two_solutions_meet_and_vanish() -> None:
+    rng = np.random.default_rng(6)
+    folds = 0
+    while folds < 10:
+        theta, phi = rng.uniform(-pi, pi, (2, 4)).tolist()
+        none, two = rng.uniform(-pi, pi, 2).tolist()
+        if not discriminant(theta, [*phi[:3], none]) < 0 < discriminant(theta, [*phi[:3], two]):
+            continue
+        while abs(two - none) > 1e-8:
+            middle = 0.5 * (none + two)
+            if discriminant(theta, [*phi[:3], middle]) < 0:
+                none = middle
+            else:
+                two = middle
+        for last, count in ((none, 0), (two, 2)):
+            pairs = theta, [*phi[:3], last]
+            found = () if reason(*pairs) else four_pairs(*pairs, 1.0)
+            assert sum(one.moved == 'rocker' for one in found) == count
+        folds += 1
+
+
 def test_the_five_pairs_of_the_weaving_machine_have_one_linkage() -> None:
     crank, rocker = ([radians(angle) for angle in angles] for angles in WEAVING)
     (found,) = five_pairs(crank, rocker, 0.18)
@@ -359,7 +410,7 @@ def test_a_link_counted_from_its_other_end_is_the_same_linkage() -> None:
         assert other.lengths == pytest.approx(
             (-one.lengths[0], one.lengths[1], one.lengths[2]), rel=1e-9
         )
-        assert -pi / 2 < one.alpha <= pi / 2
+        assert -pi / 2 <= one.alpha <= pi / 2
 
 
 def test_lengths_are_those_of_the_ground() -> None:
@@ -368,6 +419,9 @@ def test_lengths_are_those_of_the_ground() -> None:
         assert other.lengths == tuple(0.125 * length for length in one.lengths)
         assert other.design.four_bar.lengths[3] == 0.125
         assert (other.alpha, other.beta) == (one.alpha, one.beta)
+        scale = (0.125, 0.125, 0.125, 1.0, 1.0)
+        scaled = tuple(k * value for k, value in zip(scale, one.sensitivity, strict=True))
+        assert other.sensitivity == scaled
 
 
 def test_a_linkage_that_needs_no_zero_is_listed_once() -> None:
@@ -420,20 +474,25 @@ def test_pairs_that_are_one_spot_are_refused() -> None:
         five_pairs(theta, phi, 1.0)
 
 
+def test_a_linkage_that_rounding_changes_by_a_tenth_is_counted_but_not_returned() -> None:
+    rng = np.random.default_rng(9)
+    counted = 0
+    for _ in range(100):
+        case = drawn(rng, ROCKER, spread=1e-3)
+        if reason(case.crank, case.rocker):
+            continue
+        for one in solve(case):
+            for lost, length in zip(one.sensitivity[:3], one.lengths, strict=True):
+                assert 4.0 * U * lost < 0.1 * abs(length)
+            counted += one.among.vague
+    assert counted
+
+
 def test_the_same_pair_twice_is_refused_with_its_numbers() -> None:
     with pytest.raises(SynthesisError, match='pairs 2 and 4: are the same'):
         four_pairs([0.1, 0.5, 1.0, 0.5], [0.2, 0.7, 0.9, 0.7], 1.0)
     with pytest.raises(SynthesisError, match='pairs 1 and 5: are the same'):
         five_pairs([0.1, 0.5, 1.0, 1.5, 0.1], [0.2, 0.7, 0.9, 0.1, 0.2 + 2.0 * pi], 1.0)
-
-
-def reason(crank: list[float], rocker: list[float]) -> str:
-    """Return why there are no solutions; '' where there are."""
-    try:
-        (four_pairs if len(crank) == 4 else five_pairs)(crank, rocker, 1.0)
-    except SynthesisError as none:
-        return str(none)
-    return ''
 
 
 def test_four_pairs_with_imaginary_zeros_only_are_refused() -> None:

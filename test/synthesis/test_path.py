@@ -162,7 +162,7 @@ ON_A_LINE = (0.50 + 1.06j, -0.83 - 0.27j, -0.34 + 0.22j, -0.13 + 0.43j, 0.22 + 0
     [
         (ON_TWO_CIRCLES, False, 1e-13),
         (ON_TWO_CIRCLES, True, 1e-13),
-        (NEAR_A_CIRCLE, False, 1e-5),  # they are given to eight digits
+        (NEAR_A_CIRCLE, False, 1e-6),
         (ON_A_LINE, False, 1e-13),
     ],
 )
