@@ -198,10 +198,10 @@ def _usefulness(answer: Answer) -> tuple[int, float]:
 
 
 def _fitted(crank: Angles, rocker: Angles, ground: float, free: bool) -> Answer:
-    from linkage_ros.synthesis.angle_fit import fit_angles
+    from linkage_ros.synthesis.angle_fit import nearest
 
     start = fit_equation(crank, rocker, ground)
-    design = fit_angles(start, free_zeros=free)
+    design = nearest(crank, rocker, ground, free_zeros=free)
     answer = _turned(f'{len(crank)} pairs, nearest', design)
     met = answer.assessment.met
     facts = [

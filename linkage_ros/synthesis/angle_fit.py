@@ -20,23 +20,90 @@ Freudenstein's equation weighs a pair by how fast what it leaves grows with the 
 which is little near a toggle and nothing at it; its best four-bar is a start only. Here the links
 are stretched, and turned in their frames where zeros are free, until the sum of squares of the
 rocker's errors is least. Where a loop does not close the rocker points as near as it can come, and
-what the links miss each other by, in rocker lengths, is an error beside the angle's.
+what the links miss each other by is an error beside the angle's, and counts for more.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
 from math import inf, isfinite
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.synthesis.design import Design, FourBar
 from linkage_ros.synthesis.double_double import Array
 from linkage_ros.synthesis.extras import scipy_optimize
+from linkage_ros.synthesis.freudenstein import fit_equation, links
+from linkage_ros.synthesis.pairs import wanted_of
 from linkage_ros.synthesis.proof import SIDES
 import numpy as np
 
 _TOLERANCE = 1e-15
 _TRIALS = 2000
+
+_GAP = 30.0
+"""What a gap counts for beside an angle: a loop that opens is of no use, however small the gap."""
+
+_TRIPLES = 200
+"""How many threes of the pairs are tried as starts, and how many of all starts are fitted."""
+_STARTS = 6
+
+_LONGEST = 100.0
+"""In grounds, of a start's links, or of the ground in a link: what is fitted may go beyond."""
+
+
+def nearest(
+    crank: Sequence[float], rocker: Sequence[float], ground: float, *, free_zeros: bool = False
+) -> Design:
+    """
+    Return the four-bar that comes nearest to more than three pairs.
+
+    Minima are many. It is the best of those that the four-bar of Freudenstein's equation leads to,
+    and some that have three of the pairs exactly; one that closes at all pairs comes before any
+    that does not.
+
+    Parameters
+    ----------
+    crank, rocker
+        More than three angles each, in [rad].
+    ground
+        Length of the ground, in [m].
+    free_zeros
+        Whether the zero angles of crank and rocker are free too; five pairs then, at least.
+
+    Raises
+    ------
+    SynthesisError
+        Where the pairs fix no four-bar.
+    LinkageError
+        Where scipy is not installed.
+
+    """
+    starts = [fit_equation(crank, rocker, ground), *_through_triples(crank, rocker, ground)]
+    starts.sort(key=root_mean_square)
+    fitted = [fit_angles(start, free_zeros=free_zeros) for start in starts[:_STARTS]]
+    return min(fitted, key=lambda one: (_opens(one), root_mean_square(one)))
+
+
+def _opens(design: Design) -> bool:
+    """Return whether the loop is open in one of the positions."""
+    return bool(rocker_errors(design)[len(design.wanted) :].any())
+
+
+def _through_triples(
+    crank: Sequence[float], rocker: Sequence[float], ground: float
+) -> Iterator[Design]:
+    """Yield four-bars that have three of the pairs exactly, on either assembly."""
+    triples = list(combinations(range(len(crank)), 3))
+    chosen = np.array(triples[:: -(-len(triples) // _TRIPLES)])
+    found = links(np.array(crank)[chosen], np.array(rocker)[chosen]).lengths
+    size = np.abs(found)
+    usual = np.all((size < _LONGEST) & (size > 1.0 / _LONGEST), axis=-1)
+    wanted = wanted_of(crank, rocker)
+    for a, b, c in (found[usual] * ground).tolist():
+        for side in SIDES:
+            yield Design(FourBar.of_lengths(a, b, c, ground, side=side), wanted)
 
 
 def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
@@ -75,7 +142,7 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
         start = replace(design.four_bar, side=side)
 
         def errors(changes: Array, start: FourBar = start) -> Array:
-            return rocker_errors(design._replace(four_bar=_changed(start, changes)))
+            return _weighed(design._replace(four_bar=_changed(start, changes)))
 
         best = least_squares(
             errors,
@@ -94,8 +161,19 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
 
 
 def root_mean_square(design: Design) -> float:
-    """Return the root mean square of the rocker's errors on the design's assembly, in [rad]."""
-    return float(np.sqrt((rocker_errors(design) ** 2).sum() / len(design.wanted)))
+    """
+    Return the root mean square of the rocker's errors on the design's assembly, in [rad].
+
+    A gap of one rocker length counts as 30 rad.
+    """
+    return float(np.sqrt((_weighed(design) ** 2).sum() / len(design.wanted)))
+
+
+def _weighed(design: Design) -> Array:
+    """Return the errors as they are squared."""
+    errors = rocker_errors(design)
+    errors[len(design.wanted) :] *= _GAP
+    return errors
 
 
 def rocker_errors(design: Design) -> Array:

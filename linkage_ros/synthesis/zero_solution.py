@@ -16,6 +16,9 @@
 """
 One four-bar with free zeros: polished by Newton's method, and what it is worth.
 
+The last step takes what is left of the equations in sums of two doubles: it may be smaller than
+what their terms are rounded by, and no more may be lost than rounding the angles loses.
+
 Freudenstein's equation of a pair, less that of the first (`free_zeros` has the derivation), is
 
     k1·Im(p·e^{iβ}) + k2·Im(q·e^{iα}) = Im(r·e^{i(α − β)}).
@@ -29,6 +32,16 @@ from math import pi
 from typing import Literal, NamedTuple
 
 from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
+from linkage_ros.synthesis.double_double import (
+    minus,
+    over,
+    plus,
+    sine,
+    sine_cosine,
+    times,
+    two_sum,
+    Twofold,
+)
 from linkage_ros.synthesis.freudenstein import LONGEST, TRUSTED
 import numpy as np
 from numpy.typing import NDArray
@@ -162,6 +175,45 @@ def _left(rows: Differences, unknowns: Array) -> Array:
     return left
 
 
+def _left_exactly(rows: Differences, unknowns: Array) -> Array:
+    """Return what the equations leave, by sums of two doubles; (n − 1,)."""
+    k1, k2, alpha, beta = _twofold(unknowns)
+    by_theta, by_phi = (_half(two_sum(z[1:], -z[:1])) for z in (rows.theta, rows.phi))
+    theta, phi = (_half(two_sum(z[1:], z[:1])) for z in (rows.theta, rows.phi))
+    theta, phi = plus(theta, alpha), plus(phi, beta)
+    P, Q = times(sine(phi), sine(by_phi)), times(sine(theta), sine(by_theta))
+    R = times(sine(minus(theta, phi)), sine(minus(by_theta, by_phi)))
+    left: Array = minus(plus(times(k1, P), times(k2, Q)), R)[0] / rows.size
+    return left
+
+
+def _links(
+    rows: Differences, unknowns: Array, rest: Array
+) -> tuple[float, float, complex, complex, complex]:
+    """
+    Return the lengths of crank and rocker, and where crank, rocker and coupler point at first.
+
+    By sums of two doubles: where the coupler is short, crank and rocker cancel.
+    """
+    (one,) = _twofold(np.ones(1))
+    parts = zip(_twofold(unknowns), _twofold(rest), strict=True)
+    k1, k2, alpha, beta = (plus(value, low) for value, low in parts)
+    a, c = over(one, k1), over((-one[0], one[1]), k2)
+    crank = [times(a, z) for z in sine_cosine(plus((rows.theta[:1], one[1]), alpha))]
+    rocker = [times(c, z) for z in sine_cosine(plus((rows.phi[:1], one[1]), beta))]
+    y, x = minus(rocker[0], crank[0]), plus(one, minus(rocker[1], crank[1]))
+    turned = [complex(x[0].item(), y[0].item()) for y, x in (crank, rocker, (y, x))]
+    return a[0].item(), c[0].item(), turned[0], turned[1], turned[2]
+
+
+def _twofold(values: Array) -> list[Twofold]:
+    return [(value, np.zeros(1)) for value in values[:, None]]
+
+
+def _half(angle: Twofold) -> Twofold:
+    return 0.5 * angle[0], 0.5 * angle[1]
+
+
 def _residual(rows: Differences, unknowns: Array) -> float:
     """Return the largest of what is left, by what rounding the angles does to it."""
     left = np.abs(_left(rows, unknowns)) / rows.noise
@@ -198,17 +250,17 @@ def _valued(rows: Differences, unknowns: Array, free: list[int]) -> Solution:
     of_k1, of_k2, of_alpha, of_beta = np.concatenate(
         (parts * (by - k2 * np.sin(t)), -parts * (by + k1 * np.sin(p))), -1
     )
-    a, c = 1.0 / k1, -1.0 / k2
+    rest = np.zeros(4)
+    rest[free] = -inverse[free] @ (rows.size * _left_exactly(rows, unknowns))
+    a, c, crank, rocker, coupler = _links(rows, unknowns, rest)
     of_a, of_c = -a * a * of_k1, c * c * of_k2
     # The coupler closes the first pair, whose own angles turn crank and rocker too.
-    crank, rocker = a * np.exp(1j * t[0]), c * np.exp(1j * p[0])
-    coupler = 1.0 + rocker - crank
     of_t, of_p = of_alpha.copy(), of_beta.copy()
     of_t[0] += 1.0
     of_p[len(p)] += 1.0
     moved = rocker * (of_c / c + 1j * of_p) - crank * (of_a / a + 1j * of_t)
     of_b = (np.conj(coupler) * moved).real / abs(coupler)
-    (alpha, sign_a), (beta, sign_c) = _acute(alpha), _acute(beta)
+    (alpha, sign_a), (beta, sign_c) = _acute(alpha + rest[2]), _acute(beta + rest[3])
     values = np.array([sign_a * a, abs(coupler), sign_c * c, alpha, beta])
     angles = np.abs(np.concatenate((rows.theta, rows.phi)))
     lost = np.abs(np.stack((of_a, of_b, of_c, of_alpha, of_beta)))

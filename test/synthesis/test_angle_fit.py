@@ -24,7 +24,7 @@ from math import acos, pi, radians, remainder, tau
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.angle_fit import fit_angles, rocker_errors, root_mean_square
+from linkage_ros.synthesis.angle_fit import fit_angles, nearest, rocker_errors, root_mean_square
 from linkage_ros.synthesis.design import Assembly, Design, FourBar, Wanted
 from linkage_ros.synthesis.freudenstein import fit_equation
 from linkage_ros.synthesis.proof import closure_of
@@ -160,6 +160,28 @@ def test_free_zeros_come_nearer() -> None:
     start = fit_equation(crank, rocker, ground)
     free = fit_angles(start, free_zeros=True)
     assert root_mean_square(free) < 0.2 * root_mean_square(fit_angles(start))
+
+
+@pytest.mark.parametrize('number', range(12))
+def test_no_linkage_comes_nearer_than_the_nearest(number: int) -> None:
+    """Noise on eight pairs: the linkage that they were taken of is one that must be beaten."""
+    generator = np.random.default_rng([11, number])
+    true = None
+    while true is None:
+        a, b, c = np.exp(generator.uniform(-1.2, 1.2, 3)).tolist()
+        angles = np.sort(generator.uniform(-1.0, 1.0) + generator.uniform(0.0, 2.0, 8)).tolist()
+        true = sampled(FourBar.of_lengths(a, b, c, 1.0), angles)
+    off = generator.normal(0.0, 0.03, 8).tolist()
+    noisy = true._replace(
+        wanted=tuple(
+            one._replace(rocker=one.rocker + by) for one, by in zip(true.wanted, off, strict=True)
+        )
+    )
+    crank, rocker = ([getattr(one, link) for one in noisy.wanted] for link in ('crank', 'rocker'))
+    found = nearest(crank, rocker, 1.0)
+    assert root_mean_square(found) <= root_mean_square(noisy)
+    from_equation = fit_angles(fit_equation(crank, rocker, 1.0))
+    assert root_mean_square(found) <= root_mean_square(from_equation) * (1.0 + 1e-9)
 
 
 def test_the_same_each_time() -> None:
