@@ -34,6 +34,7 @@ from linkage_ros.drawing.design_curves import (
     paint_error,
 )
 from linkage_ros.drawing.design_linkage import (
+    arrow_ends,
     magnify,
     name_ends,
     paint_poses,
@@ -158,6 +159,8 @@ def _frame(
     places = [place for pose in drawn for place in pose.points.values()]
     places += [one.place for one in design.wanted if one.place is not None]
     places += [place for way in ways if way.own for place in way.trace]
+    low, high = corners(places)
+    places += arrow_ends(design, 1.15 * abs(high - low))
     low, high = corners(places)
     margin = 0.07 * abs(high - low)
     # Pivots stand on ground that is drawn, and rays of wanted angles go beyond their pins.

@@ -65,14 +65,10 @@ def paint_wanted(axes: Any, design: Design, shown: Sequence[Pose], picture: floa
                 markeredgewidth=1.5, color=WANTED, zorder=LAYERS['label'], label=places,
             )  # fmt: skip
             places = ''
-        if one.coupler is not None:
-            origin = one.place
-            if origin is None:
-                continue
-            for length, angle in ((0.09, 0.0), (0.055, 0.25 * tau)):
-                end = origin + rect(length * picture, one.coupler + angle)
+        if one.place is not None and one.coupler is not None:
+            for end in _axes_of(one.place, one.coupler, picture):
                 axes.annotate(
-                    '', (end.real, end.imag), (origin.real, origin.imag),
+                    '', (end.real, end.imag), (one.place.real, one.place.imag),
                     arrowprops={
                         'arrowstyle': '-|>', 'color': WANTED, 'linewidth': 1.3,
                         'shrinkA': 0.0, 'shrinkB': 0.0, 'mutation_scale': 7.0,
@@ -84,6 +80,16 @@ def paint_wanted(axes: Any, design: Design, shown: Sequence[Pose], picture: floa
     turned = _zero(four_bar.crank, 'crank pin at θ')
     if turned:
         axes.plot([], [], ' ', label=turned.lstrip(', '))
+
+
+def arrow_ends(design: Design, picture: float) -> list[complex]:
+    """Return how far the frames of wanted poses go."""
+    return [
+        end
+        for one in design.wanted
+        if one.place is not None and one.coupler is not None
+        for end in _axes_of(one.place, one.coupler, picture)
+    ]
 
 
 def paint_traces(axes: Any, ways: Sequence[Branch], drawn: Sequence[Pose]) -> None:
@@ -190,6 +196,11 @@ def write_numbers(
 
 def _ink(pose: Pose) -> str:
     return _BEHIND if pose.own else OTHER
+
+
+def _axes_of(place: complex, angle: float, picture: float) -> tuple[complex, complex]:
+    """Return the ends of the x and the y axis of a pose."""
+    return place + rect(0.09 * picture, angle), place + rect(0.055 * picture, angle + 0.25 * tau)
 
 
 def _ray(four_bar: FourBar, angle: float, picture: float) -> complex:

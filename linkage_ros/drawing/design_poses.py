@@ -26,13 +26,13 @@ from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.ranges import InputRange
 from linkage_ros.kinematics.survey import Way
 from linkage_ros.synthesis.design import Assembly, COUPLER, Design, Wanted
-from linkage_ros.synthesis.proof import closure_of, Met, prove, SIDES
+from linkage_ros.synthesis.proof import closed_position, closure_of, Met, prove, SIDES
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_SAMPLES = 721
+_SAMPLES = 481
 _TURNS = (False, False)
 
 
@@ -105,7 +105,7 @@ def poses(design: Design) -> tuple[list[Pose], list[int]]:
     found, open_ = [], []
     for number, (wanted, met) in enumerate(zip(design.wanted, prove(design), strict=True), 1):
         closure = closures[met.side]
-        position = closure.position(wanted.crank)
+        position = closed_position(closure, wanted.crank)
         if position.joints:
             own = met.side == design.four_bar.side
             found.append(Pose(number, wanted, met, own, closure, position))

@@ -39,9 +39,9 @@ equations are linear and homogeneous in six real numbers. What they leave is a p
 and in it R·P·Q* = k1·k2 must be real: a cubic form in s and t, so that three solutions fit at
 most, and one or three are real.
 
-A solution is polished by Newton's method on the differences. Its coupler is never imaginary: it
-closes the first pair, and the others with it. A zero turned by π is the same linkage with the
-link reversed: zeros are in [−π/2, π/2], and lengths have signs.
+A solution is polished by Newton's method on the differences (`zero_solution`). Its coupler is
+never imaginary: it closes the first pair, and the others with it. A zero turned by π is the same
+linkage with the link reversed: zeros are in [−π/2, π/2], and lengths have signs.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class FreeZeros(NamedTuple):
         columns scaled to length 1. It does not know of the angles' nearness; sensitivity does.
     sensitivity
         Of crank, coupler, rocker, α and β: Σ|x ∂L/∂x| + ``abs(L)`` over all angles x. Times 2⁻⁵³
-        it is what rounding the angles alone can make of each.
+        it is what rounding the angles alone can make of each; errors are within twice that.
     among
         Of all solutions that the pairs have, this one among them.
 

@@ -111,7 +111,7 @@ def closure_of(design: Design, side: Assembly) -> Closure:
 
 
 def _met(closure: Closure, side: Assembly, wanted: Wanted) -> Met:
-    position = _position(closure, wanted.crank)
+    position = closed_position(closure, wanted.crank)
     if not position.joints:
         return Met(side, 0.0, 0.0, position.status, position.gap)
     coupler, rocker = position.joints
@@ -126,7 +126,7 @@ def _met(closure: Closure, side: Assembly, wanted: Wanted) -> Met:
     return Met(side, max(errors, key=abs), distance, position.status)
 
 
-def _position(closure: Closure, crank: float) -> Position:
+def closed_position(closure: Closure, crank: float) -> Position:
     """
     Close the loop; what is beyond an end of the range by rounding only is at that end.
 

@@ -128,7 +128,8 @@ def marks(axes: Any) -> list[complex]:
     return [
         complex(line.get_xdata()[0], line.get_ydata()[0])
         for line in axes.get_lines()
-        if len(line.get_xdata()) == 1 and colors.to_hex(line.get_markerfacecolor()) == WANTED.lower()
+        if len(line.get_xdata()) == 1
+        and colors.to_hex(line.get_markerfacecolor()) == WANTED.lower()
     ]
 
 
@@ -257,6 +258,15 @@ def test_a_position_that_does_not_close_is_left_out_and_named():
     found = drawn(design)
     assert 'position 4: the loop does not close' in legend(found.left)
     assert len(marks(found.right)) == 3
+
+
+def test_a_position_beyond_a_toggle_by_rounding_is_drawn_there():
+    toggle = acos((A * A + 1.0 - (C - B) ** 2) / (2.0 * A))
+    rocker = closed_left(EXAMPLE.four_bar, toggle + 1e-9)[2]
+    design = EXAMPLE._replace(wanted=(Wanted(toggle - 1e-10, rocker), *EXAMPLE.wanted[1:]))
+    found = drawn(design)
+    assert not any('does not close' in said for said in legend(found.left))
+    assert marks(found.right)[0].real == pytest.approx(degrees(toggle), abs=1e-6)
 
 
 def test_a_design_that_closes_nowhere_is_refused(tmp_path):
