@@ -28,8 +28,8 @@ import sys
 
 from mpmath import mp
 
-from . import kinds, rounding
-from .digits import COUPLER, PRECISION
+from .synthesis_page import kinds, rounding
+from .synthesis_page.digits import COUPLER, PRECISION
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'synthesis.md'

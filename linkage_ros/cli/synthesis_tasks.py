@@ -28,13 +28,13 @@ from linkage_ros.cli.typed_numbers import numbers_of
 from linkage_ros.errors import LinkageError
 from linkage_ros.synthesis.defects import assess, Assessment
 from linkage_ros.synthesis.design import Design
-from linkage_ros.synthesis.freudenstein import exact, fit_equation, ThreePairs
 from linkage_ros.synthesis.needs import misses, Needs
+from linkage_ros.synthesis.pairs.freudenstein import exact, fit_equation, ThreePairs
 from linkage_ros.synthesis.proof import Met
 
 if TYPE_CHECKING:
-    from linkage_ros.synthesis.function import FunctionTask
-    from linkage_ros.synthesis.structural_error import StructuralError
+    from linkage_ros.synthesis.function.structural_error import StructuralError
+    from linkage_ros.synthesis.function.task import FunctionTask
 
 CANDIDATES = 200_000
 """How many a search tries where nobody says."""
@@ -154,7 +154,7 @@ _LINKS = ('crank', 'coupler', 'rocker')
 
 
 def _searched(crank: Angles, rocker: Angles, ground: float, search: Search) -> list[Answer]:
-    from linkage_ros.synthesis.zero_search import search_zeros
+    from linkage_ros.synthesis.pairs.zero_search import search_zeros
 
     designs = search_zeros(
         crank,
@@ -183,7 +183,7 @@ def _turned(what: str, design: Design) -> Answer:
 
 
 def _with_zeros(crank: Angles, rocker: Angles, ground: float) -> list[Answer]:
-    from linkage_ros.synthesis.free_zeros import five_pairs, four_pairs
+    from linkage_ros.synthesis.pairs.free_zeros import five_pairs, four_pairs
 
     solve, what = (four_pairs, 'four pairs') if len(crank) == 4 else (five_pairs, 'five pairs')
     found = []
@@ -198,7 +198,7 @@ def _usefulness(answer: Answer) -> tuple[int, float]:
 
 
 def _fitted(crank: Angles, rocker: Angles, ground: float, free: bool) -> Answer:
-    from linkage_ros.synthesis.angle_fit import nearest
+    from linkage_ros.synthesis.pairs.angle_fit import nearest
 
     start = fit_equation(crank, rocker, ground)
     design = nearest(crank, rocker, ground, free_zeros=free)
@@ -224,9 +224,9 @@ def _errors(met: Sequence[Met]) -> str:
 
 
 def _function(typed: argparse.Namespace, search: Search) -> list[Answer]:
-    from linkage_ros.synthesis.expression import Expression
-    from linkage_ros.synthesis.function import chebyshev, FunctionTask, pairs, wanted_rocker
-    from linkage_ros.synthesis.structural_error import structural_error
+    from linkage_ros.synthesis.function.expression import Expression
+    from linkage_ros.synthesis.function.structural_error import structural_error
+    from linkage_ros.synthesis.function.task import chebyshev, FunctionTask, pairs, wanted_rocker
 
     for name in ('range', 'crank_range', 'rocker_range'):
         if getattr(typed, name) is None:
@@ -252,7 +252,7 @@ def _function(typed: argparse.Namespace, search: Search) -> list[Answer]:
 
 
 def _structural(task: FunctionTask, error: StructuralError) -> Iterator[tuple[str, str]]:
-    from linkage_ros.synthesis.function import on_scale
+    from linkage_ros.synthesis.function.task import on_scale
 
     if error.opens_at is not None:
         opens = degrees(error.opens_at)
@@ -271,8 +271,8 @@ def _radians(angles: Sequence[float]) -> tuple[float, float]:
 
 
 def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
-    from linkage_ros.synthesis.path import generate_path
-    from linkage_ros.synthesis.path_task import PathTask
+    from linkage_ros.synthesis.path.generate import generate_path
+    from linkage_ros.synthesis.path.task import PathTask
 
     rows = typed.point or numbers_of(typed.path, (2, 3))
     timing = typed.timing
@@ -306,8 +306,8 @@ def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
 
 
 def _motion(typed: argparse.Namespace, _search: Search) -> list[Answer]:
-    from linkage_ros.synthesis.motion import from_fixed_pivots, from_moving_pivots
-    from linkage_ros.synthesis.poses import Pose
+    from linkage_ros.synthesis.motion.generate import from_fixed_pivots, from_moving_pivots
+    from linkage_ros.synthesis.motion.poses import Pose
 
     fixed, moving = typed.fixed_pivot, typed.moving_pivot
     if bool(fixed) == bool(moving):

@@ -25,9 +25,9 @@ import pytest
 
 mpmath = pytest.importorskip('mpmath')
 
-rounding = import_module('docs.rounding')
-digits = import_module('docs.digits')
-kinds = import_module('docs.kinds')
+rounding = import_module('docs.synthesis_page.rounding')
+digits = import_module('docs.synthesis_page.digits')
+kinds = import_module('docs.synthesis_page.kinds')
 make_synthesis = import_module('docs.make_synthesis')
 
 PAGE = make_synthesis.PAGE.read_text('utf-8')

@@ -24,9 +24,14 @@ from math import acos, pi, radians, remainder, tau
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.angle_fit import fit_angles, nearest, rocker_errors, root_mean_square
 from linkage_ros.synthesis.design import Assembly, Design, FourBar, Wanted
-from linkage_ros.synthesis.freudenstein import fit_equation
+from linkage_ros.synthesis.pairs.angle_fit import (
+    fit_angles,
+    nearest,
+    rocker_errors,
+    root_mean_square,
+)
+from linkage_ros.synthesis.pairs.freudenstein import fit_equation
 from linkage_ros.synthesis.proof import closure_of
 import numpy as np
 import pytest

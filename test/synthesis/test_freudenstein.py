@@ -31,7 +31,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import SynthesisError
 from linkage_ros.synthesis.double_double import sine_cosine
-from linkage_ros.synthesis.freudenstein import exact, fit_equation, links, three_pairs, TRUSTED
+from linkage_ros.synthesis.pairs.freudenstein import (
+    exact,
+    fit_equation,
+    links,
+    three_pairs,
+    TRUSTED,
+)
 from linkage_ros.synthesis.proof import prove
 from mpmath import cos, lu_solve, matrix, mp, mpf, sin, sqrt
 import numpy as np

@@ -20,8 +20,8 @@ from math import cos, inf, nan, pi, radians, sqrt
 
 from hypothesis import given, strategies
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.expression import Expression
-from linkage_ros.synthesis.function import (
+from linkage_ros.synthesis.function.expression import Expression
+from linkage_ros.synthesis.function.task import (
     chebyshev,
     FunctionTask,
     on_scale,

@@ -22,9 +22,9 @@ from math import inf, pi
 import pickle
 from typing import Any
 
-from linkage_ros.synthesis.path_aim import Aim
-from linkage_ros.synthesis.path_fit import allowed, improve
-from linkage_ros.synthesis.path_search import problem_of
+from linkage_ros.synthesis.path.aim import Aim
+from linkage_ros.synthesis.path.fit import allowed, improve
+from linkage_ros.synthesis.path.search import problem_of
 import numpy as np
 import pytest
 

@@ -17,8 +17,8 @@
 from __future__ import annotations
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.expression import Expression
-from linkage_ros.synthesis.undefined import check_defined
+from linkage_ros.synthesis.function.expression import Expression
+from linkage_ros.synthesis.function.undefined import check_defined
 import pytest
 
 

@@ -42,7 +42,7 @@ from linkage_ros.synthesis.double_double import (
     two_sum,
     Twofold,
 )
-from linkage_ros.synthesis.freudenstein import LONGEST, TRUSTED
+from linkage_ros.synthesis.pairs.freudenstein import LONGEST, TRUSTED
 import numpy as np
 from numpy.typing import NDArray
 

@@ -54,9 +54,8 @@ from typing import NamedTuple
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.diagonal import SMALLEST
 from linkage_ros.synthesis.design import Design, FourBar
-from linkage_ros.synthesis.pairs import check_pairs, wanted_of
-from linkage_ros.synthesis.proof import assembled
-from linkage_ros.synthesis.zero_solution import (
+from linkage_ros.synthesis.pairs.checks import check_pairs, wanted_of
+from linkage_ros.synthesis.pairs.zero_solution import (
     Differences,
     differences,
     Lost,
@@ -66,6 +65,7 @@ from linkage_ros.synthesis.zero_solution import (
     same,
     Solution,
 )
+from linkage_ros.synthesis.proof import assembled
 import numpy as np
 from numpy.typing import NDArray
 

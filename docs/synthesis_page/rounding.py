@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 from linkage_ros.synthesis.defects import assess
 from linkage_ros.synthesis.design import Design
-from linkage_ros.synthesis.freudenstein import exact, three_pairs, ThreePairs
+from linkage_ros.synthesis.pairs.freudenstein import exact, three_pairs, ThreePairs
 from mpmath import mp, mpf
 import numpy as np
 

@@ -32,7 +32,7 @@ class Fitted(NamedTuple):
     Attributes
     ----------
     rows
-        (n, 9), as in `path_model`.
+        (n, 9), as in `model`.
     angles
         Of the crank from the ground line at the points, (n, N).
     side

@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from linkage_ros.synthesis.double_double import Array
-from linkage_ros.synthesis.system import System
+from linkage_ros.synthesis.pairs.system import System
 import numpy as np
 
 

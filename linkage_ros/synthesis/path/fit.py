@@ -17,7 +17,7 @@
 Coupler curves brought nearer to their points: many four-bars at once, each from its own start.
 
 K. Levenberg (1944) and D. W. Marquardt (1963): steps of least squares on the distances themselves
-(`path_steps`), damped until they help. A step that opens the loop on its way, or takes the points
+(`steps`), damped until they help. A step that opens the loop on its way, or takes the points
 out of order, does not help, whatever the distances say. So that none ends at such an edge far from
 the answer, toggles are kept off by a guard at first: the cotangent of the transmission angle
 counts as a distance.
@@ -26,9 +26,9 @@ counts as a distance.
 from __future__ import annotations
 
 from linkage_ros.kinematics.batch.arrays import Array, Mask
-from linkage_ros.synthesis.path_aim import Aim, Fitted
-from linkage_ros.synthesis.path_model import closes, folds, Slopes, slopes
-from linkage_ros.synthesis.path_steps import step
+from linkage_ros.synthesis.path.aim import Aim, Fitted
+from linkage_ros.synthesis.path.model import closes, folds, Slopes, slopes
+from linkage_ros.synthesis.path.steps import step
 import numpy as np
 
 _TURN = 2.0 * np.pi

@@ -16,8 +16,8 @@
 """
 Path generation: four-bars whose coupler point passes as near as can be to given points.
 
-Many are drawn and laid upon the points (`path_search`), the best are brought nearer
-(`path_fit`), and what is left of them are distinct linkages. A coupler curve has nine numbers: up
+Many are drawn and laid upon the points (`search`), the best are brought nearer
+(`fit`), and what is left of them are distinct linkages. A coupler curve has nine numbers: up
 to nine points can be met exactly without timing (H. Alt, Über die Erzeugung gegebener ebener
 Kurven mit Hilfe des Gelenkvierecks, Zeitschrift für angewandte Mathematik und Mechanik 3 (1923)
 13-19), and five with it. Of fewer points there are endlessly many exact answers; those with the
@@ -40,12 +40,12 @@ from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.batch.arrays import Array
 from linkage_ros.synthesis.course import least_transmission
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
-from linkage_ros.synthesis.path_aim import Aim, Fitted
-from linkage_ros.synthesis.path_arcs import fractions
-from linkage_ros.synthesis.path_fit import improve
-from linkage_ros.synthesis.path_model import LENGTHS, slopes
-from linkage_ros.synthesis.path_search import problem_of
-from linkage_ros.synthesis.path_task import PathTask
+from linkage_ros.synthesis.path.aim import Aim, Fitted
+from linkage_ros.synthesis.path.arcs import fractions
+from linkage_ros.synthesis.path.fit import improve
+from linkage_ros.synthesis.path.model import LENGTHS, slopes
+from linkage_ros.synthesis.path.search import problem_of
+from linkage_ros.synthesis.path.task import PathTask
 from linkage_ros.synthesis.study import search
 import numpy as np
 from numpy.typing import NDArray

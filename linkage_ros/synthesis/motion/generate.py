@@ -31,8 +31,8 @@ from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.batch.arrays import Complex
 from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
-from linkage_ros.synthesis.pivots import fixed_pivots, Links, moving_pivots, TRUSTED
-from linkage_ros.synthesis.poses import check_task, columns, Pose
+from linkage_ros.synthesis.motion.pivots import fixed_pivots, Links, moving_pivots, TRUSTED
+from linkage_ros.synthesis.motion.poses import check_task, columns, Pose
 from linkage_ros.synthesis.proof import assembled
 import numpy as np
 

@@ -24,7 +24,7 @@ from math import degrees, inf, isfinite, remainder, tau
 from linkage_ros.errors import SynthesisError
 from linkage_ros.synthesis.design import Wanted
 from linkage_ros.synthesis.double_double import Array
-from linkage_ros.synthesis.system import differences
+from linkage_ros.synthesis.pairs.system import differences
 import numpy as np
 
 MOVE = 'move one of the angles'

@@ -39,10 +39,10 @@ from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar
 from linkage_ros.synthesis.double_double import Array
-from linkage_ros.synthesis.pairs import centred, check_pairs, dependent, MOVE, wanted_of
+from linkage_ros.synthesis.pairs.checks import centred, check_pairs, dependent, MOVE, wanted_of
+from linkage_ros.synthesis.pairs.sensitivity import condition, doubt, gradient
+from linkage_ros.synthesis.pairs.system import solved
 from linkage_ros.synthesis.proof import assembled
-from linkage_ros.synthesis.sensitivity import condition, doubt, gradient
-from linkage_ros.synthesis.system import solved
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -235,7 +235,7 @@ def fit_equation(crank: Sequence[float], rocker: Sequence[float], ground: float)
     Design the four-bar that comes nearest to three pairs or more, by Freudenstein's equation.
 
     What is least is the sum of squares of what the equation leaves, not of the rocker's error;
-    `angle_fit.fit_angles` starts from here.
+    `angle_fit.nearest` starts from here.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import floor, isfinite, log10
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.expression import Array, Expression, named
+from linkage_ros.synthesis.function.expression import Array, Expression, named
 import numpy as np
 
 _SAMPLES = 2000

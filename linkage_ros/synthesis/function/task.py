@@ -30,8 +30,8 @@ from math import degrees, isfinite, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.expression import Array, Expression, named
-from linkage_ros.synthesis.undefined import check_defined
+from linkage_ros.synthesis.function.expression import Array, Expression, named
+from linkage_ros.synthesis.function.undefined import check_defined
 import numpy as np
 from numpy.typing import ArrayLike
 

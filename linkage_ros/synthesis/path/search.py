@@ -36,9 +36,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from linkage_ros.kinematics.batch.arrays import Array, Complex
-from linkage_ros.synthesis.path_aim import Aim, Fitted
-from linkage_ros.synthesis.path_arcs import along, fractions, resampled, theta_at
-from linkage_ros.synthesis.path_model import coupler_directions, diagonals
+from linkage_ros.synthesis.path.aim import Aim, Fitted
+from linkage_ros.synthesis.path.arcs import along, fractions, resampled, theta_at
+from linkage_ros.synthesis.path.model import coupler_directions, diagonals
 from linkage_ros.synthesis.study import Problem
 import numpy as np
 
