@@ -250,7 +250,8 @@ def matrix(case: Case, x: Any, y: Any) -> list[list[Any]]:
 
 def minor(case: Case, without: int, x: Any, y: Any) -> Any:
     rows = matrix(case, x, y)
-    return mp.det(mp.matrix(rows[:without] + rows[without + 1 :]))
+    rows.pop(without)
+    return mp.det(mp.matrix(rows))
 
 
 def resultants(case: Case) -> list[tuple[Any, Any]]:

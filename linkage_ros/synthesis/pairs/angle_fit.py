@@ -88,7 +88,8 @@ def nearest(
 
 def _opens(design: Design) -> bool:
     """Return whether the loop is open in one of the positions."""
-    return bool(rocker_errors(design)[len(design.wanted) :].any())
+    _, gaps = np.split(rocker_errors(design), 2)
+    return bool(gaps.any())
 
 
 def _through_triples(
@@ -171,9 +172,8 @@ def root_mean_square(design: Design) -> float:
 
 def _weighed(design: Design) -> Array:
     """Return the errors as they are squared."""
-    errors = rocker_errors(design)
-    errors[len(design.wanted) :] *= _GAP
-    return errors
+    angles, gaps = np.split(rocker_errors(design), 2)
+    return np.concatenate((angles, _GAP * gaps))
 
 
 def rocker_errors(design: Design) -> Array:
