@@ -159,13 +159,13 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
     freedoms.add_argument('--seed', type=_whole, default=0, help='of the search (here 0)')
     freedoms.add_argument(
         '--candidates',
-        type=_whole,
+        type=_count,
         default=CANDIDATES,
         metavar='N',
         help=f'how many are tried in a search (here {CANDIDATES})',
     )
     freedoms.add_argument(
-        '--best', type=_whole, default=3, metavar='K', help='how many are listed (here 3)'
+        '--best', type=_count, default=3, metavar='K', help='how many are listed (here 3)'
     )
     freedoms.add_argument(
         '--dask',
@@ -200,6 +200,13 @@ def _whole(text: str) -> int:
     number = int(text)
     if not 0 <= number < 2**53:
         raise argparse.ArgumentTypeError(f'{text} is no number to count by; write 0 or more')
+    return number
+
+
+def _count(text: str) -> int:
+    number = _whole(text)
+    if not number:
+        raise argparse.ArgumentTypeError('0 is none; write 1 or more')
     return number
 
 

@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from math import degrees, inf, log
+from math import degrees, inf, log, pi
 from typing import NamedTuple
 
 from linkage_ros.errors import did_you_mean, SynthesisError
@@ -88,6 +88,16 @@ class Needs(NamedTuple):
             With the nearest word.
 
         """
+        if not 0.0 <= self.transmission <= 0.5 * pi:
+            raise SynthesisError(
+                'transmission angle',
+                f'{degrees(self.transmission):g}° is none',
+                'need one from 0 to 90 degrees',
+            )
+        if not self.link_ratio >= 1.0:
+            raise SynthesisError(
+                'link ratio', f'{self.link_ratio:g} is none', 'need one of 1 or more'
+            )
         if self.kind and self.kind not in _WORDS:
             raise SynthesisError(
                 self.kind,

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from math import inf, log, radians
+from math import inf, log, nan, radians
 import random
 
 from linkage_ros.errors import SynthesisError
@@ -165,3 +165,18 @@ def test_many_at_once_are_as_far_as_each_alone() -> None:
 def _closes(lengths: Lengths, angle: float) -> bool:
     a, b, c, d = lengths
     return abs(b - c) + 1e-3 < abs(d - a * np.exp(1j * radians(angle))) < b + c - 1e-3
+
+
+@pytest.mark.parametrize(
+    ('needs', 'said'),
+    [
+        (Needs(transmission=-0.1), r'^transmission angle: -5\.7'),
+        (Needs(transmission=1.6), r'^transmission angle: 91\.'),
+        (Needs(transmission=nan), '^transmission angle: nan° is none'),
+        (Needs(link_ratio=0.99), r'^link ratio: 0\.99 is none'),
+        (Needs(link_ratio=nan), '^link ratio: nan is none'),
+    ],
+)
+def test_what_cannot_be_needed_is_refused(needs: Needs, said: str) -> None:
+    with pytest.raises(SynthesisError, match=said):
+        needs.check()
