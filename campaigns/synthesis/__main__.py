@@ -32,7 +32,7 @@ from bench.machine import describe_machine
 from bench.report import say, show, Table
 from campaigns.synthesis.families import FAMILIES
 from campaigns.synthesis.run import make, Part, parts, run, Tally
-from linkage_ros.synthesis.freudenstein import links, three_pairs, TRUSTED
+from linkage_ros.synthesis.pairs.freudenstein import links, three_pairs, TRUSTED
 import numpy as np
 
 

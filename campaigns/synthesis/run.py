@@ -30,7 +30,7 @@ from random import Random
 from typing import NamedTuple
 
 from campaigns.synthesis.families import Case, draw, FAMILIES
-from linkage_ros.synthesis.freudenstein import three_pairs, TRUSTED
+from linkage_ros.synthesis.pairs.freudenstein import three_pairs, TRUSTED
 import numpy as np
 from numpy.typing import NDArray
 
