@@ -131,13 +131,13 @@ def _of_pairs(
         return _searched(crank, rocker, ground, search)
     if count == 3:
         design, found = exact(crank, rocker, ground)
-        return [Answer('three pairs, exact', design, assess(design), list(_worth(found, ground)))]
+        return [Answer('three pairs, exact', design, assess(design), list(_worth(found)))]
     if count <= 5 and free:
         return _with_zeros(crank, rocker, ground)
     return [_fitted(crank, rocker, ground, free)]
 
 
-def _worth(found: ThreePairs, ground: float) -> list[tuple[str, str]]:
+def _worth(found: ThreePairs) -> list[tuple[str, str]]:
     k1, k2, k3 = found.k
     slopes = abs(found.gradient).max(-1) / abs(found.lengths) * radians(_SHIFT)
     digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, found.digits, strict=True)]
@@ -189,7 +189,13 @@ def _with_zeros(crank: Angles, rocker: Angles, ground: float) -> list[Answer]:
     found = []
     for one in solve(crank, rocker, ground):
         answer = _turned(what, one.design)
-        found.append(answer._replace(facts=[('condition', f'{one.condition:.4g}')]))
+        digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, one.digits, strict=True)]
+        facts = [
+            ('found', str(one.among)),
+            ('condition', f'{one.condition:.4g}'),
+            ('digits to trust', ', '.join(digits)),
+        ]
+        found.append(answer._replace(facts=facts))
     return sorted(found, key=_usefulness)
 
 

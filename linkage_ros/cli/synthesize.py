@@ -41,6 +41,10 @@ _NOT_MET = 1
 """Exit code where there are solutions and none has what is needed."""
 
 
+_LISTED = 3
+"""How many solutions of a search are listed where nobody says."""
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     _add_tasks(parser)
@@ -165,7 +169,10 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
         help=f'how many are tried in a search (here {CANDIDATES})',
     )
     freedoms.add_argument(
-        '--best', type=_count, default=3, metavar='K', help='how many are listed (here 3)'
+        '--best',
+        type=_count,
+        metavar='K',
+        help=f'how many are listed (of a search {_LISTED}, else all)',
     )
     freedoms.add_argument(
         '--dask',
@@ -180,7 +187,9 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     needs = needs_of(arguments)
     with progress('candidates') as told:
         typed = arguments
-        search = Search(needs, typed.seed, typed.candidates, typed.best, typed.dask, told)
+        search = Search(
+            needs, typed.seed, typed.candidates, typed.best or _LISTED, typed.dask, told
+        )
         found = answers(typed, search)
     meeting = [one for one in found if not misses(one.assessment, needs)]
     if not meeting:

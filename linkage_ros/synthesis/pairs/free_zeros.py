@@ -48,13 +48,14 @@ from __future__ import annotations
 
 from cmath import phase
 from collections.abc import Iterator, Mapping, Sequence
-from math import cos, hypot, pi, sin
+from math import cos, hypot, log10, pi, sin
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.diagonal import SMALLEST
+from linkage_ros.kinematics.diagonal import SMALLEST, UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar
 from linkage_ros.synthesis.pairs.checks import check_pairs, wanted_of
+from linkage_ros.synthesis.pairs.freudenstein import TRUSTED
 from linkage_ros.synthesis.pairs.zero_solution import (
     Differences,
     differences,
@@ -141,6 +142,16 @@ class FreeZeros(NamedTuple):
     condition: float
     sensitivity: tuple[float, ...]
     among: Count
+
+    @property
+    def digits(self) -> tuple[float, float, float]:
+        """Return how many digits of a, b and c can be trusted, 0 to 16."""
+        lost = (
+            TRUSTED * UNIT_ROUNDOFF * part / abs(length)
+            for part, length in zip(self.sensitivity[:3], self.lengths, strict=True)
+        )
+        crank, coupler, rocker = (min(max(-log10(part), 0.0), 16.0) for part in lost)
+        return crank, coupler, rocker
 
 
 def four_pairs(
