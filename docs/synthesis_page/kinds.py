@@ -24,9 +24,8 @@ from pathlib import Path
 from shlex import split
 from typing import NamedTuple
 
-from linkage_ros.cli.synthesis_tasks import Answer, answers, Search
-from linkage_ros.cli.synthesize import add_arguments, needs_of
-from linkage_ros.synthesis.needs import distance, misses
+from linkage_ros.cli.synthesis_tasks import Answer
+from linkage_ros.cli.synthesize import add_arguments, solutions
 
 from .markdown import prose
 
@@ -103,13 +102,8 @@ def answer_to(kind: Kind) -> Answer:
     """Return the first solution that the command line shows."""
     parser = argparse.ArgumentParser()
     add_arguments(parser)
-    typed = parser.parse_args(split(kind.command))
-    needs = needs_of(typed)
-    found = answers(
-        typed, Search(needs, typed.seed, typed.candidates, typed.best, typed.dask, _untold)
-    )
-    meeting = [one for one in found if not misses(one.assessment, needs)]
-    return min(meeting or found, key=lambda one: distance(one.assessment, needs))
+    found, _ = solutions(parser.parse_args(split(kind.command)), _untold)
+    return found[0]
 
 
 def chapter(folder: Path) -> Iterator[str]:

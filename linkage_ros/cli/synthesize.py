@@ -29,7 +29,7 @@ from shlex import quote
 import sys
 from threading import Event
 
-from linkage_ros.cli.progress import progress
+from linkage_ros.cli.progress import progress, Told
 from linkage_ros.cli.synthesis_tables import tables
 from linkage_ros.cli.synthesis_tasks import Answer, answers, CANDIDATES, Search
 from linkage_ros.cli.tables import show
@@ -184,18 +184,12 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Design; return 1 where no solution has what is needed."""
-    needs = needs_of(arguments)
     with progress('candidates') as told:
-        typed = arguments
-        search = Search(
-            needs, typed.seed, typed.candidates, typed.best or _LISTED, typed.dask, told
-        )
-        found = answers(typed, search)
-    meeting = [one for one in found if not misses(one.assessment, needs)]
+        found, meeting = solutions(arguments, told)
     if not meeting:
         print(f'None of {len(found)} solution(s) has what is needed. Nearest to it:\n')
-    nearest = sorted(found, key=lambda one: distance(one.assessment, needs))
-    shown = (meeting or nearest)[: arguments.best]
+    needs = needs_of(arguments)
+    shown = found[: arguments.best]
     _show(shown, needs)
     _draw(arguments.draw, shown)
     if not meeting:
@@ -203,6 +197,17 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     if arguments.output is not None:
         _write(arguments, shown)
     return 0
+
+
+def solutions(typed: argparse.Namespace, told: Told) -> tuple[list[Answer], bool]:
+    """Return all solutions that have what is needed, or the nearest to it; and whether they do."""
+    needs = needs_of(typed)
+    keep = typed.best or _LISTED
+    found = answers(typed, Search(needs, typed.seed, typed.candidates, keep, typed.dask, told))
+    meeting = [one for one in found if not misses(one.assessment, needs)]
+    if meeting:
+        return meeting, True
+    return sorted(found, key=lambda one: distance(one.assessment, needs)), False
 
 
 def _whole(text: str) -> int:
