@@ -20,7 +20,7 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy synthesis round_trips gallery schema cost effects lint format
-.PHONY: clean
+.PHONY: clean damage
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
@@ -29,6 +29,7 @@ help:
 	@echo 'make accuracy  prove the kinematics on 11 million cases (30 min)'
 	@echo 'make synthesis compute and draw what docs/synthesis.md says'
 	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
+	@echo 'make damage    read and recover a bag cut at every byte, spoilt in every bit'
 	@echo 'make gallery   draw the linkages that come with the package'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
 	@echo 'make cost      measure what every effect costs, into docs/cost.md'
@@ -73,6 +74,9 @@ synthesis: $(STAMP)
 
 round_trips: $(STAMP)
 	@$(BIN)/python -m campaigns.synthesis
+
+damage: $(STAMP)
+	@$(BIN)/python -m campaigns.damage
 
 gallery: $(STAMP)
 	@$(BIN)/python docs/make_gallery.py

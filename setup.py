@@ -55,6 +55,8 @@ ROS = ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces']
 REPORT = ['matplotlib', 'rich']
 # Where a linkage is fitted or searched for; exact synthesis needs numpy only.
 DESIGN = ['scipy']
+# Bags as Parquet; as CSV they need nothing.
+EXPORT = ['pyarrow']
 # For studies that outgrow one machine.
 DASK = ['distributed']
 # The name `test` matters: colcon runs pytest only when it finds it in this extra.
@@ -70,6 +72,7 @@ TEST = [
     'scipy',
     'mujoco>=3',
     *DASK,
+    *EXPORT,
 ]
 # What the speed of the kinematics is measured against.
 BENCH = ['pylinkage[numba]>=1.3,<1.4']
@@ -125,8 +128,9 @@ setup(
         'report': REPORT,
         'design': DESIGN,
         'dask': DASK,
+        'export': EXPORT,
         'test': TEST,
-        'dev': [*ROS, *REPORT, *DESIGN, *DASK, *TEST, *BENCH, *STYLE, *COLCON],
+        'dev': [*ROS, *REPORT, *DESIGN, *DASK, *EXPORT, *TEST, *BENCH, *STYLE, *COLCON],
     },
     zip_safe=True,
     entry_points={

@@ -24,11 +24,14 @@ and end where the bag says so, not by the scene's timeline: somebody may have as
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 import json
+import platform
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.bag.reader import Bag, RUN_FILE
+from linkage_ros import __version__
+from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
+from linkage_ros.bag.run_events import Made, recorded_events, run_account, Taken, VERSIONS
 from linkage_ros.cdr import text_of
 from linkage_ros.errors import BagError
 from linkage_ros.joint_state import JointStateWriter
@@ -37,7 +40,7 @@ from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from linkage_ros.faults.injection import Change
+    from linkage_ros.faults.injection import Change, Injection
 
 
 class ReplayedTick(NamedTuple):
@@ -75,7 +78,14 @@ def recorded_scene(bag: Bag) -> Scene:
         Where this version cannot read it.
 
     """
-    run = _run(bag)
+    missing = {RUN_FILE, SCENE_FILE} - set(bag.attachments)
+    if missing:
+        raise BagError(
+            bag.path,
+            f'carries no {", ".join(sorted(missing))}',
+            'name a bag that linkage_ros has recorded',
+        )
+    run = run_account(bag)
     files = {name: data for name, data in bag.attachments.items() if name.endswith('.yaml')}
     if len(files) < 2:
         raise BagError(
@@ -86,49 +96,45 @@ def recorded_scene(bag: Bag) -> Scene:
 
 def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
     """Run a scene over a bag's samples; yield every tick of which the bag holds a message."""
-    run = _run(bag)
-    # Where crank and joint states share a topic, as in the tick: by their joints.
-    shared = run.crank_topic == run.joint_states_topic
-    own = JointStateWriter(scene.joints).names if shared else b''
-    outputs = {topic: number for number, topic in enumerate((run.joint_states_topic, *run.extras))}
+    for tick in replay_all(bag, scene, bag.messages()):
+        if tick.recorded or any(tick.recorded_extras):
+            yield tick
+
+
+def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterator[ReplayedTick]:
+    """
+    Run a scene over a bag's samples; yield the ticks that withheld their messages, too.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+    scene
+        The scene that it carries.
+    messages
+        The bag's.
+
+    """
     pipeline = Pipeline(scene)
     closures, injection = pipeline.closures, pipeline.injection
     last = 0
-    open_tick: tuple[int, list[bytes], Tick] | None = None  # more of its messages may follow
-    for topic, log_time, publish_time, data in bag.messages():
-        published = outputs.get(topic)
-        if topic == run.crank_topic and not (published == 0 and data.startswith(own, 12)):
-            published = None
-        elif published is None and topic not in (run.faults_topic, run.withheld_topic):
-            continue
-        if published is not None and open_tick is not None:
-            time, recorded, _ = open_tick
-            if time == publish_time and not any(recorded[published:]):
-                recorded[published] = data
-                continue
-        if open_tick is not None:
-            yield _replayed(open_tick)
-            open_tick = None
-        if log_time < last:
+    for event in recorded_events(run_account(bag), own_head(scene), messages):
+        if event.log_time < last:
             pipeline = Pipeline(scene, closures, injection)
-        last = log_time
-        if published is not None:
-            open_tick = publish_time, [b''] * len(outputs), pipeline.tick(publish_time)
-            open_tick[1][published] = data
-        elif topic == run.faults_topic:
-            if injection is not None:
-                injection.turn(*read_change(data))
-        elif topic == run.withheld_topic:
-            pipeline.tick(publish_time)
-        else:
-            pipeline.offer(data, log_time)
-    if open_tick is not None:
-        yield _replayed(open_tick)
+        last = event.log_time
+        if isinstance(event, Made):
+            joint_states, *extras = event.messages
+            tick = pipeline.tick(event.time)
+            yield ReplayedTick(event.time, joint_states, tuple(extras), tick)
+        elif isinstance(event, Taken):
+            pipeline.offer(event.data, event.log_time)
+        elif injection is not None:
+            turn(bag, injection, event.data)
 
 
-def _replayed(tick: tuple[int, list[bytes], Tick]) -> ReplayedTick:
-    time, (joint_states, *extras), now = tick
-    return ReplayedTick(time, joint_states, tuple(extras), now)
+def own_head(scene: Scene) -> bytes:
+    """Return what the joint states of a scene have behind their stamp."""
+    return JointStateWriter(scene.joints).names
 
 
 def change_text(change: Change, kind: str) -> str:
@@ -142,36 +148,17 @@ def read_change(message: bytes) -> tuple[str, bool]:
     return str(said['fault']), bool(said['injected'])
 
 
-class _Run(NamedTuple):
-    """What a run's account of itself says; of topics that there are not, ''."""
-
-    scene: str
-    scene_folder: str
-    crank_topic: str
-    joint_states_topic: str
-    faults_topic: str
-    withheld_topic: str
-    extras: tuple[str, ...]
-
-
-def _run(bag: Bag) -> _Run:
-    missing = {RUN_FILE, SCENE_FILE} - set(bag.attachments)
-    if missing:
-        raise BagError(
-            bag.path,
-            f'carries no {", ".join(sorted(missing))}',
-            'name a bag that linkage_ros has recorded',
-        )
+def turn(bag: Bag, injection: Injection, message: bytes) -> None:
+    """Turn a fault on or off, as a message of a bag says; raise `BagError` where it cannot be."""
     try:
-        run = json.loads(bag.attachments[RUN_FILE])
-        return _Run(
-            scene=str(run['scene']),
-            scene_folder=str(run.get('scene_folder', '')),
-            crank_topic=str(run.get('crank_topic', '')),
-            joint_states_topic=str(run['joint_states_topic']),
-            faults_topic=str(run.get('faults_topic', '')),
-            withheld_topic=str(run.get('withheld_topic', '')),
-            extras=tuple(map(str, run.get('extra_topics', ()))),
-        )
-    except (ValueError, KeyError, TypeError, AttributeError):
-        raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag') from None
+        injection.turn(*read_change(message))
+    except (ValueError, LookupError, TypeError, RecursionError):
+        raise BagError(
+            bag.path, 'a message on its faults topic names no fault of its scene', 'name another'
+        ) from None
+
+
+def versions_here() -> dict[str, str]:
+    """Return the versions of what runs here, as a run's account has them."""
+    found = (__version__, platform.python_version(), platform.machine())
+    return dict(zip(VERSIONS, found, strict=True))

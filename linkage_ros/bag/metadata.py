@@ -21,8 +21,9 @@ The keys and their order are rosbag2's, metadata version 9 (Jazzy; ``rosbag2_sto
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 import os
 from pathlib import Path
 from typing import Any
@@ -39,14 +40,14 @@ NO_START = 2**63 - 1
 @dataclass(frozen=True, slots=True)
 class BagSummary:
     """
-    What a bag holds.
+    What a bag holds, or one of its files.
 
     Parameters
     ----------
     folder
         The bag's folder.
     file
-        Name of the MCAP file in it.
+        Name of the MCAP file in it; of several the last.
     topics
         The topics, in the order of their numbers.
     counts
@@ -58,7 +59,11 @@ class BagSummary:
     duration
         Greatest less least log time [ns].
     size
-        Size of the MCAP file [bytes].
+        Size of the MCAP file, or files [bytes].
+    parts
+        The files one by one, where there are several.
+    let_go
+        Messages in files that made way for newer ones, for each topic; () for none.
 
     """
 
@@ -70,6 +75,8 @@ class BagSummary:
     start: int
     duration: int
     size: int
+    parts: tuple[BagSummary, ...] = ()
+    let_go: tuple[int, ...] = ()
 
 
 def qos_text(qos: QosProfile) -> str:
@@ -92,32 +99,55 @@ def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool 
         file's own ``serialized_metadata``.
 
     """
-    information = {
-        'version': 9,
-        'storage_identifier': 'mcap',
-        **_extent(summary),
-        'topics_with_message_count': [
-            {
-                'topic_metadata': {
-                    'name': topic.name,
-                    'type': topic.type,
-                    'serialization_format': 'cdr',
-                    'offered_qos_profiles': [topic.qos.to_mapping()],
-                    'type_description_hash': topic.type_hash,
-                },
-                'message_count': count,
-            }
-            for topic, count in zip(summary.topics, summary.counts, strict=True)
-        ],
-        'compression_format': '',
-        'compression_mode': '',
-        'relative_file_paths': [summary.file],
-        'files': [{'path': summary.file, **_extent(summary)}],
-        'custom_data': dict(custom) or None,
-        # As rosbag2 has it, from the environment; the definitions here are Jazzy's anyway.
-        'ros_distro': os.environ.get('ROS_DISTRO') or 'jazzy',
-    }
-    return _dump({ROOT_KEY: information} if root else information)
+    files = summary.parts or (summary,)
+    topics = [
+        f'{_topic_text(topic)}  message_count: {count}\n'
+        for topic, count in zip(summary.topics, summary.counts, strict=True)
+    ]
+    text = ''.join(
+        [
+            _dump({'version': 9, 'storage_identifier': 'mcap'}),
+            _extent(summary.duration, summary.start, sum(summary.counts)),
+            'topics_with_message_count:\n' if topics else 'topics_with_message_count: []\n',
+            *topics,
+            _dump({'compression_format': '', 'compression_mode': ''}),
+            _dump({'relative_file_paths': [part.file for part in files]}),
+            'files:\n',
+            *(
+                _file_text(part.file, part.duration, part.start, sum(part.counts))
+                for part in files
+            ),
+            _dump(
+                {
+                    'custom_data': dict(custom) or None,
+                    # As rosbag2 has it, from the environment; the definitions are Jazzy's anyway.
+                    'ros_distro': os.environ.get('ROS_DISTRO') or 'jazzy',
+                }
+            ),
+        ]
+    )
+    return f'{ROOT_KEY}:\n{_indented(text)}' if root else text
+
+
+def together(
+    parts: Sequence[BagSummary], refused: Sequence[int], let_go: Sequence[int]
+) -> BagSummary:
+    """Return what a bag of these files holds; of one file, just that."""
+    last = parts[-1]
+    start = min(part.start for part in parts)
+    ends = [part.start + part.duration for part in parts if any(part.counts)]
+    return BagSummary(
+        folder=last.folder,
+        file=last.file,
+        topics=last.topics,
+        counts=tuple(map(sum, zip(*(part.counts for part in parts), strict=True))),
+        refused=tuple(refused),
+        start=start,
+        duration=max(ends) - start if ends else 0,
+        size=sum(part.size for part in parts),
+        parts=tuple(parts) if len(parts) > 1 else (),
+        let_go=tuple(let_go),
+    )
 
 
 def write_metadata(summary: BagSummary, custom: Mapping[str, str]) -> None:
@@ -153,13 +183,34 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def _extent(summary: BagSummary) -> dict[str, Any]:
-    # New mappings at each call: YAML would write a shared one as an anchor and an alias.
-    return {
-        'duration': {'nanoseconds': summary.duration},
-        'starting_time': {'nanoseconds_since_epoch': summary.start},
-        'message_count': sum(summary.counts),
+# Topics and finished files stay what they are: a bag of a thousand files is told again for each.
+@lru_cache(maxsize=256)
+def _topic_text(topic: Topic) -> str:
+    metadata = {
+        'name': topic.name,
+        'type': topic.type,
+        'serialization_format': 'cdr',
+        'offered_qos_profiles': [topic.qos.to_mapping()],
+        'type_description_hash': topic.type_hash,
     }
+    return _dump([{'topic_metadata': metadata}])
+
+
+@lru_cache(maxsize=16384)
+def _file_text(file: str, duration: int, start: int, messages: int) -> str:
+    return _dump([{'path': file}]) + _indented(_extent(duration, start, messages))
+
+
+def _extent(duration: int, start: int, messages: int) -> str:
+    return (
+        f'duration:\n  nanoseconds: {duration}\n'
+        f'starting_time:\n  nanoseconds_since_epoch: {start}\n'
+        f'message_count: {messages}\n'
+    )
+
+
+def _indented(text: str) -> str:
+    return ''.join(f'  {line}\n' for line in text[:-1].split('\n'))
 
 
 def _dump(content: Any) -> str:

@@ -20,17 +20,25 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from errno import EINVAL
-from io import SEEK_END
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
+from linkage_ros.bag.compression import DamagedError
+from linkage_ros.bag.data_section import DataSection, Found
+from linkage_ros.bag.file_index import index_of
+from linkage_ros.bag.folder import (
+    custom_of,
+    files_of,
+    information_of,
+    is_empty,
+    is_finished,
+    unreadable,
+)
+from linkage_ros.bag.records import attachment_at, Definitions, Message, Source
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.errors import BagError, quoted
-from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, McapRecord, Message, Schema
-from mcap.stream_reader import StreamReader
+from linkage_ros.errors import BagError
+from mcap.records import Attachment, Channel, Schema
 from mcap.writer import MCAP0_MAGIC
 import yaml
 
@@ -90,15 +98,12 @@ class Bag:
 
         """
         for file in self.files:
-            names: dict[int, str] = {}
-            for record in _records(file, until_damage=self.truncated and file == self.files[-1]):
-                if isinstance(record, Channel):
-                    names[record.id] = record.topic
-                elif isinstance(record, Message):
-                    if record.channel_id not in names:
-                        raise _damaged(file, f'no channel {record.channel_id}')
-                    name = names[record.channel_id]
-                    yield BagMessage(name, record.log_time, record.publish_time, record.data)
+            until_damage = self.truncated and file == self.files[-1]
+            for found in _contents(file, Definitions(), until_damage=until_damage):
+                if isinstance(found, Message):
+                    yield BagMessage(
+                        found.channel.topic, found.log_time, found.publish_time, found.data
+                    )
 
 
 def read_bag(path: str | Path, *, allow_truncated: bool = False) -> Bag:
@@ -119,130 +124,98 @@ def read_bag(path: str | Path, *, allow_truncated: bool = False) -> Bag:
 
     """
     path = Path(path)
-    information = _information(path) if path.is_dir() else {}
-    files = _files(path, information)
-    whole = [_is_finished(file) for file in files]
+    information = information_of(path) if path.is_dir() else {}
+    files = files_of(path, information)
+    begun = allow_truncated and len(files) > 1 and is_empty(files[-1])
+    if begun:
+        # Killed between making the next file and writing to it.
+        files.pop()
+    whole = [is_finished(file) for file in files]
     if not all(whole) and not allow_truncated:
         raise BagError(
             files[whole.index(False)],
             'has no end: its recording was killed, or still runs',
-            'ask for the part that is there',
+            'linkage recover makes a whole bag of what is there',
         )
     topics: dict[str, Topic] = {}
     attachments: dict[str, bytes] = {}
     for file, finished in zip(files, whole, strict=True):
-        schemas: dict[int, Schema] = {}
-        for record in _definitions(file, finished=finished):
-            if isinstance(record, Schema):
-                schemas[record.id] = record
-            elif isinstance(record, Channel):
-                topics.setdefault(record.topic, _topic(record, schemas.get(record.schema_id)))
-            elif isinstance(record, Attachment):
-                attachments.setdefault(record.name, record.data)
-    custom = information.get('custom_data') or {}
+        definitions, attached = _description(file, finished=finished)
+        for channel in definitions.channels.values():
+            topic = topic_of(channel, definitions.schema_of(channel))
+            topics.setdefault(topic.name, topic)
+        for attachment in attached:
+            attachments.setdefault(attachment.name, attachment.data)
     return Bag(
         path=path,
         files=tuple(files),
         topics=tuple(topics.values()),
         attachments=attachments,
-        custom={str(key): str(value) for key, value in custom.items()},
-        truncated=not all(whole),
+        custom=custom_of(information),
+        truncated=begun or not all(whole),
     )
 
 
-def _information(folder: Path) -> dict[str, Any]:
-    """Return what ``metadata.yaml`` says, nothing if it is missing: the files can do without."""
-    file = folder / METADATA_FILE
-    try:
-        information = yaml.safe_load(file.read_text(encoding='utf-8'))[ROOT_KEY]
-        if not isinstance(information, dict):
-            raise TypeError
-    except FileNotFoundError:
-        return {}
-    except OSError as error:
-        raise _unreadable(file, error) from None
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError):
-        raise BagError(file, "is not a bag's metadata", 'read the MCAP file by itself') from None
-    return information
-
-
-def _files(path: Path, information: Mapping[str, Any]) -> list[Path]:
-    if not path.is_dir():
-        return [path]
-    named = information.get('relative_file_paths')
-    if isinstance(named, list) and named:
-        # By name only, as rosbag2 does: old bags carry the folder too, which may have moved.
-        return [path / Path(str(name)).name for name in named]
-    # NAME_2.mcap before NAME_10.mcap
-    files = sorted(path.glob('*.mcap'), key=lambda file: (len(file.name), file.name))
-    if not files:
-        raise BagError(path, 'holds no .mcap file', "name a bag's folder")
-    return files
-
-
-def _is_finished(file: Path) -> bool:
-    """Return whether the file is MCAP to its end; raise if not even its beginning is."""
-    length = len(MCAP0_MAGIC)
-    try:
-        with file.open('rb') as stream:
-            start = stream.read(length)
-            size = stream.seek(0, SEEK_END)
-            stream.seek(max(0, size - length))
-            end = stream.read()
-    except FileNotFoundError:
-        raise BagError(file, 'does not exist', 'name the folder of a bag, or its file') from None
-    except OSError as error:
-        raise _unreadable(file, error) from None
-    if not start:
-        raise BagError(file, 'is empty', 'its recording never began, or the power failed in it')
-    if start != MCAP0_MAGIC:
-        raise BagError(
-            file, f'starts with {quoted(start)}, as no MCAP file does', 'name an MCAP file'
-        )
-    return size > length and end == MCAP0_MAGIC
-
-
-def _definitions(file: Path, *, finished: bool) -> Iterator[McapRecord]:
-    """Yield the schemas, channels and attachments of a file; from its index, if it has one."""
+def _description(file: Path, *, finished: bool) -> tuple[Definitions, list[Attachment]]:
+    """Return schemas, channels and attachments of a file; from its index, if it has one."""
     if finished:
         with _translated(file), file.open('rb') as stream:
-            reader = SeekingReader(stream)
-            summary = reader.get_summary()
-            if summary and summary.channels:
-                yield from summary.schemas.values()
-                yield from summary.channels.values()
-                yield from reader.iter_attachments()
+            source = Source(stream)
+            index = index_of(source)
+            if index.definitions.channels:
+                return index.definitions, [
+                    attachment_at(source, each.offset)[0] for each in index.attachments
+                ]
+    definitions = Definitions()
+    contents = _contents(file, definitions, until_damage=not finished)
+    return definitions, [found for found in contents if isinstance(found, Attachment)]
+
+
+def _contents(file: Path, definitions: Definitions, *, until_damage: bool) -> Iterator[Found]:
+    """Yield messages, attachments and metadata in the order of the file; checksums fit."""
+    finished = is_finished(file)
+    with _translated(file), file.open('rb') as stream:
+        source = Source(stream)
+        index = index_of(source) if finished else None
+        if index and index.checked:
+            # What the data says must be what the index says.
+            definitions.schemas |= index.definitions.schemas
+            definitions.channels |= index.definitions.channels
+        data = DataSection(source, definitions, index.start if index else 0)
+        messages, at = 0, len(MCAP0_MAGIC)
+        try:
+            while not data.finished:
+                records, end = data.take(at)
+                for found in records:
+                    messages += isinstance(found, Message)
+                    yield found
+                at = end
+        except DamagedError as error:
+            if until_damage and not finished:
                 return
-    for record in _records(file, until_damage=not finished):
-        if isinstance(record, Schema | Channel | Attachment):
-            yield record
-
-
-def _records(file: Path, *, until_damage: bool) -> Iterator[McapRecord]:
-    """Yield a file's records in its order, those in chunks too; checksums are checked."""
-    with _translated(file, ignore=until_damage), file.open('rb') as stream:
-        yield from StreamReader(stream, validate_crcs=True).records
+            raise DamagedError(f'the record at byte {at:,}: {error}') from None
+        if index is None:
+            return
+        data.covered()
+        if at != index.start:
+            raise DamagedError('its index begins elsewhere than it says')
+        promised = index.statistics
+        if promised and promised.message_count != messages:
+            raise DamagedError(f'{messages:,} messages are there of {promised.message_count:,}')
 
 
 @contextmanager
-def _translated(file: Path, *, ignore: bool = False) -> Iterator[None]:
-    """Turn what mcap raises on a damaged file into a `BagError`, or into nothing at all."""
+def _translated(file: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        # A damaged index sends mcap to a negative place in the file.
-        if error.errno != EINVAL:
-            raise _unreadable(file, error) from None
-        if not ignore:
-            raise _damaged(file, 'its index points outside of it') from None
-    except Exception as error:  # noqa: BLE001
-        # Any: mcap raises its own errors, struct.error, ValueError, KeyError, MemoryError and
-        # those of the decompressors, as the damage has it.
-        if not ignore:
-            raise _damaged(file, f'{type(error).__name__} {error}') from None
+        raise unreadable(file, error) from None
+    except DamagedError as error:
+        raise _damaged(file, str(error)) from None
 
 
-def _topic(channel: Channel, schema: Schema | None) -> Topic:
+def topic_of(channel: Channel, schema: Schema | None) -> Topic:
+    """Return the topic that a channel is."""
     return Topic(
         name=channel.topic,
         type=schema.name if schema else '',
@@ -252,19 +225,15 @@ def _topic(channel: Channel, schema: Schema | None) -> Topic:
     )
 
 
+@lru_cache(maxsize=256)
 def _qos(text: str) -> QosProfile:
     """Return the first of the profiles; the default if there is none, or none to be understood."""
     try:
         return QosProfile.from_mapping(yaml.safe_load(text)[0])
-    except (yaml.YAMLError, LookupError, TypeError, ValueError):
+    except Exception:  # noqa: BLE001 (whatever yaml and the numbers in it raise)
         # A QoS nobody understands is no reason to withhold the messages.
         return QosProfile()
 
 
-def _unreadable(file: Path, error: OSError) -> BagError:
-    reason = f'cannot be read: {error.strerror or error}'
-    return BagError(file, reason, 'check its permissions and the disk')
-
-
 def _damaged(file: Path, reason: str) -> BagError:
-    return BagError(file, f'is damaged: {reason}', 'what lies before the damage can be read')
+    return BagError(file, f'is damaged: {reason}', 'linkage recover saves what is whole')

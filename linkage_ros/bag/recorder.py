@@ -23,15 +23,16 @@ that stalls or fills stops that thread only: the queue fills, and further messag
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
-import json
 from pathlib import Path
 import threading
 import time
 
+from linkage_ros.bag.account import Account
+from linkage_ros.bag.metadata import BagSummary
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 
@@ -47,7 +48,8 @@ class TopicCounts:
     """
     What became of one topic's messages.
 
-    ``received == recorded + dropped + waiting``, at every instant.
+    ``received == recorded + dropped + let_go + waiting``, at every instant. Let go is what was
+    recorded in a file that made way for a newer one.
     """
 
     name: str
@@ -55,6 +57,7 @@ class TopicCounts:
     recorded: int
     dropped: int
     waiting: int
+    let_go: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,9 +71,9 @@ class RecordingSummary:
         The bag.
     topics
         Counts for each topic, in the order of their numbers; nothing waits any more, so
-        ``received == recorded + dropped``.
+        ``received == recorded + dropped + let_go``.
     size
-        Size of the MCAP file [bytes].
+        Size of the MCAP files [bytes].
     failure
         Why it ended early, on one line; None if it did not.
 
@@ -116,6 +119,7 @@ class Recorder:
         self._done = ([0] * len(writer.topics), [0] * len(writer.topics))
         self._safe = (0,) * len(writer.topics)
         self._custom: dict[str, str] = {}
+        writer.account = self._account
         self._summary: RecordingSummary | None = None
         self._stopping = threading.Event()
         # A daemon: a disk that never answers must not keep the process from ending.
@@ -146,14 +150,17 @@ class Recorder:
     def inspect(self) -> tuple[TopicCounts, ...]:
         """Return the counts as they are now; after a failure, ``recorded`` is what was kept."""
         counts = []
+        # First, so that nothing is let go that was not taken.
+        let_go = self._writer.let_go
         taken, lost = self._done
         for number, topic in enumerate(self._writer.topics):
-            recorded = taken[number]
+            gone = let_go[number]
+            recorded = taken[number] - gone
             dropped = self._overflowed[number].value() + lost[number]
             # Last, so that a message on its way is waiting, and never gone twice.
             received = self._received[number].value()
-            waiting = received - recorded - dropped
-            counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting))
+            waiting = received - recorded - dropped - gone
+            counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting, gone))
         return tuple(counts)
 
     def stop(
@@ -165,7 +172,7 @@ class Recorder:
         Parameters
         ----------
         custom
-            Goes to ``custom_data`` of the bag's metadata, beside the dropped messages.
+            Goes to ``custom_data`` of the bag's metadata, beside the account.
         timeout
             How long a disk that does not answer is waited for [s]. After that the summary counts
             as recorded only what a flush has brought to the disk.
@@ -186,9 +193,11 @@ class Recorder:
             )
         topics = []
         for number, counts in enumerate(self.inspect()):
-            recorded = self._safe[number] if stuck else counts.recorded
-            dropped = counts.received - recorded
-            topics.append(TopicCounts(counts.name, counts.received, recorded, dropped, 0))
+            recorded = counts.recorded
+            if stuck:
+                recorded = max(0, self._safe[number] - counts.let_go)
+            dropped = counts.received - recorded - counts.let_go
+            topics.append(replace(counts, recorded=recorded, dropped=dropped, waiting=0))
         self._summary = RecordingSummary(
             folder=self._writer.folder,
             topics=tuple(topics),
@@ -213,10 +222,18 @@ class Recorder:
                         due = time.monotonic() + self._flush_period
                     if more:
                         time.sleep(_NAP)
-            dropped = {counts.name: counts.dropped for counts in self.inspect()}
-            self._writer.close({**self._custom, 'linkage_ros.dropped': json.dumps(dropped)})
+            self._writer.close(self._custom)
         except Exception as error:  # noqa: BLE001 (nothing may end the thread in silence)
             self._fail(error)
+
+    def _account(self, summary: BagSummary) -> Account:
+        """Return what became of all messages, once no more are taken; `dropped` is the rest."""
+        received = [tally.value() for tally in self._received]
+        dropped = [
+            came - there - gone
+            for came, there, gone in zip(received, summary.counts, summary.let_go, strict=True)
+        ]
+        return Account(received, summary.counts, dropped, summary.let_go)
 
     def _write_batch(self) -> bool:
         """Write up to a batch of messages; return whether there may be more."""
@@ -236,9 +253,10 @@ class Recorder:
         if not isinstance(error, RecordingError):
             reason = f'the recording ended early: {type(error).__name__}: {error}'
             error = RecordingError(self._writer.folder, reason, 'please report this')
-        kept: tuple[int, ...] = self._safe
+        kept: Sequence[int] = self._safe
         with suppress(Exception):
-            kept = self._writer.close().counts
+            summary = self._writer.close()
+            kept = [sum(counts) for counts in zip(summary.counts, summary.let_go, strict=True)]
         taken, lost = self._done
         lost = [gone + had - has for gone, had, has in zip(lost, taken, kept, strict=True)]
         while self._queue:

@@ -14,39 +14,40 @@
 
 
 """
-Write a bag that is readable at every instant and stays so when the disk fills.
+Write a bag, in one file or several, whose every flushed message outlives a kill or a full disk.
 
-From the first error of the disk on, mcap's ``Writer`` goes on into memory (`disk.RecordFile`), and
-`BagWriter` ends the recording with the records and indexes that it makes.
+``metadata.yaml`` is there from the first moment and renewed about once a second and with each new
+file: it names all files, and counts what is on the disk. Until the bag is closed its custom data
+has `account.UNFINISHED`; so a killed bag says that it is one, and where it stopped.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
 import time
-from typing import cast, IO, NoReturn
+from typing import NoReturn
 
-from linkage_ros import __version__
-from linkage_ros.bag.disk import CHUNK_SIZE, FIRST_RESERVE, RecordFile, Reserve
-from linkage_ros.bag.metadata import (
-    BagSummary,
-    metadata_text,
-    NO_START,
-    qos_text,
-    sync_folder,
-    write_metadata,
+from linkage_ros.bag.account import (
+    Account,
+    custom_data,
+    FAILURE,
+    last_records,
+    UNFINISHED_DATA,
 )
+from linkage_ros.bag.bag_file import BagFile
+from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_metadata
+from linkage_ros.bag.packing import compression_type
+from linkage_ros.bag.storage import scarcity, Storage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import RecordingError
-from mcap.records import (
-    Statistics,
-)
-from mcap.writer import CompressionType, Writer
 
+_MAKE_ROOM = 'make room there before the next recording'
 _TIME_END = 2**63  # rosbag2's times are signed
 _SEQUENCE_END = 2**32  # MCAP's sequence numbers; at 10 kHz they start again after five days
+_RENEWAL = 1.0  # [s]
 
 
 class BagWriter:
@@ -60,7 +61,17 @@ class BagWriter:
     topics
         What will be written; a topic's number is its place in this sequence.
     attachments
-        Name to (media type, content), written first, so that a killed bag still explains itself.
+        Name to (media type, content); each file has them, so that each explains itself.
+    storage
+        How it is stored; its ``flush_period`` is for whoever calls `flush`.
+
+    Attributes
+    ----------
+    let_go
+        Messages of each topic that were in files that made way for newer ones.
+    account
+        Returns what became of all messages, given what the bag holds; none for a bag whose writer
+        keeps no account.
 
     Raises
     ------
@@ -74,15 +85,24 @@ class BagWriter:
         folder: str | Path,
         topics: Sequence[Topic],
         attachments: Mapping[str, tuple[str, bytes]] | None = None,
+        storage: Storage | None = None,
     ) -> None:
         self.folder = Path(folder)
         self.topics = tuple(topics)
-        self._counts = [0] * len(self.topics)
+        self.storage = storage or Storage()
+        self.let_go = (0,) * len(self.topics)
+        self.account: Callable[[BagSummary], Account | None] = lambda summary: None
+        self._attachments = dict(attachments or {})
+        self._split_time = round(self.storage.split_seconds * 1e9)  # [ns]
+        self._splits = self.storage.split_bytes > 0 or self._split_time > 0
+        self._paths = (self.folder / f'{self.folder.name}_{number}.mcap' for number in count())
+        self._sequences = [0] * len(self.topics)
         self._refused = [0] * len(self.topics)
-        self._start, self._end = NO_START, 0
-        self._flushes, self._flushed = 0, 0
+        self._ended: list[BagSummary] = []
+        self._due = 0.0
         self._summary: BagSummary | None = None
         self._failure: RecordingError | None = None
+        self._compression = compression_type(self.storage.compression, self.folder)
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError:
@@ -91,47 +111,17 @@ class BagWriter:
             ) from None
         except OSError as error:
             self._give_up(error)
-        path = self.folder / f'{self.folder.name}_0.mcap'
         try:
             with ExitStack() as undo:
                 undo.callback(_remove, self.folder)
-                self._file = RecordFile(path)
-                undo.callback(self._file.close)
-                self._reserve = Reserve(self.folder)
-                undo.callback(self._reserve.release)
-                self._begin(attachments or {})
+                self._file = self._next_file()
+                undo.callback(self._file.abandon)
+                self._refuse_if_scarce('cannot be recorded to')
+                self._renew(self._summarize())
+                sync_folder(self.folder.absolute().parent)
                 undo.pop_all()
         except OSError as error:
             self._give_up(error)
-
-    def _begin(self, attachments: Mapping[str, tuple[str, bytes]]) -> None:
-        # Our stream stands in for a binary file: mcap asks it for write, tell and flush only.
-        self._mcap = Writer(
-            cast('IO[bytes]', self._file),
-            chunk_size=CHUNK_SIZE,
-            compression=CompressionType.NONE,
-        )
-        self._mcap.start(profile='ros2', library=f'linkage_ros {__version__}')
-        for name, (media_type, content) in attachments.items():
-            self._mcap.add_attachment(0, time.time_ns(), name, media_type, content)
-        schemas: dict[str, int] = {}
-        self._channels: list[int] = []
-        for topic in self.topics:
-            if topic.type not in schemas:
-                definition = topic.definition.encode()
-                schemas[topic.type] = self._mcap.register_schema(topic.type, 'ros2msg', definition)
-            description = {
-                'offered_qos_profiles': qos_text(topic.qos),
-                'topic_type_hash': topic.type_hash,
-            }
-            self._channels.append(
-                self._mcap.register_channel(topic.name, 'cdr', schemas[topic.type], description)
-            )
-        if self._file.error:
-            raise self._file.error
-        self._file.sync()
-        write_metadata(self._summarize(self._counts), {})
-        sync_folder(self.folder.absolute().parent)
 
     def write(self, topic: int, log_time: int, publish_time: int, data: bytes) -> bool:
         """
@@ -163,39 +153,25 @@ class BagWriter:
         if not (0 <= log_time < _TIME_END and 0 <= publish_time < _TIME_END):
             self._refused[topic] += 1
             return False
-        count = self._counts[topic]
-        self._mcap.add_message(
-            self._channels[topic], log_time, data, publish_time, count % _SEQUENCE_END
-        )
-        self._counts[topic] = count + 1
-        self._start, self._end = min(self._start, log_time), max(self._end, log_time)
+        if self._splits and self._is_full(log_time):
+            self._split()
+        sequence = self._sequences[topic]
+        self._file.add(topic, log_time, publish_time, data, sequence % _SEQUENCE_END)
+        self._sequences[topic] = sequence + 1
         if self._file.error:
-            self._fail(self._file.error)
+            self._end(self._file.error)
         return True
 
     def flush(self) -> None:
-        """
-        Bring to the disk what was written; raises as `write` does.
-
-        mcap before 1.6 cannot close a chunk early: there, whole chunks only are safe.
-        """
+        """Bring to the disk what was written, and look how full it is; raises as `write` does."""
         if self._failure:
             raise self._failure
-        if hasattr(self._mcap, 'flush'):
-            self._mcap.flush()  # type: ignore[no-untyped-call]
-        if self._file.position == self._flushed:
-            return
-        self._flushed = self._file.position
-        self._flushes += 1
-        chunks = self._flushes + self._file.position // CHUNK_SIZE
         try:
-            if self._file.error:
-                raise self._file.error
-            self._file.sync()
-            # The index at the end grows by about this much with each chunk.
-            self._reserve.grow(FIRST_RESERVE + chunks * (90 + 10 * len(self.topics)))
-        except OSError as error:
-            self._fail(error)
+            if self._file.flush() and time.monotonic() >= self._due:
+                self._renew(self._summarize())
+            self._refuse_if_scarce('the recording ended')
+        except (OSError, RecordingError) as error:
+            self._end(error)
 
     def close(self, custom: Mapping[str, str] | None = None) -> BagSummary:
         """
@@ -223,53 +199,84 @@ class BagWriter:
 
     @property
     def size(self) -> int:
-        """Return the size of the MCAP file by now [bytes]."""
-        return self._file.size
+        """Return the size of the MCAP files by now [bytes]."""
+        return sum(part.size for part in self._ended) + self._file.size
+
+    def _is_full(self, log_time: int) -> bool:
+        file = self._file
+        if file.first is None:
+            return False
+        if 0 < self.storage.split_bytes <= file.size and file.has_chunks:
+            return True
+        # Where time jumps back, what comes after it is not put to what came before.
+        return 0 < self._split_time <= abs(log_time - file.first)
+
+    def _split(self) -> None:
+        """End the file and begin the next; where they are too many, let the oldest go."""
+        try:
+            self._refuse_if_scarce('the recording ended')
+            error = self._file.finish(last_records(UNFINISHED_DATA, self._summarize(), None))
+            if error:
+                raise error
+            file = self._next_file()
+            self._ended, self._file = self._parts(), file
+            self._renew_and_let_go()
+        except (OSError, RecordingError) as worse:
+            self._end(worse)
+
+    def _renew_and_let_go(self) -> None:
+        """Name the files that are kept, then remove the others: no name is without its file."""
+        parts, most = self._parts(), self.storage.keep_files
+        excess = max(0, len(parts) - most) if most else 0
+        gone, kept = parts[:excess], parts[excess:]
+        let_go = [self.let_go, *(part.counts for part in gone)]
+        summary = together(kept, self._refused, tuple(map(sum, zip(*let_go, strict=True))))
+        self._renew(summary)
+        self._ended, self.let_go = kept[:-1], summary.let_go
+        for part in gone:
+            (self.folder / part.file).unlink(missing_ok=True)
 
     def _finish(self, custom: Mapping[str, str]) -> OSError | None:
         """Close the bag as well as the disk allows; return what went wrong, now or before."""
-        text = metadata_text(self._summarize(self._counts), custom, root=False)
-        self._file.keep_tail()
-        self._mcap.add_metadata('rosbag2', {'serialized_metadata': text})
-        self._mcap.finish()  # type: ignore[no-untyped-call]
-        self._reserve.release()
-        error = self._file.error
+        error = None
+        if not self._file.finished:
+            summary = self._summarize()
+            error = self._file.finish(last_records(custom, summary, self.account(summary)))
+        self._summary = summary = self._summarize()
         try:
-            try:
-                self._file.drain()
-            except OSError as full:
-                error = error or full
-                self._count_only(self._file.cut_back())
-            self._file.sync()
-        except OSError as worse:
-            error = error or worse
-        self._summary = self._summarize(self._counts)
-        try:
-            self._file.close()
-            write_metadata(self._summary, custom)
+            write_metadata(summary, custom_data(custom, summary, self.account(summary)))
         except OSError as worse:
             error = error or worse
         return error
 
-    def _count_only(self, kept: Statistics) -> None:
-        """Forget the messages that did not reach the file."""
-        self._counts = [kept.channel_message_counts.get(channel, 0) for channel in self._channels]
-        if kept.message_count:
-            self._start, self._end = kept.message_start_time, kept.message_end_time
-        else:
-            self._start, self._end = NO_START, 0
+    def _renew(self, summary: BagSummary) -> None:
+        """Write into the metadata what is on the disk by now."""
+        begin = time.monotonic()
+        write_metadata(summary, custom_data(UNFINISHED_DATA, summary, None))
+        end = time.monotonic()
+        # Of a bag in many files it is long, and a slow disk must not be kept busy with it.
+        self._due = end + max(_RENEWAL, 20.0 * (end - begin))
 
-    def _fail(self, error: OSError) -> NoReturn:
-        self._failure = self._ended_by(error)
+    def _next_file(self) -> BagFile:
+        return BagFile(next(self._paths), self.topics, self._attachments, self._compression)
+
+    def _refuse_if_scarce(self, what: str) -> None:
+        """Raise RecordingError where too little is free; what a file has set aside is not."""
+        scarce = scarcity(self.folder, self.storage.min_free_bytes)
+        if scarce:
+            raise RecordingError(self.folder, f'{what}: {scarce}', _MAKE_ROOM)
+
+    def _end(self, error: OSError | RecordingError) -> NoReturn:
+        self._failure = error if isinstance(error, RecordingError) else self._ended_by(error)
         if not self._summary:
-            self._finish({'linkage_ros.failure': str(self._failure)})
+            self._finish({FAILURE: str(self._failure)})
         raise self._failure
 
     def _ended_by(self, error: OSError) -> RecordingError:
         return RecordingError(
             self.folder,
             f'the recording ended early: {error.strerror or error}',
-            'what is on the disk stays readable; make room there before the next recording',
+            f'what is on the disk stays readable; {_MAKE_ROOM}',
         )
 
     def _give_up(self, error: OSError) -> NoReturn:
@@ -279,17 +286,11 @@ class BagWriter:
             'name a folder on a disk that can be written to',
         ) from None
 
-    def _summarize(self, counts: Sequence[int]) -> BagSummary:
-        return BagSummary(
-            folder=self.folder,
-            file=self._file.path.name,
-            topics=self.topics,
-            counts=tuple(counts),
-            refused=tuple(self._refused),
-            start=self._start,
-            duration=max(0, self._end - self._start),
-            size=self._file.size,
-        )
+    def _parts(self) -> list[BagSummary]:
+        return [*self._ended, self._file.summary(self.topics)]
+
+    def _summarize(self) -> BagSummary:
+        return together(self._parts(), self._refused, self.let_go)
 
 
 def _remove(folder: Path) -> None:

@@ -28,9 +28,12 @@ from linkage_ros.stop import stop_on_signals
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
     'demo': 'run the demo scene with a crank of its own, on a ROS graph of its own',
+    'play': 'publish a bag on the graph, at its own pace or another',
     'plot': 'draw the joints of a bag over the angle of its crank',
     'info': 'say what a bag holds, how well its loops closed, and where a toggle was nearest',
     'export': 'write the joints of a bag, or one of its topics, to a CSV or Parquet file',
+    'recover': 'make a whole bag of what a damaged or unfinished one still holds',
+    'replay': 'run the scene of a bag once more and compare, or another scene over its samples',
     'scene': 'say what a scene consists of; list all effects; print the schemas of the files',
     'cost': 'say what each effect of a scene costs on this machine',
     'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
@@ -42,7 +45,7 @@ COMMANDS = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run ``linkage``; return 0, 1 for a run that went wrong, or 2 for wrong input."""
+    """Run ``linkage``; return 0, 1 for a run that went wrong, 2 for wrong input, 3 for a loss."""
     # First of all: from here on Ctrl-C ends a run by closing its bag.
     stop = stop_on_signals()
     arguments = sys.argv[1:] if arguments is None else arguments

@@ -20,10 +20,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag
+from linkage_ros.cli.proof import mid_run_text, prove
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline
-from linkage_ros.replay import recorded_scene, replay
+from linkage_ros.replay import recorded_scene, ReplayedTick
 from linkage_ros.ros.node import LinkageNode
 
 
@@ -58,7 +59,11 @@ def summary(node: LinkageNode) -> str:
     ]
     for recording in node.recording.ended:
         rows += [
-            ('recorded', f'{t.name}: {t.recorded} of {t.received}, {t.dropped} dropped')
+            (
+                'recorded',
+                f'{t.name}: {t.recorded} of {t.received}, {t.dropped} dropped'
+                + (f', {t.let_go} let go with the oldest files' if t.let_go else ''),
+            )
             for t in recording.topics
         ]
         rows += [('bag', str(recording.folder)), ('proof', _proof(recording.folder))]
@@ -69,24 +74,26 @@ def summary(node: LinkageNode) -> str:
 
 def _proof(folder: Path) -> str:
     """Replay a bag: whether it gives the same bytes, and how well its loop closed."""
+    worst = 0.0
+
+    def look(replayed: ReplayedTick) -> None:
+        nonlocal worst
+        for closure, seen in zip(closures, replayed.tick.looks, strict=True):
+            if seen.position is not None and seen.position.joints:
+                worst = max(worst, closure.residual(seen.position))
+
     try:
         bag = read_bag(folder)
         scene = recorded_scene(bag)
         pipeline = Pipeline(scene)
-        found = {'joint states': [0, 0]}
-        found |= {extra.topic.removeprefix('~/'): [0, 0] for extra in pipeline.extras}
-        worst = 0.0
-        for _, recorded, recorded_extras, tick in replay(bag, scene):
-            now = (tick.message, *(tick.extras or [b''] * len(recorded_extras)))
-            for counts, then, again in zip(
-                found.values(), (recorded, *recorded_extras), now, strict=True
-            ):
-                counts[0] += bool(then) and then == again
-                counts[1] += bool(then)
-            for line, look in zip(pipeline.lines, tick.looks, strict=True):
-                if look.position is not None and look.position.joints:
-                    worst = max(worst, line.closure.residual(look.position))
+        closures = pipeline.closures
+        proof = prove(bag, scene, bag.messages(), look)
     except LinkageError as error:
         return str(error)
-    proof = ' and '.join(f'{same} of {of} {what}' for what, (same, of) in found.items())
-    return f'{proof} replay to the same bytes; worst loop residual {worst:.1e} m'
+    names = ['joint states', *(extra.topic.removeprefix('~/') for extra in pipeline.extras)]
+    same = ' and '.join(
+        f'{topic.same} of {topic.recorded} {name}'
+        for name, topic in zip(names, proof.comparison.topics, strict=True)
+    )
+    untold = f'; {mid_run_text(proof)}' if proof.mid_run else ''
+    return f'{same} replay to the same bytes{untold}; worst loop residual {worst:.1e} m'

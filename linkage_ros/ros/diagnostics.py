@@ -285,8 +285,12 @@ class Health:
             level, message = OK, 'Recording'
             topics = recorder.inspect()
             for topic in topics:
+                values[f'Received: {topic.name}'] = topic.received
                 values[f'Recorded: {topic.name}'] = topic.recorded
                 values[f'Dropped: {topic.name}'] = topic.dropped
+                values[f'Waiting: {topic.name}'] = topic.waiting
+                if topic.let_go:
+                    values[f'Let go: {topic.name}'] = topic.let_go
             if any(topic.dropped for topic in topics):
                 level, message = WARN, 'The disk does not keep up: messages dropped'
             if recorder.failure is not None:

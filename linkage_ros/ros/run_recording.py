@@ -20,13 +20,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from datetime import datetime
 import json
-from os.path import exists
+from os.path import lexists
 from pathlib import Path
 import platform
 
 from linkage_ros import __version__
 from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.recorder import Recorder, RecordingSummary
+from linkage_ros.bag.run_events import BEGUN, MID_RUN, WITH_THE_RUN
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
@@ -87,13 +88,20 @@ class RunRecording:
         try:
             described = topics()
             folder = _folder(Path(directory or record.directory), record.name, scene.name)
-            writer = BagWriter(folder, [t for _, t in described], _attachments(scene, described))
+            # What a running tick remembers is not in the bag: a replay has to know.
+            begun = MID_RUN if loop.running else WITH_THE_RUN
+            files = _attachments(scene, described, begun)
+            writer = BagWriter(folder, [t for _, t in described], files, record.storage)
         except RecordingError as error:
             self.failure = f'not recording: {error}'
             self._logger.error(self.failure)
             return self.failure
-        loop.recorder = Recorder(writer, capacity=record.queue)
+        loop.recorder = Recorder(
+            writer, capacity=record.queue, flush_period=record.storage.flush_period
+        )
         line = f'recording to {folder}'
+        if record.name and folder.name != record.name:
+            line += f': {record.name} exists already'
         self._logger.info(line)
         return line
 
@@ -105,7 +113,9 @@ class RunRecording:
         summary = recorder.stop()
         self.ended.append(summary)
         counts = ', '.join(
-            f'{t.name} {t.recorded} recorded {t.dropped} dropped' for t in summary.topics
+            f'{t.name} {t.recorded} recorded {t.dropped} dropped'
+            + (f' {t.let_go} let go' if t.let_go else '')
+            for t in summary.topics
         )
         if summary.failure:
             self.failure = f'recording ended early: {summary.failure}'
@@ -118,7 +128,7 @@ class RunRecording:
 
 
 def _attachments(
-    scene: Scene, topics: Sequence[tuple[str, Topic]]
+    scene: Scene, topics: Sequence[tuple[str, Topic]], begun: str
 ) -> dict[str, tuple[str, bytes]]:
     named = {key: topic.name for key, topic in topics if key != EXTRA}
     run = {
@@ -126,6 +136,7 @@ def _attachments(
         'scene_folder': str(Path(scene.folder).resolve()),
         **named,
         'extra_topics': [topic.name for key, topic in topics if key == EXTRA],
+        BEGUN: begun,
         'linkage_ros': __version__,
         'python': platform.python_version(),
         'machine': platform.machine(),
@@ -137,11 +148,10 @@ def _attachments(
 
 
 def _folder(directory: Path, name: str, scene: str) -> Path:
-    if name:
-        return directory / name
-    dated = f'{scene}_{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}'
-    folder, number = directory / dated, 1
-    while exists(folder):  # noqa: PTH110 (Path's raises where it may not look)
+    """Return where a bag goes: one that exists keeps its name, and this one gets a number."""
+    name = name or f'{scene}_{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}'
+    folder, number = directory / name, 1
+    while lexists(folder):
         number += 1
-        folder = directory / f'{dated}_{number}'
+        folder = directory / f'{name}_{number}'
     return folder

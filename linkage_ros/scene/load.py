@@ -35,6 +35,7 @@ from linkage_ros.scene.loads import read_loads
 from linkage_ros.scene.read import parts_of, read_parameters
 from linkage_ros.scene.scene import Member, RecordParameters, Scene
 from linkage_ros.scene.section import Section
+from linkage_ros.scene.storage import read_storage
 from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
@@ -324,10 +325,10 @@ def _record(content: Section) -> RecordParameters:
         directory=content.text('directory', 'runs'),
         name=content.text('name', ''),
         queue=content.whole('queue', 20_000, least=100, most=10_000_000),
+        storage=read_storage(content),
     )
     if record.name != Path(record.name).name or record.name == '..':
         raise content.error(
             'name', f'{record.name!r} is not a plain name', 'leave out the folders'
         )
-    content.finish()
     return record

@@ -21,10 +21,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from linkage_ros.bag.storage import Storage
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.faults.fault import Fault
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.scene.section import Section
+from linkage_ros.scene.storage import StorageParameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,15 +39,19 @@ class RecordParameters:
     directory
         Folder in which the bags' own folders are made, relative to where the node was started.
     name
-        Name of the bag's folder; '' for the scene's name and the time.
+        Name of the bag's folder; '' for the scene's name and the time. Where it exists already, a
+        number is added: NAME_2.
     queue
         How many messages wait for the disk before further ones are dropped.
+    storage
+        In which files, packed how, how soon on the disk.
 
     """
 
     directory: str
     name: str
     queue: int
+    storage: Storage = field(default_factory=StorageParameters)
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,7 @@ from linkage_ros.scene.schema import (
     Schema,
     text,
 )
+from linkage_ros.scene.storage import SPLITS, StorageParameters
 
 _RATE = 'Ticks a second [Hz]; 0: one for every crank sample.'
 _STRONGEST = 1e9
@@ -190,7 +191,11 @@ def _fault() -> Schema:
 
 
 def _record() -> Schema:
-    return mapping(
+    storage = parameters_schema(StorageParameters)['properties']
+    for key, least in SPLITS.items():
+        above = {'if': {'exclusiveMinimum': 0}, 'then': {'minimum': least}}
+        storage[key] = {**storage[key], **above}
+    whole = mapping(
         'How the run is recorded; without it, it is not.',
         {
             'directory': {
@@ -199,7 +204,8 @@ def _record() -> Schema:
             },
             'name': {
                 **text(
-                    "name of the bag's folder; '': the scene's name and the time",
+                    "name of the bag's folder; '': the scene's name and the time; one that exists "
+                    'gets a number',
                     rf'^(?!\.\.?$)(?!.*/){CHARACTER}*$',
                 ),
                 'default': '',
@@ -211,5 +217,10 @@ def _record() -> Schema:
                 'maximum': 10_000_000,
                 'default': 20_000,
             },
+            **storage,
         },
     )
+    split = [{'required': [key], 'properties': {key: {'exclusiveMinimum': 0}}} for key in SPLITS]
+    one_file = f'without {" or ".join(SPLITS)} there is one file'
+    alone = {'properties': {'keep_files': {'description': one_file, 'maximum': 0}}}
+    return {**whole, 'if': {'anyOf': split}, 'else': alone}

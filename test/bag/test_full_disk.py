@@ -30,9 +30,12 @@ import pickle
 import signal
 import subprocess
 import sys
+import time
 
-from linkage_ros.bag import writer as writer_module
+from linkage_ros.bag.disk import Reserve
 from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError, RecordingError
 import pytest
@@ -80,7 +83,7 @@ def test_a_full_disk_costs_no_message_that_was_taken(
 def test_when_another_process_takes_the_reserve_whole_chunks_remain(
     small_disk, topics, messages, readers, monkeypatch
 ):
-    monkeypatch.setattr(writer_module.Reserve, 'release', lambda reserve: None)
+    monkeypatch.setattr(Reserve, 'release', lambda reserve: None)
     writer = BagWriter(small_disk / 'run', topics)
     taken, _ = _write_until_it_fails(writer, messages, flush_every=100)
     summary = writer.close()
@@ -149,6 +152,87 @@ def test_a_limit_on_the_files_size_leaves_a_bag_of_whole_chunks(
 
 def _pickle(topics, messages):
     return pickle.dumps((topics, messages))
+
+
+def test_a_disk_that_fills_among_files_keeps_them_all(small_disk, topics, messages, readers):
+    storage = Storage(split_bytes=300_000)
+    writer = BagWriter(small_disk / 'run', topics, ATTACHMENTS, storage)
+    taken, error = _write_until_it_fails(writer, messages, flush_every=100)
+    assert 'ended early: No space left on device' in str(error)
+    summary = writer.close()
+    assert len(summary.parts) >= 3
+    assert taken <= sum(summary.counts) <= taken + 1
+    there = [message.data for message in messages[: sum(summary.counts)]]
+    assert [m.data for m in read_bag(small_disk / 'run').messages()] == there
+    assert sorted(data for *_, data in readers.rosbags(small_disk / 'run')) == sorted(there)
+    for part in summary.parts:
+        assert read_bag(small_disk / 'run' / part.file).attachments == {
+            'scene.yaml': b'linkage: four_bar\n'
+        }
+
+
+def test_a_ring_goes_on_where_all_of_it_would_fill_the_disk(small_disk, topics, messages, readers):
+    storage = Storage(split_bytes=200_000, keep_files=3)
+    writer = BagWriter(small_disk / 'run', topics, ATTACHMENTS, storage)
+    for _ in range(2):  # 4 MB on a disk of 2 MiB
+        assert _write_until_it_fails(writer, messages, flush_every=100)[1] is None
+    summary = writer.close()
+    kept, gone = sum(summary.counts), sum(summary.let_go)
+    assert kept + gone == 2 * len(messages)
+    assert kept > 1000
+    there = [message.data for message in messages[-kept:]]
+    assert [m.data for m in read_bag(small_disk / 'run').messages()] == there
+    assert sorted(data for *_, data in readers.rosbags(small_disk / 'run')) == sorted(there)
+
+
+def test_a_recording_ends_where_less_stays_free_than_it_should(
+    small_disk, topics, messages, readers
+):
+    storage = Storage(min_free_bytes=600_000)
+    recorder = Recorder(
+        BagWriter(small_disk / 'run', topics, ATTACHMENTS, storage), flush_period=0.01
+    )
+    for message in messages:
+        recorder.offer(*message)
+        if recorder.failure:
+            break
+        time.sleep(0.0002)
+    summary = recorder.stop()
+    free = os.statvfs(small_disk)
+    # It gave back what it had set aside, and what it writes between two looks is little.
+    assert free.f_bavail * free.f_frsize > 600_000 - 100_000
+    assert summary.failure.startswith(f'{small_disk}/run: the recording ended: ')
+    assert summary.failure.endswith(
+        'bytes are free on its disk, fewer than min_free_bytes: 600,000; make room there before '
+        'the next recording'
+    )
+    kept = sum(counts.recorded for counts in summary.topics)
+    assert kept > 500
+    assert all(c.received == c.recorded + c.dropped for c in summary.topics)
+    readers.agree(small_disk / 'run', topics, messages[:kept])
+    text = yaml.safe_load((small_disk / 'run' / 'metadata.yaml').read_text())
+    custom = text['rosbag2_bagfile_information']['custom_data']
+    assert custom['linkage_ros.failure'] == summary.failure
+
+
+@pytest.mark.parametrize('when', ['by size', 'by time'])
+def test_the_floor_counts_at_each_new_file_too(small_disk, topics, messages, when):
+    split = {'by size': {'split_bytes': 200_000}, 'by time': {'split_seconds': 0.5}}[when]
+    storage = Storage(min_free_bytes=600_000, **split)
+    writer = BagWriter(small_disk / 'run', topics, ATTACHMENTS, storage)
+    taken, error = _write_until_it_fails(writer, messages)
+    assert 'fewer than min_free_bytes: 600,000' in str(error)
+    assert sum(writer.close().counts) == taken
+    found = [message.data for message in read_bag(small_disk / 'run').messages()]
+    assert found == [message.data for message in messages[:taken]]
+
+
+def test_a_disk_with_too_little_room_from_the_start_gets_no_bag(small_disk, topics):
+    with pytest.raises(
+        RecordingError, match=r'cannot be recorded to: .* min_free_bytes: 5,000,000'
+    ):
+        BagWriter(small_disk / 'run', topics, storage=Storage(min_free_bytes=5_000_000))
+    assert list(small_disk.iterdir()) == []
 
 
 @pytest.mark.parametrize('healthy_writes', [6, 20, 21])

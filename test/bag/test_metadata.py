@@ -25,6 +25,7 @@ from linkage_ros.bag.metadata import (
     metadata_text,
     NO_START,
     qos_text,
+    together,
     write_metadata,
 )
 from linkage_ros.bag.topic import QosProfile
@@ -115,6 +116,40 @@ def test_the_file_says_what_rosbag2_says(summary, topics, monkeypatch):
         expected['rosbag2_bagfile_information']
     )
     assert '&' not in text, 'an alias that yaml-cpp understands and people do not'
+
+
+@pytest.mark.parametrize('root', [True, False])
+@pytest.mark.parametrize('custom', [{}, {'seed': '7', 'note': 'zwei\n\nZeilen: ja\u2028 é'}])
+@pytest.mark.parametrize('files', [0, 3])
+@pytest.mark.parametrize('with_topics', [True, False])
+def test_its_text_is_that_of_a_yaml_library(summary, root, custom, files, with_topics):
+    if not with_topics:
+        summary = replace(summary, topics=(), counts=(), refused=())
+    parts = [replace(summary, file=f'run: {number}.mcap') for number in range(files)]
+    text = metadata_text(replace(summary, parts=tuple(parts)), custom, root=root)
+    content = yaml.safe_load(text)
+    written = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=1000)
+    # Lines without anything but indentation stand in texts of several lines only.
+    assert [line.strip() for line in text.split('\n')] == [
+        line.strip() for line in written.split('\n')
+    ]
+    inner = content['rosbag2_bagfile_information'] if root else content
+    assert inner['custom_data'] == (custom or None)
+
+
+def test_files_together_are_a_bag(summary):
+    empty = replace(summary, file='run_1.mcap', counts=(0, 0), start=NO_START, duration=0, size=5)
+    early = replace(
+        summary, file='run_2.mcap', counts=(1, 0), start=summary.start - 10, duration=11, size=6
+    )
+    whole = together([summary, empty, early], (1, 2), (3, 4))
+    assert (whole.counts, whole.refused, whole.let_go) == ((4, 4), (1, 2), (3, 4))
+    assert (whole.start, whole.duration) == (summary.start - 10, summary.duration + 10)
+    assert (whole.size, whole.file) == (1234 + 5 + 6, 'run_2.mcap')
+    information = yaml.safe_load(metadata_text(whole, {}, root=False))
+    assert information['relative_file_paths'] == ['run_0.mcap', 'run_1.mcap', 'run_2.mcap']
+    assert [each['message_count'] for each in information['files']] == [7, 0, 1]
+    assert together([empty], (0, 0), (0, 0)) == replace(empty, refused=(0, 0), let_go=(0, 0))
 
 
 def test_the_record_in_the_file_has_no_root_key(summary):

@@ -188,7 +188,7 @@ def test_a_flipped_bit_is_found_where_it_is(folder, messages):
     content[place + 30] ^= 1
     file.write_bytes(content)
     found = []
-    with pytest.raises(BagError, match='is damaged: CRCValidationError'):
+    with pytest.raises(BagError, match=r'is damaged: the record at byte .*checksum does not fit'):
         found.extend(message.data for message in read_bag(folder).messages())
     assert found == [message.data for message in messages[: len(found)]]
     assert 5000 < len(found) <= 6000

@@ -22,6 +22,7 @@ import json
 import os
 import threading
 
+from linkage_ros.bag.account import UNFINISHED
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.recorder import Recorder
 from linkage_ros.bag.writer import BagWriter
@@ -72,6 +73,7 @@ def test_the_bag_says_what_is_missing_from_it(tmp_path, topics, messages):
     text = yaml.safe_load((tmp_path / 'run' / 'metadata.yaml').read_text())
     custom = text['rosbag2_bagfile_information']['custom_data']
     assert custom['seed'] == '7'
+    assert json.loads(custom['linkage_ros.received']) == {'/crank': 3, '/arm/joint_states': 2}
     assert json.loads(custom['linkage_ros.dropped']) == {'/crank': 3, '/arm/joint_states': 2}
 
 
@@ -136,6 +138,14 @@ def test_a_failure_ends_the_recording_and_not_the_process(
     kept = sum(counts.recorded for counts in summary.topics)
     assert 500 < kept < 6000
     readers.agree(tmp_path / 'run', topics, messages[:kept])
+    text = yaml.safe_load((tmp_path / 'run' / 'metadata.yaml').read_text())
+    custom = text['rosbag2_bagfile_information']['custom_data']
+    assert custom['linkage_ros.failure'] == summary.failure
+    # The account in the bag is that of the moment at which it ended.
+    received, dropped = (json.loads(custom[f'linkage_ros.{w}']) for w in ('received', 'dropped'))
+    for counts in summary.topics:
+        assert received[counts.name] == counts.recorded + dropped[counts.name]
+        assert counts.recorded < received[counts.name] <= counts.received
 
 
 def test_an_error_nobody_thought_of_is_a_failure_too(tmp_path, topics, messages, monkeypatch):
@@ -194,6 +204,37 @@ def test_threads_that_offer_at_once_lose_no_count(tmp_path, topics, messages, re
     assert len(found) == sum(counts.recorded for counts in summary.topics)
     if capacity > 50:
         assert len(found) == 20_000
+
+
+def test_while_a_bag_is_recorded_its_metadata_says_so_and_counts_what_is_safe(
+    tmp_path, topics, messages, monkeypatch
+):
+    monkeypatch.setattr('linkage_ros.bag.writer._RENEWAL', 0.0)
+
+    def information():
+        text = (tmp_path / 'run' / 'metadata.yaml').read_text()
+        return yaml.safe_load(text)['rosbag2_bagfile_information']
+
+    writer = BagWriter(tmp_path / 'run', topics)
+    monkeypatch.setattr(writer, '_due', 0.0)
+    recorder = Recorder(writer, flush_period=0.02)
+    before = information()
+    assert list(before['custom_data']) == [UNFINISHED]
+    assert (before['message_count'], before['relative_file_paths']) == (0, ['run_0.mcap'])
+    for message in messages[:10]:
+        recorder.offer(*message)
+    for _ in range(500):
+        if information()['message_count'] == 10:
+            break
+        threading.Event().wait(0.02)
+    now = information()
+    assert now['message_count'] == 10
+    assert list(now['custom_data']) == [UNFINISHED]
+    assert now['starting_time']['nanoseconds_since_epoch'] == min(
+        m.log_time for m in messages[:10]
+    )
+    recorder.stop()
+    assert UNFINISHED not in information()['custom_data']
 
 
 def test_what_waits_for_long_is_flushed_in_between(tmp_path, topics, messages):

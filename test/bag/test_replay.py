@@ -23,6 +23,7 @@ from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag, RUN_FILE
 from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
@@ -54,12 +55,14 @@ def files(scene: str, run: bytes = RUN) -> dict[str, tuple[str, bytes]]:
 class Run:
     """A tick by hand: offers and ticks as the node's tick loop makes them, recorded."""
 
-    def __init__(self, folder: Path, scene: str, run: bytes = RUN) -> None:
+    def __init__(
+        self, folder: Path, scene: str, run: bytes = RUN, storage: Storage | None = None
+    ) -> None:
         said = json.loads(run)
         names = [name for key, name in said.items() if key.endswith('_topic')]
         names += said.get('extra_topics', [])
         topics = [Topic(name, 'sensor_msgs/msg/JointState', '', '') for name in names]
-        self.recorder = Recorder(BagWriter(folder, topics, files(scene, run)))
+        self.recorder = Recorder(BagWriter(folder, topics, files(scene, run), storage))
         self.folder = folder
         # The scene as the bag has it: what is tested is the order and the times, not the loading.
         self.scene = recorded_scene(read_bag(folder, allow_truncated=True))
@@ -106,6 +109,20 @@ def test_ticks_on_a_clock_replay_to_the_same_bytes(tmp_path: Path, scene: str) -
         run.tick(now, now)
     assert 1500 < len(run.published) < 2000
     assert run.replayed() == [(message, message) for message in run.published]
+
+
+@pytest.mark.parametrize('compression', ['none', 'lz4', 'zstd'])
+def test_a_bag_in_several_files_replays_as_one(tmp_path: Path, compression: str) -> None:
+    storage = Storage(split_seconds=0.3, compression=compression)
+    run = Run(tmp_path / 'bag', 'effects: {velocity: {}}\n', storage=storage)
+    for k in range(2000):
+        now = SECOND + k * 1_000_000
+        # A sample may be the last of a file, and its joint state the first of the next.
+        if k % 2 == 0:
+            run.offer(now - 500_000, sample(now - 637_000, tau * k * 1e-3, tau))
+        run.tick(now, now)
+    assert run.replayed() == [(message, message) for message in run.published]
+    assert len(read_bag(run.folder).files) == 7
 
 
 def test_ticks_on_samples_replay_to_the_same_bytes(tmp_path: Path) -> None:

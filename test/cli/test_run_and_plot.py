@@ -86,15 +86,16 @@ def test_a_linkage_file_runs_as_it_is(linkage: Run, tmp_path: Path) -> None:
     assert not (tmp_path / 'runs').exists()
 
 
-def test_a_folder_that_exists_is_not_touched_and_the_run_goes_on(
+def test_a_folder_that_exists_is_not_touched_and_the_bag_gets_a_number(
     linkage: Run, tmp_path: Path, scene: Path
 ) -> None:
     taken = tmp_path / 'runs' / 'b 1'
     taken.mkdir(parents=True)
     answer = linkage('run', str(scene), '--seconds', '1')
-    assert answer.returncode == 1
-    assert 'runs/b 1: exists already' in answer.stdout
+    assert answer.returncode == 0
+    assert 'runs/b 1_2: b 1 exists already' in answer.stderr
     assert list(taken.iterdir()) == []
+    assert not read_bag(tmp_path / 'runs' / 'b 1_2').truncated
 
 
 def test_a_bag_of_nothing_is_not_drawn(linkage: Run, tmp_path: Path, scene: Path) -> None:

@@ -67,10 +67,6 @@ def scene_text(directory, name=', name: bag', rate=100):
 
 def cannot_begin(folder, case):
     """Return a record directory, and what the node has to say of it."""
-    if case == 'the folder exists':
-        (folder / case / 'bag').mkdir(parents=True)
-        (folder / case / 'bag' / 'mine').write_text('precious')
-        return folder / case, 'exists already'
     if case == 'below a file':
         (folder / case).write_text('a file')
         return folder / case, 'Not a directory'
@@ -80,12 +76,11 @@ def cannot_begin(folder, case):
 @pytest.mark.parametrize(
     ('case', 'name'),
     [
-        ('the folder exists', ', name: bag'),
         ('below a file', ', name: bag'),
         ('below a file', ''),
         ('a name too long', ''),
     ],
-    ids=['exists', 'below a file', 'below a file, dated', 'too long, dated'],
+    ids=['below a file', 'below a file, dated', 'too long, dated'],
 )
 def test_a_bag_that_cannot_be_made(
     graph, tmp_path, write_scene, start, keeps_publishing, case, name
@@ -103,8 +98,23 @@ def test_a_bag_that_cannot_be_made(
     keeps_publishing()
     assert node.end() == INCOMPLETE
     assert 'Traceback' not in node.log
-    if case == 'the folder exists':
-        assert [path.name for path in (directory / 'bag').iterdir()] == ['mine']
+
+
+def test_a_name_that_is_taken_gets_a_number(graph, tmp_path, write_scene, start, keeps_publishing):
+    (tmp_path / 'bag').mkdir()
+    (tmp_path / 'bag' / 'mine').write_text('precious')
+    (tmp_path / 'bag_2').symlink_to(tmp_path / 'nowhere')
+    node = start(write_scene('taken', scene_text(tmp_path)))
+    for name in ('bag_3', 'bag_4'):
+        graph.wait_for_level('recording', OK)
+        keeps_publishing()
+        assert graph.call(Trigger, '/linkage_node/stop_recording').success
+        with AnyReader([tmp_path / name]) as reader:
+            assert reader.message_count > 0
+        assert f'recording to {tmp_path}/{name}: bag exists already' in node.log
+        assert graph.call(Trigger, '/linkage_node/start_recording').success
+    assert node.end() == 0
+    assert [path.name for path in (tmp_path / 'bag').iterdir()] == ['mine']
 
 
 def limit_file_size():

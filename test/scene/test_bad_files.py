@@ -96,6 +96,26 @@ SCENES = {
         ":2: record.name: 'a\\nb' is not a text; write a name",
     ),
     'half a message': (b'record: {queue: 100.5}', ':2: record.queue: 100.5 is not whole; write'),
+    'flush at every tick': (
+        b'record: {flush_period: 0.001}',
+        ':2: record.flush_period: 0.001 is out of bounds; write a finite number, at least 0.05',
+    ),
+    'file of a byte': (
+        b'record: {split_bytes: 1}',
+        ':2: record.split_bytes: 1 is too small; write 1000000 or more, or 0',
+    ),
+    'file of a moment': (
+        b'record: {split_seconds: 0.5}',
+        ':2: record.split_seconds: 0.5 is too small; write 1 or more, or 0',
+    ),
+    'ring of one file': (
+        b'record: {keep_files: 2}',
+        ':2: record.keep_files: there is one file only; write split_bytes or split_seconds too',
+    ),
+    'unknown packing': (
+        b'record: {compression: gzip}',
+        ":2: record.compression: 'gzip' is none; write none or lz4 or zstd",
+    ),
     'tab': (b'drive:\n\ttopic: {}', ':3: is not valid YAML (found character'),
     'open bracket': (b'effects: {velocity: {}', ':2: is not valid YAML (expected'),
     'two documents': (b'---\nrate: 1', ':2: is not valid YAML (but found another document);'),

@@ -25,6 +25,7 @@ from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
 from linkage_ros.scene.scene import RecordParameters
+from linkage_ros.scene.storage import StorageParameters
 import pytest
 
 from .files import CONFIG, FOUR_BAR, SCENE
@@ -98,6 +99,29 @@ record: {directory: bags, name: first, queue: 1000}
 def test_a_record_that_says_nothing(build):
     scene, _ = build(SCENE + b'record: {}')
     assert scene.record == RecordParameters(directory='runs', name='', queue=20_000)
+
+
+def test_a_record_that_says_how_it_is_stored(build):
+    scene, _ = build(
+        SCENE
+        + b"""
+record:
+  flush_period: 0.25
+  split_bytes: 1e8
+  split_seconds: 60
+  keep_files: 10
+  min_free_bytes: 1000000000
+  compression: zstd
+"""
+    )
+    assert scene.record.storage == StorageParameters(
+        flush_period=0.25,
+        split_bytes=100_000_000,
+        split_seconds=60.0,
+        keep_files=10,
+        min_free_bytes=1_000_000_000,
+        compression='zstd',
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,94 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+``python -m campaigns.damage``: bags cut at every byte, and every bit of them flipped.
+
+Reading and recovering has to find the damage, or it does no harm: what is given are true messages
+in their order, topics and attachments as they were, and what is missing is said to be. A verdict
+says how much was given, and whether something was said.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+import sys
+import time
+
+from bench.machine import describe_machine
+from bench.report import say, show, Table
+from campaigns.damage.judge import FAULT
+from campaigns.damage.run import JUDGES, parts, run, Tally
+from campaigns.damage.subject import KINDS
+
+
+def main() -> int:
+    """Damage and judge; 1 where a verdict is a fault."""
+    parser = argparse.ArgumentParser('python -m campaigns.damage', description=__doc__)
+    parser.add_argument('--size', type=int, default=100_000, help='of the file, about [bytes]')
+    parser.add_argument('--sample', type=int, help='cuts and flips at random, instead of all')
+    parser.add_argument(
+        '--others', type=int, default=20_000, help='cuts and flips of each bag by other writers'
+    )
+    parser.add_argument('--jobs', type=int, default=2, help='processes')
+    parser.add_argument('--seed', type=int, default=1)
+    arguments = parser.parse_args()
+    started = told = time.monotonic()
+    work = parts(['own'], arguments.seed, arguments.size, arguments.sample)
+    others = [kind for kind in KINDS if kind != 'own']
+    work += (
+        parts(others, arguments.seed, arguments.size, arguments.others) if arguments.others else []
+    )
+    tally = Tally()
+    done, of = 0, sum(len(part.places) for part in work)
+    try:
+        for part, judged in run(work, arguments.jobs):
+            tally.add(judged)
+            done += len(part.places)
+            if time.monotonic() - told > 10 or done == of:
+                told = time.monotonic()
+                say(f'{done:,} of {of:,} damages, {told - started:.0f} s')
+    except KeyboardInterrupt:
+        say('stopped')
+        return 130
+    for kind in KINDS:
+        for damage in ('cut', 'flip'):
+            _show(tally, kind, damage)
+    for kind, damage, place, name, verdict in tally.faults:
+        say(f'{name}, {kind}, {damage} {place}: {verdict}')
+    machine = Table('Machine', ('', ''), [*describe_machine()])
+    machine.rows.append(('seed', str(arguments.seed)))
+    seconds = time.monotonic() - started
+    machine.rows.append(('damages', f'{of:,} in {seconds:.0f} s, {arguments.jobs} processes'))
+    show(machine)
+    return int(bool(tally.faults))
+
+
+def _show(tally: Tally, kind: str, damage: str) -> None:
+    counts: dict[str, Counter[str]] = {}
+    for (of_kind, of_damage, judge, verdict), count in tally.verdicts.items():
+        if (of_kind, of_damage) == (kind, damage):
+            counts.setdefault(verdict, Counter())[judge] += count
+    if not counts:
+        return
+    table = Table(f'{kind}: {damage}', ('verdict', *JUDGES))
+    for verdict in sorted(counts, key=lambda v: (not v.startswith(FAULT), v)):
+        table.rows.append([verdict, *(f'{counts[verdict][judge]:,}' for judge in JUDGES)])
+    show(table)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

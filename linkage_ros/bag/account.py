@@ -1,0 +1,106 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a bag says of itself: what became of its messages, and whether it is finished."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import json
+from typing import NamedTuple
+
+from linkage_ros.bag.metadata import BagSummary, metadata_text
+
+_PREFIX = 'linkage_ros.'
+
+ACCOUNT = f'{_PREFIX}account'
+"""Name of the metadata record at the end of a bag's last file that holds an `Account`."""
+
+LET_GO = f'{_PREFIX}let_go'
+"""Key in the ``custom_data`` of a bag whose first files are gone: a JSON object by topic."""
+
+FAILURE = f'{_PREFIX}failure'
+"""Key in the ``custom_data`` of a bag whose recording ended early: why."""
+
+UNFINISHED = f'{_PREFIX}unfinished'
+"""Key in the ``custom_data`` of a bag that is being recorded, or whose recording was killed."""
+
+UNFINISHED_DATA: Mapping[str, str] = {
+    UNFINISHED: 'being recorded, or killed; counted is what was on the disk by the last flush'
+}
+
+
+class Account(NamedTuple):
+    """
+    Messages by topic: ``received == recorded + dropped + let_go``.
+
+    Attributes
+    ----------
+    received
+        What the recording was given.
+    recorded
+        What is in the bag.
+    dropped
+        What the disk was too slow or too full for, or what no bag can hold.
+    let_go
+        What was in files that made way for newer ones.
+
+    """
+
+    received: Sequence[int]
+    recorded: Sequence[int]
+    dropped: Sequence[int]
+    let_go: Sequence[int]
+
+
+def custom_data(
+    custom: Mapping[str, str], summary: BagSummary, account: Account | None
+) -> dict[str, str]:
+    """
+    Return the ``custom_data`` of a bag's metadata.
+
+    Parameters
+    ----------
+    custom
+        What else it says.
+    summary
+        What the bag holds.
+    account
+        What became of all messages; None while that is not known.
+
+    """
+    entries = dict(custom)
+    if any(summary.let_go):
+        entries[LET_GO] = _by_topic(summary.let_go, summary)
+    if account:
+        entries[f'{_PREFIX}received'] = _by_topic(account.received, summary)
+        entries[f'{_PREFIX}dropped'] = _by_topic(account.dropped, summary)
+    return entries
+
+
+def last_records(
+    custom: Mapping[str, str], summary: BagSummary, account: Account | None
+) -> dict[str, dict[str, str]]:
+    """Return by their names the metadata records that end a file; arguments as `custom_data`."""
+    text = metadata_text(summary, custom_data(custom, summary, account), root=False)
+    records = {'rosbag2': {'serialized_metadata': text}}
+    if account:
+        words = zip(Account._fields, account, strict=True)
+        records[ACCOUNT] = {word: _by_topic(counts, summary) for word, counts in words}
+    return records
+
+
+def _by_topic(counts: Sequence[int], summary: BagSummary) -> str:
+    return json.dumps({t.name: n for t, n in zip(summary.topics, counts, strict=True)})

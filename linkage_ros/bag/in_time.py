@@ -1,0 +1,162 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A bag's messages in the order of their log times, those of one time in that of the file.
+
+Files with an index are read chunk by chunk, each when its time has come, so that no more is held
+than the chunks whose times overlap, and what lies before a start is not read at all. What has no
+index (its recording was killed, or wrote none) is read from its beginning, and put in order within
+a window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from heapq import heapify, heappop, heappush, merge
+from itertools import count
+from operator import attrgetter
+from pathlib import Path
+
+from linkage_ros.bag.compression import DamagedError
+from linkage_ros.bag.file_index import FileIndex, index_of
+from linkage_ros.bag.folder import unreadable
+from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.bag.records import chunk_at, content_of, Definitions, messages_in, Source
+from linkage_ros.errors import BagError
+
+WINDOW = 1_000_000_000
+"""How much later than it should a message may stand in a file without an index, in [ns]."""
+
+_Entry = tuple[int, int, int, int, BagMessage | None]
+"""Time, number of the file, place of the chunk, number in it from 1; a whole chunk has none."""
+
+
+class TimeOrder:
+    """
+    The order of a bag's messages in time.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+
+    Attributes
+    ----------
+    begin
+        The least log time, in [ns]; nothing without messages.
+    end
+        The greatest, in [ns]; nothing where the bag must be read to know it.
+
+    Raises
+    ------
+    BagError
+        A file cannot be read, or its beginning is damaged.
+
+    """
+
+    def __init__(self, bag: Bag) -> None:
+        self._files = bag.files
+        self._definitions: dict[int, Definitions] = {}
+        self._chunks: list[tuple[int, _Entry]] = []  # each with its last time
+        unindexed = []
+        for number, file in enumerate(bag.files):
+            index = _index(file)
+            if index is None:
+                unindexed.append(file)
+                continue
+            self._definitions[number] = index.definitions
+            for chunk in index.chunks:
+                # One that holds definitions only has no times.
+                if chunk.message_end_time or chunk.message_index_offsets:
+                    place = chunk.message_start_time, number, chunk.chunk_start_offset, 0, None
+                    self._chunks.append((chunk.message_end_time, place))
+        self._rest = replace(bag, files=tuple(unindexed))
+        self.end = None if unindexed else max((last for last, _ in self._chunks), default=None)
+        first = next(self.messages(), None)
+        self.begin = first.log_time if first else None
+
+    def messages(self, since: int = 0) -> Iterator[BagMessage]:
+        """
+        Yield the messages from a log time on, in [ns].
+
+        Raises
+        ------
+        BagError
+            A file is damaged; the messages before the damage have been given by then.
+
+        """
+        yield from merge(
+            self._indexed(since),
+            _ordered(message for message in self._rest.messages() if message.log_time >= since),
+            key=attrgetter('log_time'),
+        )
+
+    def _indexed(self, since: int) -> Iterator[BagMessage]:
+        heap = [place for last, place in self._chunks if last >= since]
+        heapify(heap)
+        while heap:
+            _, number, place, _, message = heappop(heap)
+            if message is not None:
+                yield message
+                continue
+            for index, found in enumerate(self._read(number, place), 1):
+                if found.log_time >= since:
+                    heappush(heap, (found.log_time, number, place, index, found))
+
+    def _read(self, number: int, place: int) -> list[BagMessage]:
+        """Return the messages of the chunk at a place of a file."""
+        file = self._files[number]
+        try:
+            with file.open('rb') as stream:
+                content = content_of(chunk_at(Source(stream), place))
+            found = messages_in(content, self._definitions[number])
+            return [
+                BagMessage(each.channel.topic, each.log_time, each.publish_time, each.data)
+                for each in found
+            ]
+        except OSError as error:
+            raise unreadable(file, error) from None
+        except DamagedError as error:
+            raise BagError(
+                file,
+                f'is damaged: the chunk at byte {place:,} {error}',
+                'linkage recover saves what is whole',
+            ) from None
+
+
+def _index(file: Path) -> FileIndex | None:
+    """Return a file's index; nothing where it has none to go by."""
+    try:
+        with file.open('rb') as stream:
+            index = index_of(Source(stream))
+    except OSError as error:
+        raise unreadable(file, error) from None
+    except DamagedError:
+        return None
+    return index if index.chunks and index.definitions.channels else None
+
+
+def _ordered(messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
+    """Yield messages in the order of their times, each as soon as one is a window later."""
+    heap: list[tuple[int, int, BagMessage]] = []
+    numbers = count()
+    for message in messages:
+        heappush(heap, (message.log_time, next(numbers), message))
+        while heap[0][0] < message.log_time - WINDOW:
+            yield heappop(heap)[2]
+    while heap:
+        yield heappop(heap)[2]

@@ -1,0 +1,261 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Make a whole bag of what a damaged one still holds; the damaged one is read, nothing else."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import shutil
+from typing import Any
+
+from linkage_ros.bag.being_written import is_being_written
+from linkage_ros.bag.folder import custom_of, files_of, information_of, unreadable
+from linkage_ros.bag.metadata import METADATA_FILE
+from linkage_ros.bag.new_bag import NewBag
+from linkage_ros.bag.records import Message, Source
+from linkage_ros.bag.recovery import promised_counts, RECOVERED, Recovery, TopicRecovery
+from linkage_ros.bag.salvage import BEGINNING, Loss, Salvage
+from linkage_ros.errors import BagError, quoted, RecordingError
+
+Told = Callable[[int, int], None]
+Stopped = Callable[[], bool]
+
+
+class _Findings:
+    """What comes to light on the way."""
+
+    def __init__(self) -> None:
+        self.losses: list[tuple[str, Loss]] = []
+        self.repaired: list[str] = []
+        self.remarks: list[str] = []
+        self.promised: Counter[str] = Counter()
+        self.all_promised = True  # whether the index of each file could be believed
+
+
+def recovered_name(path: Path) -> Path:
+    """Return the folder that a bag is recovered to if none is named: beside it."""
+    whole = Path(os.path.abspath(path))  # noqa: PTH100 (a link keeps the name it goes by)
+    return whole.with_name(f'{whole.name if path.is_dir() else whole.stem}_recovered')
+
+
+def recover(
+    path: Path,
+    target: Path | None = None,
+    told: Told = lambda done, of: None,
+    stopped: Stopped = lambda: False,
+) -> Recovery | None:
+    """
+    Save what is whole of a bag into a new one.
+
+    Parameters
+    ----------
+    path
+        The bag's folder, or an MCAP file.
+    target
+        The new folder; without it `recovered_name`.
+    told
+        Takes how many bytes have been seen, and of how many.
+    stopped
+        Whether to stop: then nothing is left behind, and nothing returned.
+
+    Raises
+    ------
+    BagError
+        It is no bag, leads out of its folder, or nothing of it is whole. Nothing was written.
+    RecordingError
+        The new folder exists or cannot be written to. Nothing is left behind.
+
+    """
+    target = target or recovered_name(path)
+    findings = _Findings()
+    information = _information(path, findings)
+    files = _files(path, information, findings)
+    if os.path.lexists(target):
+        raise _exists(target)
+    profile, compression = _foretaste(path, files, stopped)
+    sizes = [file.stat().st_size for file in files]
+    with _new_folder(target):
+        bag = NewBag(target, profile, compression)
+        try:
+            for number, file in enumerate(files):
+                before, of = sum(sizes[:number]), sum(sizes)
+                for done in _save(file, bag, findings):
+                    told(before + done, of)
+                    if stopped():
+                        bag.abandon()
+                        shutil.rmtree(target)
+                        return None
+            recovery = _recovery(target, bag, information, findings)
+            custom = custom_of(information or bag.information)
+            bag.close({**custom, RECOVERED: recovery.in_short(path)})
+        finally:
+            bag.abandon()
+    return recovery
+
+
+def _information(path: Path, findings: _Findings) -> dict[str, Any]:
+    """Return what the metadata says; what is damaged says nothing."""
+    if not path.is_dir():
+        return {}
+    try:
+        information = information_of(path)
+    except BagError:
+        information = {}
+    if not information:
+        findings.repaired.append(METADATA_FILE)
+    return information
+
+
+def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> list[Path]:
+    """Return the files of a bag: those that are named, and those that lie there."""
+    if path.is_dir():
+        named = files_of(path, information) if information else []
+        there = files_of(path, {}) if any(path.glob('*.mcap')) or not named else []
+        files = [*named, *(file for file in there if file not in named)]
+    else:
+        files = [path]
+    found = []
+    for file in files:
+        try:
+            if file.is_file():
+                with file.open('rb'):
+                    found.append(file)
+                continue
+            reason = 'is no file' if file.exists() else 'does not exist'
+        except OSError as error:
+            reason = unreadable(file, error).reason
+        if len(files) == 1:
+            raise BagError(file, reason, "name a bag's folder, or its file")
+        findings.losses.append((file.name, Loss(0, 0, reason)))
+    findings.remarks += [
+        f'{file.name} is still being written; what comes after this is not in the new bag'
+        for file in found
+        if is_being_written(file)
+    ]
+    return found
+
+
+def _foretaste(path: Path, files: Sequence[Path], stopped: Stopped) -> tuple[str, str]:
+    """Return profile and compression for the new bag; or BagError, where there is nothing."""
+    profile, anything, reason = '', False, 'holds no file'
+    for file in files:
+        with file.open('rb') as stream:
+            salvage = Salvage(Source(stream))
+            for found in salvage.found():
+                anything = True
+                if isinstance(found, Message):
+                    ros = found.channel.message_encoding == 'cdr'
+                    return 'ros2' if ros else salvage.data.profile, salvage.data.compression
+                if stopped():
+                    break
+            anything |= bool(salvage.data.definitions.channels)
+            profile = profile or salvage.data.profile
+            reason = _why_nothing(file, salvage)
+    if not anything:
+        raise BagError(path, f'holds nothing that can be saved: {reason}', 'name another bag')
+    return profile or 'ros2', ''
+
+
+def _why_nothing(file: Path, salvage: Salvage) -> str:
+    with file.open('rb') as stream:
+        start = stream.read(8)
+    if not start:
+        return f'{file.name} is empty'
+    if BEGINNING in salvage.repaired:
+        return f'{file.name} starts with {quoted(start)}, as no MCAP file does'
+    if salvage.losses:
+        loss = salvage.losses[0]
+        return f'{file.name} at byte {loss.start:,}: {loss.reason}'
+    return f'{file.name} is whole, and empty'
+
+
+def _save(file: Path, bag: NewBag, findings: _Findings) -> Iterator[int]:
+    """Copy what is whole of a file; yield now and then how many of its bytes have been seen."""
+    bag.begin_file()
+    with file.open('rb') as stream:
+        salvage = Salvage(Source(stream))
+        definitions = salvage.data.definitions
+        told = 0
+        for found in salvage.found():
+            bag.add(found, definitions)
+            if salvage.seen != told:
+                told = salvage.seen
+                yield told
+        bag.describe(definitions)
+    findings.losses += [(file.name, loss) for loss in salvage.losses]
+    findings.repaired += [f'{file.name}: {what}' for what in salvage.repaired]
+    if salvage.data.unchecked:
+        findings.remarks.append(
+            f'{file.name}: {salvage.data.unchecked:,} messages that no checksum covers, taken as '
+            'they stand'
+        )
+    said = salvage.index.statistics if salvage.index else None
+    if said is None:
+        findings.all_promised = False
+        return
+    for number, count in said.channel_message_counts.items():
+        if number in definitions.channels:
+            findings.promised[definitions.channels[number].topic] += count
+
+
+def _recovery(
+    target: Path, bag: NewBag, information: Mapping[str, Any], findings: _Findings
+) -> Recovery:
+    promised: Mapping[str, int] = findings.promised
+    if not findings.all_promised:
+        promised = promised_counts(information)
+    names = dict.fromkeys([*bag.topics, *promised])
+    return Recovery(
+        folder=target,
+        topics=tuple(
+            TopicRecovery(name, bag.counts[name], promised.get(name, 0) if promised else None)
+            for name in names
+        ),
+        attachments=tuple(bag.attachments),
+        losses=tuple(findings.losses),
+        repaired=tuple(findings.repaired),
+        remarks=tuple(findings.remarks),
+    )
+
+
+@contextmanager
+def _new_folder(target: Path) -> Iterator[None]:
+    """Make a folder, which goes away again if what is done in it fails."""
+    remedy = 'name a folder on a disk with room, with -o'
+    try:
+        target.mkdir(parents=True)
+    except FileExistsError:
+        raise _exists(target) from None
+    except OSError as error:
+        reason = f'cannot be made: {error.strerror or error}'
+        raise RecordingError(target, reason, remedy) from None
+    try:
+        yield
+    except OSError as error:
+        shutil.rmtree(target, ignore_errors=True)
+        reason = f'cannot be written: {error.strerror or error}'
+        raise RecordingError(target, reason, remedy) from None
+    except BaseException:
+        shutil.rmtree(target, ignore_errors=True)
+        raise
+
+
+def _exists(target: Path) -> RecordingError:
+    return RecordingError(target, 'exists already', 'name a new folder with -o')

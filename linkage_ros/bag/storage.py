@@ -1,0 +1,66 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""How a bag lies on the disk: in which files, packed how, how soon, and what stays free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import os
+from pathlib import Path
+
+NONE = 'none'
+COMPRESSIONS = (NONE, 'lz4', 'zstd')
+
+
+@dataclass(frozen=True, slots=True)
+class Storage:
+    """
+    How a bag is stored; by default in one file, not packed.
+
+    Attributes
+    ----------
+    flush_period
+        How often the disk is waited for [s]: what a power cut may cost.
+    split_bytes
+        Size at which the next file begins [bytes]; 0 for never.
+    split_seconds
+        Time after which the next file begins [s], by the log times; 0 for never.
+    keep_files
+        How many files are kept; 0 for all.
+    min_free_bytes
+        What stays free on the disk [bytes].
+    compression
+        'none', 'lz4' or 'zstd'.
+
+    """
+
+    flush_period: float = 1.0
+    split_bytes: int = 0
+    split_seconds: float = 0.0
+    keep_files: int = 0
+    min_free_bytes: int = 0
+    compression: str = NONE
+
+
+def scarcity(folder: Path, least: int) -> str:
+    """Return how much too little is free on the disk of a folder; '' where it is enough."""
+    if not least:
+        return ''
+    disk = os.statvfs(folder)
+    free = disk.f_bavail * disk.f_frsize
+    if free >= least:
+        return ''
+    return f'{free:,} bytes are free on its disk, fewer than min_free_bytes: {least:,}'

@@ -1,0 +1,80 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The messages of a bag for a command: with a word on how far it is, up to damage or Ctrl-C."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count
+from threading import Event
+
+from linkage_ros.bag.contents import TOLD_EVERY
+from linkage_ros.bag.layout import layout_of
+from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.cli.progress import progress
+from linkage_ros.errors import BagError
+
+_MIB = 2**20
+_BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its own
+
+
+class BagReading:
+    """
+    The messages of a bag, up to damage or a wish to stop, with a word on how far it is.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+    stop
+        The wish.
+
+    """
+
+    def __init__(self, bag: Bag, stop: Event) -> None:
+        self.damage = ''
+        """What is damaged, on one line; '' where it was read to its end."""
+        self.stopped = False
+        """Whether it was stopped."""
+        self._bag, self._stop = bag, stop
+        self._told: Callable[[int, int], None] = lambda _done, _of: None
+        self._size = max(1, sum(layout_of(file).content for file in bag.files) // _MIB)
+
+    @contextmanager
+    def told(self) -> Iterator[Iterator[BagMessage]]:
+        """Give the messages, and tell on the terminal how far they are."""
+        with progress('replayed [MiB]') as self._told:
+            yield self._messages()
+
+    def _messages(self) -> Iterator[BagMessage]:
+        read = 0
+        messages = self._bag.messages()
+        for number in count(1):
+            try:
+                message = next(messages, None)
+            except BagError as error:
+                self.damage = f'{error.where}: {error.reason}'
+                return
+            if message is None:
+                return
+            read += len(message.data) + _BESIDE
+            yield message
+            if not number % TOLD_EVERY:
+                self._told(read // _MIB, max(self._size, read // _MIB))
+                if self._stop.is_set():
+                    self.stopped = True
+                    return

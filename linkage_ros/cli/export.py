@@ -1,0 +1,275 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Write what a bag holds of its joints to a CSV or Parquet file, a row for each tick.
+
+A row has the joint states and, where they were recorded, the accelerations of ~/motion and the
+forces of ~/pin_forces. The crank's samples come at instants of their own: they are a table of
+their own, by --topic. So is any other topic of joint states, trajectories of one point, or
+wrenches. Of a foreign bag the only topic of joint states is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from itertools import islice
+import json
+from pathlib import Path
+import sys
+from threading import Event
+from typing import Any
+
+from linkage_ros.bag.layout import layout_of
+from linkage_ros.bag.reader import Bag, read_bag, RUN_FILE
+from linkage_ros.cli.message_values import JOINT_STATE, Key, TYPES
+from linkage_ros.cli.progress import progress
+from linkage_ros.cli.table_files import block_rows, check_kind, table_file
+from linkage_ros.cli.tick_rows import (
+    Found,
+    LOGGED,
+    PUBLISHED,
+    rows_of,
+    Source,
+    STAMP,
+    survey,
+    TIME,
+)
+from linkage_ros.errors import BagError, did_you_mean, LinkageError
+from linkage_ros.kinematics.linkage import RevoluteJoint
+from linkage_ros.replay import recorded_scene
+from linkage_ros.scene.scene import Scene
+
+_MIB = 2**20
+
+_UNITS = {
+    'position': ('rad', 'm'),
+    'rate': ('rad/s', 'm/s'),
+    'acceleration': ('rad/s²', 'm/s²'),
+    'effort': ('N·m', 'N'),
+    'force x': ('N', 'N'),
+    'force y': ('N', 'N'),
+    'torque': ('N·m', 'N·m'),
+}
+"""Of each quantity the unit where the joint turns, and where it slides."""
+
+
+class _StopError(Exception):
+    """A signal has asked for an end."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
+    parser.add_argument(
+        '-o', '--output', type=Path, required=True, metavar='FILE', help='FILE.csv or FILE.parquet'
+    )
+    parser.add_argument('--topic', help='a topic to write alone, a row for each message')
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Write the file; return 1 where it was stopped."""
+    try:
+        found = export(arguments.bag, arguments.output, arguments.topic, stop.is_set)
+    except _StopError:
+        print('linkage export: stopped; nothing was written', file=sys.stderr)
+        return 1
+    for (topic, reason), count in found.left_out.items():
+        print(f'linkage export: {topic}: {count} messages left out: {reason}', file=sys.stderr)
+    of = ', '.join(f'{count} of {topic}' for topic, count in found.counts.items())
+    print(f'{arguments.output}: {found.rows} rows, {4 + len(found.keys)} columns ({of})')
+    return 0
+
+
+def export(bag_path: Path, file: Path, topic: str | None, stopped: Callable[[], bool]) -> Found:
+    """
+    Write a bag's joints to a file; memory does not grow with the bag.
+
+    Parameters
+    ----------
+    bag_path
+        The bag.
+    file
+        The file; one that exists is replaced.
+    topic
+        What to write alone; nothing for the joint states and what was published with them.
+    stopped
+        Whether to stop.
+
+    Raises
+    ------
+    LinkageError
+        Where the bag cannot be read or holds nothing to write, or the file cannot be written.
+
+    """
+    check_kind(file)
+    bag = read_bag(bag_path, allow_truncated=True)
+    if bag.truncated:
+        print(f'linkage export: {bag_path}: has no end; its whole part is taken', file=sys.stderr)
+    scene = _scene(bag)
+    source = _source(bag, scene, topic)
+    turning = _turning(scene)
+
+    def bounded(told: Callable[[int, int], None], of: int) -> Callable[[int], None]:
+        def tell(read: int) -> None:
+            if stopped():
+                raise _StopError
+            told(read // _MIB, max(of, read // _MIB))
+
+        return tell
+
+    size = sum(layout_of(path).content for path in bag.files) // _MIB
+    with progress('columns looked for [MiB]') as told:
+        found = survey(source, [] if scene is None else scene.joints, bounded(told, size))
+    if not found.rows:
+        raise _nothing(source, found)
+    heads = [TIME, STAMP, PUBLISHED, LOGGED, *(_head(key, turning) for key in found.keys)]
+    with (
+        table_file(file, heads, (STAMP, PUBLISHED, LOGGED)) as write,
+        progress('written [MiB]') as told,
+    ):
+        rows = rows_of(source, found.keys, bounded(told, size))
+        while block := list(islice(rows, block_rows(len(heads)))):
+            write(block)
+    return found
+
+
+def _scene(bag: Bag) -> Scene | None:
+    """Return the scene that a bag carries, where it carries one that this version can read."""
+    try:
+        return recorded_scene(bag)
+    except LinkageError:
+        return None
+
+
+def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
+    """Return what to write, as it was asked for or as the bag says."""
+    types = {each.name: each.type for each in bag.topics}
+    readable = {name: kind for name, kind in types.items() if kind in TYPES}
+    if topic is not None:
+        others = f'name {" or ".join(readable) or "another bag"}'
+        if topic not in types:
+            raise BagError(
+                bag.path, f'holds no topic {topic}', did_you_mean(topic, readable, others)
+            )
+        if topic not in readable:
+            raise BagError(
+                bag.path, f'{topic} is of {types[topic]}, which is not about joints', others
+            )
+        return Source(bag, {topic: types[topic]}, (), _any)
+    run = _run(bag)
+    joint_states = str(run.get('joint_states_topic'))
+    if joint_states not in readable:
+        joint_states = _only_joint_states(bag, readable)
+        return Source(bag, {joint_states: JOINT_STATE}, (), _any)
+    written = [joint_states]
+    written += [str(name) for name in run.get('extra_topics', ()) if str(name) in readable]
+    crank, faults, withheld = (
+        str(run.get(f'{name}_topic')) for name in ('crank', 'faults', 'withheld')
+    )
+    own = _Own(scene) if scene is not None and crank == joint_states else _any
+    return Source(
+        bag,
+        {name: types[name] for name in written},
+        {crank, faults, withheld},
+        own,
+    )
+
+
+def _any(_names: Sequence[str]) -> bool:
+    return True
+
+
+class _Own:
+    """
+    Tells joint states of a scene from crank samples on the same topic, by their joints.
+
+    Parameters
+    ----------
+    scene
+        The scene; of its linkages some may be left out of a message.
+
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._members = [member.joints for member in scene.members]
+
+    def __call__(self, names: Sequence[str]) -> bool:
+        left = tuple(names)
+        for joints in self._members:
+            count = len(joints)
+            if left[:count] == joints:
+                left = left[count:]
+        return not left
+
+
+def _run(bag: Bag) -> Mapping[str, Any]:
+    """Return a bag's account of its run; nothing where it has none, or a damaged one."""
+    try:
+        run = json.loads(bag.attachments[RUN_FILE])
+    except (KeyError, ValueError, RecursionError):
+        return {}
+    whole = isinstance(run, dict) and isinstance(run.get('extra_topics', []), list)
+    return run if whole else {}
+
+
+def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
+    found = [name for name, kind in readable.items() if kind == JOINT_STATE]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise BagError(
+            bag.path, f'holds joint states on {", ".join(found)}', 'name one with --topic'
+        )
+    raise BagError(
+        bag.path,
+        f'holds no topic of {JOINT_STATE}',
+        f'name {" or ".join(readable)} with --topic' if readable else 'name another bag',
+    )
+
+
+def _nothing(source: Source, found: Found) -> BagError:
+    reasons = Counter(dict(found.left_out)).most_common(1)
+    why = f' ({reasons[0][1]} left out: {reasons[0][0][1]})' if reasons else ''
+    return BagError(
+        source.bag.path,
+        f'holds no message on {", ".join(source.types)} to write{why}',
+        'name another topic with --topic, or another bag',
+    )
+
+
+def _turning(scene: Scene | None) -> dict[str, bool]:
+    """Return of each joint that is known whether it turns, or slides."""
+    if scene is None:
+        return {}
+    turning: dict[str, bool] = {}
+    for member in scene.members:
+        kinds = [isinstance(joint, RevoluteJoint) for joint in member.linkage.joints.values()]
+        turning |= dict(zip(member.joints, kinds, strict=True))
+        driven = [not given.slider for given in member.linkage.inputs]
+        turning |= dict(zip(member.inputs, driven, strict=True))
+    return turning
+
+
+def _head(key: Key, turning: Mapping[str, bool]) -> str:
+    """Return the heading of a column: the joint, what is told of it, and its unit."""
+    name, quantity = key
+    angular, linear = _UNITS[quantity]
+    told = name if quantity == 'position' else f'{name} {quantity}'
+    if name in turning:
+        return f'{told} [{angular if turning[name] else linear}]'
+    return f'{told} [{angular}]' if angular == linear else f'{told} [{angular} or {linear}]'

@@ -1,0 +1,238 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Say what a bag holds and how its run went.
+
+Of a bag of ours the scene in it is run once more, state by state: how well every loop closed, and
+where the linkage came nearest to a toggle. Of another the rest is told. Ctrl-C ends the reading;
+what was read until then is told.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from functools import partial
+import json
+from math import degrees
+from pathlib import Path
+import sys
+from threading import Event
+from typing import Any
+
+from linkage_ros.bag.contents import contents_of
+from linkage_ros.bag.layout import layout_of
+from linkage_ros.bag.reader import Bag, read_bag
+from linkage_ros.cli.bag_account import (
+    account_of,
+    replay_account,
+    scene_account,
+    worst_account,
+)
+from linkage_ros.cli.linkage_file import value_text, wrapped
+from linkage_ros.cli.progress import progress
+from linkage_ros.cli.tables import show, Table
+from linkage_ros.cli.worst_states import examine
+from linkage_ros.errors import LinkageError
+from linkage_ros.replay import recorded_scene
+
+_MIB = 2**20
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
+    parser.add_argument('--json', action='store_true', help='the same as JSON')
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Look at the bag; return 1 where it was stopped."""
+    bag = read_bag(arguments.bag, allow_truncated=True)
+    account = info(bag, stop)
+    if arguments.json:
+        print(json.dumps(account, indent=1, allow_nan=False))
+    else:
+        for number, table in enumerate(tables(account)):
+            if number:
+                print()
+            show(table)
+    if account['stopped']:
+        print('linkage info: stopped; not all of the bag was read', file=sys.stderr)
+    return int(account['stopped'])
+
+
+def info(bag: Bag, stop: Event) -> dict[str, Any]:
+    """
+    Return what there is to say of a bag, as JSON has it.
+
+    Raises
+    ------
+    BagError
+        Where a file of the bag cannot be read.
+
+    """
+    layouts = [layout_of(file) for file in bag.files]
+    size = max(1, sum(layout.content for layout in layouts) // _MIB)
+    with progress('read [MiB]') as told:
+        contents = contents_of(bag, lambda read: told(read // _MIB, size), stop.is_set)
+    account = account_of(bag, layouts, contents)
+    account |= {'scene': None, 'scene_missing': None, 'replay': None}
+    try:
+        scene = recorded_scene(bag)
+        account['scene'] = scene_account(scene)
+        states = max((topic['messages'] for topic in account['topics']), default=0)
+        with progress('states looked at') as told:
+            examined = examine(bag, scene, partial(_told, told, states), stop.is_set)
+    except LinkageError as error:
+        account['scene_missing'] = f'{error.where}: {error.reason}'
+        return account
+    account['replay'] = replay_account(examined)
+    account['stopped'] |= examined.stopped
+    for linkage, worst in zip(account['scene']['linkages'], examined.linkages, strict=True):
+        linkage.update(worst_account(worst))
+    return account
+
+
+def _told(told: Any, of: int, done: int) -> None:
+    told(done, max(done, of))
+
+
+def tables(account: dict[str, Any]) -> Iterator[Table]:
+    """Yield the account of a bag as tables."""
+    yield _table(account['bag'], _facts(account))
+    heads = ('topic', 'type', '>messages', '>rate [Hz]', '>dropped', 'QoS')
+    rows = [
+        (
+            _clean(topic['name']),
+            _clean(topic['type']),
+            str(topic['messages']),
+            '' if topic['rate_hz'] is None else f'{topic["rate_hz"]:.6g}',
+            '?' if topic['dropped'] is None else str(topic['dropped']),
+            _qos(topic),
+        )
+        for topic in account['topics']
+    ]
+    yield Table('Topics', heads, rows)
+    for linkage in (account['scene'] or {'linkages': []})['linkages']:
+        title = f'Linkage {linkage["name"]}' if linkage['name'] else 'Linkage'
+        yield _table(title, _linkage(linkage, account['begin_ns']))
+
+
+def _facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    duration = account['duration_ns']
+    yield 'duration', 'no messages' if duration is None else f'{duration / 1e9:.9f} s'
+    for name in ('begin', 'end') if duration is not None else ():
+        yield name, f'{account[name]} ({account[f"{name}_ns"]} ns)'
+    yield 'size', f'{account["size_bytes"]} bytes'
+    yield 'files', ', '.join(_clean(file['name']) for file in account['files'])
+    yield 'compression', ', '.join(map(_compression, account['compressions'])) or 'none'
+    truncated = account['truncated']
+    yield 'truncated', 'yes: its recording was killed, or still runs' if truncated else 'no'
+    if account['damage']:
+        yield 'DAMAGED', f'{account["damage"]}; what lies before is told here'
+    if account['recording_failure']:
+        yield 'FAILED', account['recording_failure']
+    yield 'messages', str(account['messages'])
+    dropped = [topic['dropped'] for topic in account['topics']]
+    told = dropped and None not in dropped
+    yield 'dropped', str(sum(dropped)) if told else 'not told: no recorder of ours closed the bag'
+    yield 'versions', ', '.join(_versions(account['versions'])) or 'not told'
+    scene = account['scene']
+    if scene:
+        rate = f'{scene["rate_hz"]:g} ticks a second' if scene['rate_hz'] else 'a tick a sample'
+        faults = f', faults {", ".join(scene["faults"])}' if scene['faults'] else ''
+        yield 'scene', f'{scene["name"]}, {rate}, seed {scene["seed"]}{faults}'
+    if account['scene_missing']:
+        yield (
+            'missing' if not scene else 'not run again',
+            f'{account["scene_missing"]}; so neither residual nor nearness to a toggle is known',
+        )
+    if account['replay']:
+        of, same = account['replay'].values()
+        yield 'run again', f'{same} of {of} joint states come to the same bytes'
+
+
+def _linkage(linkage: dict[str, Any], begin: int | None) -> Iterator[tuple[str, str]]:
+    bars = [
+        f'{bar["kind"]} ({", ".join(f"{length:g}" for length in bar["lengths_m"])} m)'
+        for bar in linkage.get('four_bars', ())
+    ]
+    yield 'links', '; '.join([str(linkage['links']), *bars])
+    for what in ('joints', 'effects'):
+        yield what, ', '.join(linkage[what]) or 'none'
+    inputs = linkage['inputs']
+    yield 'drive', f'{linkage["drive"]}, of {", ".join(given["joint"] for given in inputs)}'
+    if 'states' not in linkage:
+        return
+    toggles = f', {linkage["toggles"]} of them at a toggle' if linkage['toggles'] else ''
+    yield 'states', f'{linkage["states"]} closed{toggles}'
+    worst, near = linkage['worst_residual'], linkage['nearest_to_toggle']
+    if worst:
+        yield 'worst residual', f'{worst["residual_m"]:.1e} m, {_place(worst, inputs, begin)}'
+    if near:
+        distance = near['input_to_toggle']
+        away = '' if distance is None else f', {_input(distance, inputs[0])} from one'
+        angle = f'transmission angle {degrees(near["transmission_angle_rad"]):.4g}°'
+        nearness = f'conditioning {near["conditioning"]:.4g}, {angle}{away}'
+        yield 'nearest toggle', f'{nearness}, {_place(near, inputs, begin)}'
+
+
+def _place(found: dict[str, Any], inputs: list[dict[str, str]], begin: int | None) -> str:
+    """Return when and where something was."""
+    values = ', '.join(
+        f'{given["joint"]} {_input(value, given)}'
+        for given, value in zip(inputs, found['inputs'], strict=True)
+    )
+    return f'at {(found["time_ns"] - (begin or 0)) / 1e9:+.6f} s, {values}'
+
+
+def _input(value: float, given: dict[str, str]) -> str:
+    turning = given['unit'] == 'rad'
+    return value_text(wrapped(value) if turning else value, turning)
+
+
+def _compression(found: dict[str, Any]) -> str:
+    if found['name'] == 'none':
+        return 'none'
+    return f'{_clean(found["name"])}, {found["content_bytes"]} bytes in {found["stored_bytes"]}'
+
+
+def _versions(versions: dict[str, Any]) -> Iterator[str]:
+    for key, name in (
+        ('linkage_ros', 'linkage_ros'),
+        ('python', 'Python'),
+        ('machine', 'on'),
+        ('ros_distro', 'ROS 2'),
+        ('rosbag2_metadata', 'rosbag2 metadata'),
+        ('written_by', 'written by'),
+    ):
+        if versions[key] is not None:
+            yield f'{name} {_clean(str(versions[key]))}'
+
+
+def _qos(topic: dict[str, Any]) -> str:
+    """Return a quality of service in a word, or in two where who comes late gets the last."""
+    latched = ', transient local' if topic['durability'] == 'transient_local' else ''
+    return _clean(topic['reliability']).replace('_', ' ') + latched
+
+
+def _table(title: str, facts: Iterator[tuple[str, str]]) -> Table:
+    return Table(_clean(title), ('', ''), [(name, _clean(value)) for name, value in facts])
+
+
+def _clean(text: str) -> str:
+    """Return a text without what a terminal would obey: bags come from anywhere."""
+    return text if text.isprintable() else repr(text)[1:-1]

@@ -1,0 +1,227 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A bag of a run that never was: the samples of another bag, and what a scene makes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+from linkage_ros.bag.reader import Bag, RUN_FILE
+from linkage_ros.bag.run_events import BEGUN, RunAccount, Taken, Turned, WITH_THE_RUN
+from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.cdr import time_message
+from linkage_ros.cli.message_values import JOINT_STATE
+from linkage_ros.cli.what_if import Remade, WhatIf
+from linkage_ros.errors import LinkageError
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import versions_here
+from linkage_ros.scene.scene import Scene
+
+_FLUSHED_EVERY = 50_000
+_CHANGES_QOS = QosProfile(depth=100, durability='transient_local')
+
+
+class Source(NamedTuple):
+    """
+    What a new bag is made of.
+
+    Attributes
+    ----------
+    bag
+        The bag.
+    run
+        What it says of itself; blank where it says nothing.
+    recorded
+        The scene in it; nothing where it carries none, or none that can be read.
+    crank_topic
+        Where its samples are.
+
+    """
+
+    bag: Bag
+    run: RunAccount
+    recorded: Scene | None
+    crank_topic: str
+
+
+class Names(NamedTuple):
+    """
+    Names of the topics that are written beside the samples, as the bag's own run has named them.
+
+    Attributes
+    ----------
+    joint_states, faults, withheld
+        Of the topics.
+    extras
+        Of the scene's further topics, in their order.
+
+    """
+
+    joint_states: str
+    faults: str
+    withheld: str
+    extras: tuple[str, ...]
+
+
+def names_for(source: Source, scene: Scene, what_if: WhatIf) -> Names:
+    """Return the names of what a scene publishes."""
+    run = source.run
+    known: dict[str, str] = {}
+    if source.recorded is not None:
+        private = [extra.topic for extra in Pipeline(source.recorded).extras]
+        known = dict(zip(private, run.extras, strict=False))
+    pairs = {'~/withheld': run.withheld_topic, '~/faults': run.faults_topic, **known}
+    joint_states = run.joint_states_topic or '/joint_states'
+    nodes = [name.removesuffix(key[1:]) for key, name in pairs.items() if name.endswith(key[1:])]
+    node = nodes[0] if nodes else f'{joint_states.rpartition("/")[0]}/linkage_node'
+    if joint_states == source.crank_topic:
+        # Told apart by their joints, which takes those that the run had.
+        own = source.recorded.joints if source.recorded is not None else ()
+        if run.crank_topic != joint_states or scene.joints != own:
+            joint_states = f'{node}/joint_states'
+
+    def resolved(key: str) -> str:
+        return pairs.get(key) or f'{node}{key[1:]}'
+
+    return Names(
+        joint_states,
+        resolved('~/faults'),
+        resolved('~/withheld'),
+        tuple(resolved(extra.topic) for extra in what_if.extras),
+    )
+
+
+class NewBag:
+    """
+    A bag that is written.
+
+    Parameters
+    ----------
+    folder
+        Where it goes; one that exists is never touched.
+    source, scene, what_if, names
+        What it is made of.
+
+    Raises
+    ------
+    LinkageError
+        Where it cannot be made, or the definition of a message is not installed.
+
+    """
+
+    def __init__(
+        self, folder: Path, source: Source, scene: Scene, what_if: WhatIf, names: Names
+    ) -> None:
+        bag = source.bag
+        own = {topic.name: topic for topic in bag.topics}
+        topics = [
+            ('joint_states_topic', names.joint_states, JOINT_STATE, QosProfile()),
+            ('crank_topic', source.crank_topic, JOINT_STATE, own[source.crank_topic].qos),
+        ]
+        if scene.faults:
+            topics.append(('faults_topic', names.faults, 'std_msgs/msg/String', _CHANGES_QOS))
+        if what_if.withholds:
+            withheld = 'builtin_interfaces/msg/Time'
+            topics.append(('withheld_topic', names.withheld, withheld, QosProfile()))
+        self._what_if = what_if
+        self._numbers = {key: number for number, (key, *_) in enumerate(topics)}
+        self._first_extra = len(topics)
+        named = {key: name for key, name, _, _ in topics}
+        described = [_described(bag, name, kind, qos) for _, name, kind, qos in topics]
+        described += [
+            _described(bag, name, extra.message, QosProfile())
+            for name, extra in zip(names.extras, what_if.extras, strict=True)
+        ]
+        account = {
+            'scene': scene.name,
+            'scene_folder': str(Path(scene.folder).resolve()),
+            **named,
+            'extra_topics': list(names.extras),
+            BEGUN: WITH_THE_RUN,
+            **versions_here(),
+            'made_from': {'bag': str(bag.path.resolve()), 'run': _said(bag)},
+        }
+        files = {name: ('application/yaml', data) for name, data in scene.files.items()}
+        files[RUN_FILE] = ('application/json', json.dumps(account).encode())
+        self._writer = BagWriter(folder, described, files)
+        self._written = [0] * len(described)
+        self._unflushed = 0
+        self._topics = described
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Return how many messages were written on each topic."""
+        return dict(zip((topic.name for topic in self._topics), self._written, strict=True))
+
+    def add(self, event: Taken | Turned | Remade) -> None:
+        """Write what happened; raises RecordingError where it cannot be."""
+        if isinstance(event, Taken):
+            self._write(self._numbers['crank_topic'], *event)
+        elif isinstance(event, Turned):
+            self._write(self._numbers['faults_topic'], *event)
+        else:
+            log_time, time, _, tick = event
+            if tick is None:
+                return
+            if tick.message:
+                self._write(self._numbers['joint_states_topic'], log_time, time, tick.message)
+                for number, message in enumerate(tick.extras, self._first_extra):
+                    if message:
+                        self._write(number, log_time, time, message)
+            elif self._what_if.withheld(tick):
+                withheld = time_message(time)
+                self._write(self._numbers['withheld_topic'], log_time, time, withheld)
+
+    def _write(self, number: int, log_time: int, publish_time: int, data: bytes) -> None:
+        self._written[number] += self._writer.write(number, log_time, publish_time, data)
+        self._unflushed += 1
+        if self._unflushed == _FLUSHED_EVERY:
+            self._writer.flush()
+            self._unflushed = 0
+
+    def close(self) -> None:
+        """Finish the bag."""
+        dropped = dict.fromkeys(self.counts, 0)
+        self._writer.close({'linkage_ros.dropped': json.dumps(dropped)})
+
+
+def _described(bag: Bag, name: str, kind: str, qos: QosProfile) -> Topic:
+    """Describe a topic as the bag does one of its type, or as the installed packages do."""
+    for topic in bag.topics:
+        if topic.type == kind and topic.definition:
+            return replace(topic, name=name, qos=qos)
+    try:
+        from linkage_ros.ros.bag_topics import bag_topic, message_type
+        from rclpy.qos import QoSProfile as RosProfile
+    except ImportError:
+        raise LinkageError(
+            '--output', f'{kind} takes rclpy, which is not installed', 'source a ROS 2 workspace'
+        ) from None
+    return replace(bag_topic(name, message_type(kind, '--scene'), RosProfile(depth=10)), qos=qos)
+
+
+def _said(bag: Bag) -> Mapping[str, object]:
+    """Return what the bag says of its own run; nothing of a foreign one."""
+    try:
+        said = json.loads(bag.attachments[RUN_FILE])
+    except (KeyError, ValueError, RecursionError):
+        return {}
+    return said if isinstance(said, dict) else {}

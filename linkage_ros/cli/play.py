@@ -1,0 +1,205 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Publish a bag on the graph, at its own pace or another, to its end or Ctrl-C.
+
+Types, qualities of service and bytes are those that were recorded, in the order of the log times.
+What cannot be published is left out, and said.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import inf, isfinite
+from pathlib import Path
+import sys
+from threading import Event
+
+from linkage_ros.bag.being_written import is_being_written
+from linkage_ros.bag.in_time import TimeOrder
+from linkage_ros.bag.reader import Bag, read_bag
+from linkage_ros.bag.topic import Topic
+from linkage_ros.cli.progress import progress, Told
+from linkage_ros.errors import BagError, did_you_mean, LinkageError
+from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.ros.bag_publishers import offer
+from linkage_ros.ros.cues import Part
+from linkage_ros.ros.playback import LATE, Playback
+from linkage_ros.ros.player import CLOCK, play, player_node, Wishes
+
+_CLOCK_RATE = 40.0  # as ``ros2 bag play``
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
+    parser.add_argument(
+        '--rate',
+        type=_number(0.01, 1000.0),
+        default=1.0,
+        metavar='R',
+        help='seconds of the bag a second, 0.01 to 1000; without it 1',
+    )
+    parser.add_argument(
+        '--clock',
+        type=_number(0.1, 10_000.0),
+        nargs='?',
+        const=_CLOCK_RATE,
+        default=0.0,
+        metavar='HZ',
+        help=f"publish the bag's time on {CLOCK}, so often a second; without a number 40",
+    )
+    parser.add_argument(
+        '--topics', nargs='+', metavar='TOPIC', help='play these only; without it, all'
+    )
+    parser.add_argument(
+        '--start',
+        type=_number(0.0, 1e9),
+        default=0.0,
+        metavar='SECONDS',
+        help="begin so much of the bag's time after its beginning",
+    )
+    parser.add_argument(
+        '--seconds',
+        type=_number(1e-9, 1e9),
+        default=inf,
+        help="end after so much of the bag's time; without it, at its end",
+    )
+    parser.add_argument('--loop', action='store_true', help='begin again at the end')
+    parser.add_argument(
+        '--wait',
+        type=_number(0.0, 1e6),
+        default=0.0,
+        metavar='SECONDS',
+        help='wait until somebody listens to one of the topics, for so long at most',
+    )
+    parser.add_argument(
+        '--ros-args', nargs=argparse.REMAINDER, default=[], help='remappings: -r OLD:=NEW'
+    )
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Play the bag; return 1 where it is damaged, and was played up to there."""
+    bag = read_bag(arguments.bag, allow_truncated=True)
+    if bag.truncated:
+        _say_truncated(bag)
+    topics = _topics(bag, arguments.topics)
+    if arguments.clock:
+        topics = _without_clock(topics)
+    order = TimeOrder(bag)
+    begin = order.begin
+    if begin is None:
+        raise BagError(bag.path, 'holds no messages', 'there is nothing to play')
+    first = begin + round(arguments.start * NANOSECONDS)
+    if order.end is not None and first > order.end:
+        raise LinkageError(
+            f'--start {arguments.start:g}',
+            f'is behind the end of {bag.path}',
+            f'it lasts {(order.end - begin) / 1e9:g} s',
+        )
+    ros = ['--ros-args', *arguments.ros_args] if arguments.ros_args else []
+    with player_node(ros) as node, progress('played [s]') as told:
+        publishers = offer(node, topics, _say)
+        if not publishers:
+            raise BagError(bag.path, 'has no topic that can be published', 'nothing to play')
+        part = Part(first, first + arguments.seconds * NANOSECONDS, publishers, arguments.loop)
+        wishes = Wishes(arguments.rate, arguments.clock, arguments.wait)
+        last = min(part.last, inf if order.end is None else order.end)
+        tell = partial(_tell, told, first, last)
+        playback, error = play(node, publishers, order, part, wishes, stop, tell)
+    if not any(playback.counts.values()) and not stop.is_set():
+        raise error or BagError(
+            bag.path, 'holds no message of these topics at these times', 'nothing to play'
+        )
+    print(_summary(playback, arguments.rate))
+    if error is not None:
+        _say(error, 'ended early: ')
+    return int(error is not None)
+
+
+def _say_truncated(bag: Bag) -> None:
+    """Say that a bag has no end; raise where that is because it still grows."""
+    for file in bag.files:
+        if is_being_written(file):
+            raise BagError(file, 'is being written', 'end its recording first')
+    print(
+        f'linkage play: {bag.path}: its recording was killed; what it holds is played',
+        file=sys.stderr,
+    )
+
+
+def _topics(bag: Bag, names: Sequence[str] | None) -> list[Topic]:
+    """Return the topics that shall be played."""
+    if not bag.topics:
+        raise BagError(bag.path, 'has no topics', 'there is nothing to play')
+    topics = {topic.name: topic for topic in bag.topics}
+    if names is None:
+        return list(topics.values())
+    for name in names:
+        if name not in topics:
+            others = f'there are: {_printable(", ".join(topics))}'
+            remedy = did_you_mean(name, topics, others)
+            raise LinkageError(name, f'{bag.path} has no such topic', remedy)
+    return [topics[name] for name in dict.fromkeys(names)]
+
+
+def _without_clock(topics: Sequence[Topic]) -> list[Topic]:
+    """Return the topics but the clock's, which two would tell differently."""
+    if any(topic.name == CLOCK for topic in topics):
+        _say(LinkageError(CLOCK, 'is left out', '--clock publishes its own'), '')
+    return [topic for topic in topics if topic.name != CLOCK]
+
+
+def _say(error: LinkageError, what: str = 'left out: ') -> None:
+    print(f'linkage play: {what}{_printable(str(error))}', file=sys.stderr)
+
+
+def _printable(text: str) -> str:
+    """Return a text without what a terminal would obey: bags come from anywhere."""
+    return text if text.isprintable() else repr(text)[1:-1]
+
+
+def _tell(told: Told, first: int, last: float, now: int) -> None:
+    end = now if last == inf else int(last)
+    told((now - first) // NANOSECONDS, (end - first) // NANOSECONDS)
+
+
+def _summary(playback: Playback, rate: float) -> str:
+    """Return what was played, in a few lines."""
+    of, took = f'{playback.played / 1e9:.3f} s of the bag', f'{playback.took / 1e9:.3f} s'
+    sent = sum(playback.counts.values())
+    late = f'{playback.late} of {sent} messages by more than {LATE / 1e6:g} ms'
+    rows = [
+        ('played', f'{of} in {took}, at a rate of {rate:g}'),
+        *(('', f'{name}: {count}') for name, count in playback.counts.items()),
+        ('late', f'{late}; at most {playback.latest / 1e6:.1f} ms'),
+    ]
+    return '\n'.join(f'{head:<8}{text}' for head, text in rows)
+
+
+def _number(least: float, most: float) -> Callable[[str], float]:
+    """Return what reads a number within bounds."""
+
+    def read(text: str) -> float:
+        value = float(text)
+        if not isfinite(value) or not least <= value <= most:
+            raise argparse.ArgumentTypeError(f'{text} is not between {least:g} and {most:g}')
+        return value
+
+    read.__name__ = 'number'  # argparse calls it so: "invalid number value"
+    return read

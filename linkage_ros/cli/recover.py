@@ -1,0 +1,87 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Make a whole bag of what a damaged or unfinished one still holds, and say what is lost."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+import sys
+from threading import Event
+
+from linkage_ros.bag.recover import recover
+from linkage_ros.bag.recovery import Recovery
+from linkage_ros.cli.progress import progress
+from linkage_ros.cli.tables import show, Table
+
+WHOLE, STOPPED, LOSS = 0, 1, 3
+
+_MOST_SHOWN = 20
+"""Lines of losses; of a disk that is worn out there may be thousands."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file; only read")
+    parser.add_argument(
+        '-o', '--output', type=Path, metavar='FOLDER', help='new folder; without it BAG_recovered'
+    )
+    parser.epilog = (
+        'exit code: 0 nothing was lost, 3 something was, 2 there is nothing to save, 1 stopped'
+    )
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Recover the bag; return 0 where nothing is lost, 3 where something is, 1 if stopped."""
+    with progress('bytes') as told:
+        recovery = recover(arguments.bag, arguments.output, told, stop.is_set)
+    if recovery is None:
+        print('stopped; nothing was written', file=sys.stderr)
+        return STOPPED
+    _say(recovery)
+    return WHOLE if recovery.whole else LOSS
+
+
+def _say(recovery: Recovery) -> None:
+    rows = []
+    for topic in recovery.topics:
+        promised = '?' if topic.promised is None else f'{topic.promised:,}'
+        rows.append((topic.name, f'{topic.saved:,}', promised))
+    if rows:
+        show(Table('', ('topic', '>saved', '>of'), rows))
+    if recovery.attachments:
+        print(f'attachments  {", ".join(recovery.attachments)}')
+    _lines('note', list(recovery.remarks))
+    _lines('repaired', list(recovery.repaired))
+    lost = []
+    for file, (start, end, reason) in recovery.losses:
+        size = f', {end - start:,} bytes' if end > start else ''
+        lost.append(f'{file} at byte {start:,}{size}: {reason}')
+    if recovery.missing:
+        lost.append(f'{recovery.missing:,} messages that the bag promises')
+    _lines('LOST', lost)
+    if recovery.whole:
+        print('nothing lost')
+    print(f'bag          {recovery.folder}')
+
+
+def _lines(word: str, lines: list[str]) -> None:
+    for line in lines[:_MOST_SHOWN]:
+        # What a damaged file says of itself may hold anything; a line stays a line.
+        text = ''.join(letter if letter.isprintable() else '�' for letter in line)
+        print(f'{word:<13}{text}')
+    if len(lines) > _MOST_SHOWN:
+        print(f'{word:<13}and {len(lines) - _MOST_SHOWN:,} more')

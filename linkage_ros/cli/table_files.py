@@ -1,0 +1,155 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Tables of numbers as files, CSV and Parquet, written block by block.
+
+Numbers keep every bit: CSV has the shortest text that reads back as the same number. What is not
+there is an empty cell, or null. A file comes into being as a whole: it is written under another
+name beside its place, and renamed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+import csv
+from importlib.util import find_spec
+import io
+import os
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from linkage_ros.errors import LinkageError
+
+Row = Sequence[float | int | None]
+Write = Callable[[Sequence[Row]], None]
+"""Writes a block of rows."""
+
+_CELLS = 2**20  # a block of so many takes about 40 MB
+
+
+@contextmanager
+def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterator[Write]:
+    """
+    Give what writes a table; the file is there when all has been written, or not at all.
+
+    Parameters
+    ----------
+    file
+        Its ending says which kind it is; see `KINDS`. One that exists is replaced.
+    heads
+        Headings of the columns.
+    whole
+        Those of them that hold whole numbers.
+
+    Raises
+    ------
+    LinkageError
+        Where it cannot be written.
+
+    """
+    opened = KINDS[file.suffix.lower()]
+    # A link is followed: what it names is replaced, and not the link.
+    target = Path(os.path.realpath(file))
+    temporary = target.with_name(f'.linkage_export_{os.getpid()}{target.suffix}')
+    try:
+        if target.exists() and not target.is_file():
+            raise LinkageError(str(file), 'exists, and is no file', 'name another file')
+        with temporary.open('wb') as stream:
+            try:
+                with opened(stream, heads, whole) as write:
+                    yield write
+                stream.flush()
+                os.fsync(stream.fileno())
+                temporary.replace(target)
+            except BaseException:
+                temporary.unlink(missing_ok=True)
+                raise
+    except OSError as error:
+        raise LinkageError(
+            str(file), f'cannot be written: {error.strerror or error}', 'name another file'
+        ) from None
+
+
+def check_kind(file: Path) -> None:
+    """
+    Check that a table can be written to a file of this name.
+
+    Raises
+    ------
+    LinkageError
+        Where its ending is not known, or what writes it is not installed.
+
+    """
+    ending = file.suffix.lower()
+    if ending not in KINDS:
+        raise LinkageError(
+            str(file),
+            f'ends in {ending!r}' if ending else 'has no ending',
+            f'name a file that ends in {" or ".join(KINDS)}',
+        )
+    if ending == '.parquet' and find_spec('pyarrow') is None:
+        raise LinkageError(
+            'pyarrow',
+            'is not installed',
+            "pip install 'linkage_ros[export]', or name a file that ends in .csv",
+        )
+
+
+def block_rows(columns: int) -> int:
+    """Return how many rows a block should have."""
+    return max(1, _CELLS // columns)
+
+
+@contextmanager
+def _csv(stream: BinaryIO, heads: Sequence[str], _whole: Sequence[str]) -> Iterator[Write]:
+    text = io.TextIOWrapper(stream, encoding='utf-8', newline='', write_through=True)
+    writer = csv.writer(text, lineterminator='\n')  # writes floats with repr
+    try:
+        writer.writerow(heads)
+        yield writer.writerows
+    finally:
+        text.detach()  # else it would close the stream when it is collected
+
+
+@contextmanager
+def _parquet(stream: BinaryIO, heads: Sequence[str], whole: Sequence[str]) -> Iterator[Write]:
+    import pyarrow as pa  # local import: an extra, and slow to load
+    from pyarrow import parquet
+
+    schema = pa.schema([(head, pa.int64() if head in whole else pa.float64()) for head in heads])
+
+    def write(rows: Sequence[Row]) -> None:
+        try:
+            columns: list[Any] = [
+                pa.array(column, field.type)
+                for column, field in zip(zip(*rows, strict=True), schema, strict=True)
+            ]
+        except (OverflowError, pa.ArrowInvalid):
+            raise LinkageError(
+                'a time in the bag', 'is beyond 63 bits of [ns]', 'write a .csv file'
+            ) from None
+        writer.write_table(pa.Table.from_arrays(columns, schema=schema))
+
+    # Numbers hardly ever repeat to the bit: a dictionary of them would be built in vain.
+    with parquet.ParquetWriter(stream, schema, compression='zstd', use_dictionary=False) as writer:
+        yield write
+
+
+KINDS: dict[
+    str, Callable[[BinaryIO, Sequence[str], Sequence[str]], AbstractContextManager[Write]]
+] = {'.csv': _csv, '.parquet': _parquet}
+"""Ending of a file, and what writes it."""

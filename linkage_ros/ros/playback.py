@@ -1,0 +1,165 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A bag's messages at their times.
+
+The time of the bag runs on the steady clock from the first message on, at a rate. Each message is
+due at a time that follows from its log time alone, so that a late one delays no other. The clock
+for ``/clock`` ticks on the same thread: it never is ahead of a message that has not been sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from math import inf
+from threading import Event
+from time import monotonic_ns, sleep
+from typing import NamedTuple, Protocol
+
+from linkage_ros.ros.cues import Cue
+
+LATE = 10_000_000
+"""How long after it was due a message is sent that counts as late, in [ns]."""
+
+_FINE = 20_000_000
+"""The last part of a wait, in [ns], that is slept through whole; before it a stop is heeded."""
+
+_LONGEST_WAIT = 60.0  # [s]; `Event.wait` does not take any number
+_TOLD_EVERY = 250_000_000
+
+
+class Steady(Protocol):
+    """A clock that never jumps, and waits."""
+
+    def now(self) -> int:
+        """Return the time, in [ns]."""
+
+    def wait_until(self, due: int) -> bool:
+        """Wait until a time, in [ns]; return whether it was stopped."""
+
+
+class SteadyClock:
+    """The machine's steady clock, until an event."""
+
+    def __init__(self, stop: Event) -> None:
+        self._stop = stop
+        self.now = monotonic_ns
+
+    def wait_until(self, due: int) -> bool:
+        """Wait until a time, in [ns]; return whether it was stopped."""
+        while (left := due - monotonic_ns()) > _FINE:
+            if self._stop.wait(min((left - _FINE) * 1e-9, _LONGEST_WAIT)):
+                return True
+        if left > 0:
+            sleep(left * 1e-9)
+        return self._stop.is_set()
+
+
+class Ticks(NamedTuple):
+    """A clock that tells the bag's time: its period, in [ns], and what takes the time."""
+
+    period: float
+    publish: Callable[[int], None]
+
+
+class Playback:
+    """
+    Sends messages at their times, and counts them.
+
+    Parameters
+    ----------
+    first
+        Log time with which it begins, in [ns].
+    rate
+        Seconds of the bag a second.
+    publish
+        Of each topic what publishes a message.
+    steady
+        By which it goes.
+    ticks
+        Tell the bag's time; nothing where nobody asks for it.
+    told
+        Takes the log time, in [ns], now and then.
+
+    Attributes
+    ----------
+    counts
+        Of each topic how many messages were sent.
+    late
+        How many of them later than they were due, by more than `LATE`.
+    latest
+        The most that one was late, in [ns].
+    played
+        How much of the bag was played, in [ns] of its time.
+    took
+        How long that took, in [ns].
+
+    """
+
+    def __init__(
+        self,
+        first: int,
+        rate: float,
+        publish: Mapping[str, Callable[[bytes], None]],
+        steady: Steady,
+        ticks: Ticks | None = None,
+        told: Callable[[int], None] = lambda _: None,
+    ) -> None:
+        self._first = first
+        self._rate = rate
+        self._publish = publish
+        self._steady = steady
+        self._ticks = ticks
+        self._told = told
+        self.counts = dict.fromkeys(publish, 0)
+        self.late = self.latest = self.played = self.took = 0
+
+    def run(self, cues: Iterable[Cue]) -> None:
+        """Send the messages, to their end or until the clock says that it was stopped."""
+        steady, counts = self._steady, self.counts
+        begun: int | None = None
+        last_base = number = 0
+        tick = tell = inf
+        for base, log_time, topic, data in cues:
+            if begun is None:
+                begun = tell = steady.now()
+                tick = begun if self._ticks else inf
+            offset = base + log_time - self._first
+            due = begun + round(offset / self._rate)
+            while self._ticks and tick <= due:
+                if steady.wait_until(round(tick)):
+                    return
+                at = round((tick - begun) * self._rate)
+                # Rounding must not lead to before the beginning of a pass.
+                self._ticks.publish(self._first + max(0, at - base))
+                number += 1
+                tick = begun + number * self._ticks.period
+            if steady.wait_until(due):
+                return
+            self._publish[topic](data)
+            now = steady.now()
+            counts[topic] += 1
+            if now - due > LATE:
+                self.late += 1
+            self.latest = max(self.latest, now - due)
+            self.played, self.took = offset, now - begun
+            last_base = base
+            if now >= tell:
+                self._told(log_time)
+                tell = now + _TOLD_EVERY
+        if self._ticks and begun is not None:
+            # So that who lives by it comes to the end of the bag too.
+            self._ticks.publish(self._first + self.played - last_base)

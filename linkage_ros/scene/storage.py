@@ -1,0 +1,89 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a scene may say about how its bag is stored, beside where and under which name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from linkage_ros.bag.storage import COMPRESSIONS, Storage
+from linkage_ros.parameters import choice, number, whole
+from linkage_ros.scene.read import read_parameters
+from linkage_ros.scene.section import Section
+
+SPLITS = {'split_bytes': 1_000_000, 'split_seconds': 1.0}
+"""
+What makes files of a bag, and the least that it may be where it is not 0.
+
+Each file begins with the scene, the linkages and the types, and costs the disk some ten waits.
+"""
+
+_DEFAULT = Storage()
+
+
+@dataclass(frozen=True, slots=True)
+class StorageParameters(Storage):
+    """How the bag is stored."""
+
+    flush_period: float = number(
+        'how often the disk is waited for: what a power cut may cost',
+        _DEFAULT.flush_period,
+        unit='s',
+        least=0.05,
+        most=60.0,
+    )
+    split_bytes: int = whole(
+        'size at which the next file begins; 0: never',
+        _DEFAULT.split_bytes,
+        unit='bytes',
+        least=0,
+        most=10**15,
+    )
+    split_seconds: float = number(
+        'time after which the next file begins; 0: never',
+        _DEFAULT.split_seconds,
+        unit='s',
+        least=0.0,
+        most=1e9,
+    )
+    keep_files: int = whole(
+        'how many files are kept: the oldest goes when one more begins; 0: all',
+        _DEFAULT.keep_files,
+        least=0,
+        most=1_000_000,
+    )
+    min_free_bytes: int = whole(
+        'what stays free on the disk: where less is, the recording ends; 0: no matter',
+        _DEFAULT.min_free_bytes,
+        unit='bytes',
+        least=0,
+        most=10**15,
+    )
+    compression: str = choice('how messages are packed', COMPRESSIONS, _DEFAULT.compression)
+
+
+def read_storage(content: Section) -> StorageParameters:
+    """Read how a bag is stored out of the section that says how a run is recorded."""
+    storage: StorageParameters = read_parameters(content, StorageParameters, {})
+    for key, least in SPLITS.items():
+        value = getattr(storage, key)
+        if 0 < value < least:
+            raise content.error(key, f'{value:g} is too small', f'write {least:.9g} or more, or 0')
+    if storage.keep_files and not any(getattr(storage, key) for key in SPLITS):
+        raise content.error(
+            'keep_files', 'there is one file only', f'write {" or ".join(SPLITS)} too'
+        )
+    return storage

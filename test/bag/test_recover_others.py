@@ -1,0 +1,263 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""`recover` on bags that others wrote, or forged: packed, split, without checksums, bombs."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+import struct
+import sys
+import tracemalloc
+
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recover import recover
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import BagError
+from mcap.reader import make_reader
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, IndexType, Writer
+import pytest
+import yaml
+import zstandard
+
+CHECKSUM = 33
+"""Where in a chunk's record its checksum stands."""
+
+
+def chunks_of(content: bytes) -> list[tuple[int, int]]:
+    """Return where chunks begin and end, by mcap's reader."""
+    with_index = make_reader(BytesIO(content)).get_summary()
+    return [
+        (each.chunk_start_offset, each.chunk_start_offset + each.chunk_length)
+        for each in with_index.chunk_indexes
+    ]
+
+
+def data_of(folder: Path) -> list[bytes]:
+    return [message.data for message in read_bag(folder).messages()]
+
+
+def written(file: Path, messages, *, count: int = 90, chunk_size: int = 5000, **options) -> Path:
+    """Write a file by mcap's writer with these options."""
+    file.parent.mkdir(exist_ok=True)
+    with file.open('wb') as stream:
+        writer = Writer(stream, chunk_size=chunk_size, **options)
+        writer.start(profile='ros2')
+        schema = writer.register_schema('std_msgs/msg/String', 'ros2msg', b'string data')
+        channel = writer.register_channel('/text', 'cdr', schema)
+        for number, message in enumerate(messages[:count]):
+            writer.add_message(channel, number, message.data, number, number)
+        writer.finish()
+    return file
+
+
+@pytest.mark.parametrize('compression', [CompressionType.LZ4, CompressionType.ZSTD])
+def test_compressed_chunks_are_unpacked_checked_and_packed_again(tmp_path, messages, compression):
+    file = written(tmp_path / 'a.mcap', messages, compression=compression)
+    content = bytearray(file.read_bytes())
+    start, end = chunks_of(content)[1]
+    content[(start + end) // 2] ^= 4
+    file.write_bytes(content)
+    recovery = recover(file)
+    saved = data_of(recovery.folder)
+    assert 40 < len(saved) < 90
+    rest = iter(message.data for message in messages[:90])
+    assert all(data in rest for data in saved)
+    with (recovery.folder / 'a_recovered_0.mcap').open('rb') as stream:
+        chunks = [r for r in StreamReader(stream, emit_chunks=True).records if type(r) is Chunk]
+    assert {chunk.compression for chunk in chunks} == {compression.name.lower()}
+
+
+def test_without_the_library_it_says_so(tmp_path, messages, monkeypatch):
+    file = written(tmp_path / 'a.mcap', messages, compression=CompressionType.ZSTD)
+    monkeypatch.setitem(sys.modules, 'zstandard', None)
+    recovery = recover(file)
+    assert not recovery.whole
+    assert {loss.reason for _, loss in recovery.losses} == {
+        'is packed with zstd, and Python knows no zstd here'
+    }
+
+
+def forged(file: Path, data: bytes, size: int, compression: str = 'zstd') -> Path:
+    """Write a file with one chunk that says to be so large."""
+    with file.open('wb') as stream:
+        options = {'index_types': IndexType.NONE, 'use_statistics': False}
+        writer = Writer(stream, compression=CompressionType.NONE, **options)
+        writer.start(profile='ros2')
+        writer.register_channel('/text', 'cdr', 0)
+        writer.add_attachment(0, 0, 'note', 'text/plain', b'saved')
+        body = struct.pack('<QQQII', 0, 0, size, 1, len(compression)) + compression.encode()
+        body += struct.pack('<Q', len(data)) + data
+        stream.write(struct.pack('<BQ', 6, len(body)) + body)
+        writer.finish()
+    return file
+
+
+@pytest.mark.parametrize(
+    ('size', 'reason'),
+    [
+        (2**40, 'no more than 268,435,456 are taken'),
+        (2**29, 'no more than 268,435,456 are taken'),
+        (1000, 'is not of the 1,000 bytes that it says to be'),
+    ],
+)
+@pytest.mark.parametrize('open_end', [False, True])
+def test_a_bomb_does_not_go_off(tmp_path, size, reason, open_end):
+    unpacked = zstandard.ZstdCompressor(write_content_size=not open_end)
+    bomb = unpacked.compress(bytes(2**29))
+    assert len(bomb) < 50_000
+    file = forged(tmp_path / 'bomb.mcap', bomb, size)
+    tracemalloc.start()
+    try:
+        recovery = recover(file)
+        with pytest.raises(BagError, match='is damaged'):
+            list(read_bag(file).messages())
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 20_000_000
+    assert any(reason in loss.reason for _, loss in recovery.losses)
+    assert recovery.attachments == ('note',)
+
+
+def test_a_chunk_without_a_checksum_is_taken_if_it_parses_to_its_end(tmp_path, messages):
+    options = {'compression': CompressionType.NONE}
+    file = written(tmp_path / 'a.mcap', messages, **options)
+    content = bytearray(file.read_bytes())
+    chunks = chunks_of(content)
+    for start, _ in chunks:
+        struct.pack_into('<I', content, start + CHECKSUM, 0)
+    file.write_bytes(content)
+    recovery = recover(file, tmp_path / 'whole')
+    assert data_of(recovery.folder) == [m.data for m in messages[:90]]
+    assert recovery.remarks == (
+        'a.mcap: 90 messages that no checksum covers, taken as they stand',
+    )
+    # A length within the second chunk: now its records do not fill it.
+    content[chunks[1][0] + 9 + 40 + 1] ^= 1
+    file.write_bytes(content)
+    saved = data_of(recover(file, tmp_path / 'part').folder)
+    assert 0 < len(saved) < 90
+    rest = iter(message.data for message in messages[:90])
+    assert all(data in rest for data in saved)
+
+
+def test_one_chunk_without_a_checksum_among_others_is_not_believed(tmp_path, messages):
+    file = written(tmp_path / 'a.mcap', messages, compression=CompressionType.NONE)
+    content = bytearray(file.read_bytes())
+    start, _ = chunks_of(content)[1]
+    struct.pack_into('<I', content, start + CHECKSUM, 0)
+    file.write_bytes(content)
+    with pytest.raises(BagError, match='has no checksum, others have'):
+        list(read_bag(file).messages())
+    assert any('checksum' in loss.reason for _, loss in recover(file).losses)
+
+
+def test_messages_outside_of_chunks_are_taken_up_to_the_damage_and_called_unchecked(
+    tmp_path, messages
+):
+    options = {'use_chunking': False, 'compression': CompressionType.NONE}
+    file = written(tmp_path / 'a.mcap', messages, **options)
+    content = file.read_bytes()
+    place = content.index(messages[50].data)
+    # In the middle of a message: what is left of it is no message.
+    file.write_bytes(content[: place + 20])
+    assert [m.data for m in read_bag(file, allow_truncated=True).messages()] == [
+        m.data for m in messages[:50]
+    ]
+    recovery = recover(file)
+    assert data_of(recovery.folder) == [m.data for m in messages[:50]]
+    assert not recovery.whole
+    assert 'no checksum covers' in recovery.remarks[0]
+
+
+def test_one_checksum_over_all_data_is_held_against_them(tmp_path, messages):
+    options = {'use_chunking': False, 'enable_data_crcs': True}
+    file = written(tmp_path / 'a.mcap', messages, compression=CompressionType.NONE, **options)
+    recovery = recover(file, tmp_path / 'whole')
+    assert recovery.whole
+    assert recovery.remarks == ()
+    content = bytearray(file.read_bytes())
+    content[content.index(messages[50].data) + 9] ^= 1
+    file.write_bytes(content)
+    with pytest.raises(BagError, match='checksum of all data'):
+        list(read_bag(file).messages())
+    recovery = recover(file, tmp_path / 'part')
+    assert [topic.saved for topic in recovery.topics] == [0]
+    assert not recovery.whole
+
+
+class TestSplit:
+    @pytest.fixture
+    def split(self, tmp_path, messages):
+        folder = tmp_path / 'split'
+        dealt = messages[:30], messages[30:60], messages[60:90]
+        for number in range(3):
+            written(
+                folder / f'split_{number}.mcap',
+                dealt[number],
+                chunk_size=1000,
+                compression=CompressionType.NONE,
+            )
+        return folder
+
+    def test_files_become_one_in_their_order(self, split, messages):
+        recovery = recover(split)
+        assert recovery.whole
+        assert data_of(recovery.folder) == [m.data for m in messages[:90]]
+
+    def test_an_empty_file_and_one_that_is_cut(self, split, messages):
+        (split / 'split_2.mcap').write_bytes(b'')
+        content = (split / 'split_1.mcap').read_bytes()
+        start, _ = chunks_of(content)[-1]
+        (split / 'split_1.mcap').write_bytes(content[: start + 5])
+        recovery = recover(split)
+        saved = data_of(recovery.folder)
+        assert 30 < len(saved) < 60
+        assert saved == [m.data for m in messages[: len(saved)]]
+        assert {file for file, _ in recovery.losses} == {'split_1.mcap', 'split_2.mcap'}
+
+    def test_a_file_that_is_named_and_missing_is_a_loss(self, split, messages):
+        named = {'relative_file_paths': ['split_0.mcap', 'split_1.mcap', 'split_7.mcap']}
+        text = yaml.safe_dump({'rosbag2_bagfile_information': named})
+        (split / 'metadata.yaml').write_text(text)
+        recovery = recover(split)
+        assert [(file, loss.reason) for file, loss in recovery.losses] == [
+            ('split_7.mcap', 'does not exist')
+        ]
+        assert data_of(recovery.folder) == [m.data for m in messages[:90]]
+
+
+@pytest.mark.parametrize('index', [True, False])
+def test_a_bag_within_a_damaged_attachment_stays_in_it(tmp_path, topics, messages, index):
+    inner = written(tmp_path / 'inner.mcap', messages, compression=CompressionType.NONE)
+    attached = {'inner.mcap': ('application/octet-stream', inner.read_bytes())}
+    writer = BagWriter(tmp_path / 'run', topics, attached)
+    for message in messages[1000:1100]:
+        writer.write(*message)
+    writer.close()
+
+    file = tmp_path / 'run' / 'run_0.mcap'
+    content = bytearray(file.read_bytes())
+    content[content.index(b'inner.mcap') - 4 - 16 - 8] ^= 1  # the length of the record
+    content[content.index(messages[60].data)] ^= 1  # and the content
+    file.write_bytes(content if index else content[: chunks_of(content)[0][1]])
+    recovery = recover(tmp_path / 'run')
+    assert data_of(recovery.folder) == [m.data for m in messages[1000:1100]]
+    assert recovery.attachments == ()
+    assert not recovery.whole

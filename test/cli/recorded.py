@@ -1,0 +1,171 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Bags of scenes that ran without a node: the pipeline by hand, recorded as the tick loop does."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Mapping
+import json
+from pathlib import Path
+from threading import Event
+from types import ModuleType
+from typing import Any
+
+from linkage_ros.bag.reader import RUN_FILE
+from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.cdr import time_message
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import get_typestore, Stores
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+SECOND = 1_000_000_000
+BEGIN = 1_700_000_000 * SECOND
+MS = 1_000_000
+
+FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
+Crank = Callable[[int], Mapping[str, tuple[float, float]]]
+"""Gives for each tick the crank joints that a sample names, with angle and rate."""
+
+
+def topic(name: str, kind: str, reliability: str = 'reliable') -> Topic:
+    """Describe a topic as the node does."""
+    definition, _ = STORE.generate_msgdef(kind, ros_version=2)
+    return Topic(
+        name, kind, definition, STORE.hash_rihs01(kind), QosProfile(reliability=reliability)
+    )
+
+
+class Recorded:
+    """
+    A run.
+
+    Parameters
+    ----------
+    folder
+        The bag.
+    scene
+        The scene file.
+    crank
+        What comes from elsewhere, at every tick; nothing where the scene has a drive of its own.
+    crank_topic
+        On which.
+    drop
+        Tells by the number of the tick and the topic's name whether the recorder has to drop it.
+
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        scene: Path,
+        crank: Crank | None = None,
+        crank_topic: str = '/crank_states',
+        drop: Callable[[int, str], bool] = lambda _number, _topic: False,
+    ) -> None:
+        loaded = load_scene(scene)
+        self.folder = folder
+        self.pipeline = Pipeline(loaded)
+        self.rate = loaded.rate or 1000.0
+        self._crank, self._crank_topic, self._drop = crank, crank_topic, drop
+        self._extras = [f'/linkage/{extra.topic[2:]}' for extra in self.pipeline.extras]
+        run: dict[str, Any] = {
+            'scene': loaded.name,
+            'joint_states_topic': '/joint_states',
+            'withheld_topic': '/linkage/withheld',
+            'extra_topics': self._extras,
+            'linkage_ros': '9.8.7',
+            'python': '3.99.1',
+            'machine': 'abacus',
+        }
+        topics = [
+            topic('/joint_states', JOINT_STATE),
+            topic('/linkage/withheld', 'builtin_interfaces/msg/Time'),
+            *(
+                topic(name, extra.message)
+                for name, extra in zip(self._extras, self.pipeline.extras, strict=True)
+            ),
+        ]
+        if crank:
+            run['crank_topic'] = crank_topic
+            if crank_topic != '/joint_states':
+                topics.append(topic(crank_topic, JOINT_STATE, 'best_effort'))
+        self._numbers = {each.name: number for number, each in enumerate(topics)}
+        self._writer = BagWriter(
+            folder,
+            topics,
+            {name: ('application/yaml', data) for name, data in loaded.files.items()}
+            | {RUN_FILE: ('application/json', json.dumps(run).encode())},
+        )
+
+    def run(self, ticks: int, dropped: Mapping[str, int] | None = None) -> Path:
+        """Tick, and close the bag; return its folder."""
+        for number in range(ticks):
+            stamp = BEGIN + round(number * SECOND / self.rate)
+            now = stamp + MS // 4  # when the tick takes its sample
+            if self._crank:
+                states = self._crank(number)
+                angles, rates = zip(*states.values(), strict=True) if states else ((), ())
+                message = JointStateWriter(list(states)).write(stamp, angles, rates)
+                self._write(number, self._crank_topic, now, stamp + MS // 8, message)
+                self.pipeline.offer(message, now)
+            tick = self.pipeline.tick(stamp)
+            if tick.message:
+                self._write(number, '/joint_states', now, stamp, tick.message)
+                for name, message in zip(self._extras, tick.extras, strict=bool(tick.extras)):
+                    if message:
+                        self._write(number, name, now, stamp, message)
+            elif any(look.position for look in tick.looks):
+                self._write(number, '/linkage/withheld', now, stamp, time_message(stamp))
+        counts = dict.fromkeys(self._numbers, 0) | dict(dropped or {})
+        self._writer.close({'linkage_ros.dropped': json.dumps(counts)})
+        return self.folder
+
+    def _write(self, number: int, name: str, log: int, publish: int, data: bytes) -> None:
+        if not self._drop(number, name):
+            self._writer.write(self._numbers[name], log, publish, data)
+
+
+def scene_file(folder: Path, text: str, linkage: str = FOUR_BAR) -> Path:
+    """Write a scene and its linkage; return the scene's file."""
+    (folder / 'l.yaml').write_text(linkage)
+    scene = folder / 'scene of mine.yaml'
+    scene.write_text(text if 'linkage' in text else f'linkage: l.yaml\n{text}')
+    return scene
+
+
+def told(folder: Path) -> Iterator[tuple[str, int, Any]]:
+    """Yield topic, log time and message of a bag, as rosbags reads it."""
+    with AnyReader([folder]) as reader:
+        for connection, time, data in reader.messages():
+            yield connection.topic, time, reader.deserialize(data, connection.msgtype)
+
+
+def stamp_of(message: Any) -> int:
+    """Return the stamp of a message of rosbags, in [ns]."""
+    return int(message.header.stamp.sec) * SECOND + int(message.header.stamp.nanosec)
+
+
+def answer(command: ModuleType, *typed: object, stop: Event | None = None) -> int:
+    """Run a subcommand in this process, as ``linkage`` would; return its exit code."""
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    return int(command.run(parser.parse_args([str(word) for word in typed]), stop or Event()))

@@ -1,0 +1,460 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``linkage info``: what a bag holds, by rosbags; how its run went, by the textbook's formulas."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from datetime import datetime
+import json
+from math import acos, cos, degrees, pi, remainder, sin, sqrt, tau
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from linkage_ros.bag.metadata import METADATA_FILE
+from linkage_ros.bag.reader import read_bag, RUN_FILE
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.cli import info
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.closure import Closure
+from mcap.exceptions import EndOfFile
+from mcap.reader import NonSeekingReader
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagsWriter
+
+from .conftest import Run
+from .recorded import (
+    answer,
+    BEGIN,
+    FOUR_BAR,
+    JOINT_STATE,
+    MS,
+    Recorded,
+    scene_file,
+    SECOND,
+    stamp_of,
+    STORE,
+    told,
+    topic,
+)
+
+A, B, C, D = 0.04, 0.12, 0.08, 0.1  # crank, coupler, rocker and ground of FOUR_BAR
+EFFECTS = 'effects: {acceleration: {}}\n'
+
+
+def crank(number: int) -> dict[str, tuple[float, float]]:
+    """Return a crank that turns at 7 rad/s from 1 rad on, beside a joint that is none of ours."""
+    return {'other_joint': (0.5, 0.0), 'crank_joint': (1.0 + 0.007 * number, 7.0)}
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('run')
+    run = Recorded(folder / 'bag', scene_file(folder, EFFECTS), crank)
+    return run.run(1500, dropped={'/linkage/motion': 3})
+
+
+@pytest.fixture
+def tell(capsys: pytest.CaptureFixture[str]) -> Any:
+    def tell(path: Path) -> dict[str, Any]:
+        assert answer(info, path, '--json') == 0
+        account: dict[str, Any] = json.loads(capsys.readouterr().out)
+        return account
+
+    return tell
+
+
+def test_counts_and_times_are_those_that_rosbags_finds(bag: Path, tell: Any) -> None:
+    account = tell(bag)
+    with AnyReader([bag]) as reader:
+        assert account['duration_ns'] == reader.end_time - 1 - reader.start_time
+        assert account['begin_ns'] == reader.start_time
+        assert account['messages'] == reader.message_count
+        expected = {name: (found.msgtype, found.msgcount) for name, found in reader.topics.items()}
+    found = {each['name']: (each['type'], each['messages']) for each in account['topics']}
+    assert found == expected
+    assert [each['dropped'] for each in account['topics']] == [0, 0, 3, 0]
+    # 1500 ticks at 1 kHz, all at log times a period apart.
+    rates = {each['name']: each['rate_hz'] for each in account['topics']}
+    assert rates['/joint_states'] == rates['/crank_states'] == pytest.approx(1000.0, rel=1e-12)
+    assert rates['/linkage/withheld'] is None
+    assert account['size_bytes'] == (bag / 'bag_0.mcap').stat().st_size
+    assert [file['name'] for file in account['files']] == ['bag_0.mcap']
+    assert account['begin_ns'] == BEGIN + MS // 4
+    # The local text is the same instant, whatever the zone; its last three digits are below 1 µs.
+    text = account['begin']
+    read = datetime.strptime(f'{text[:26]}{text[29:]}', '%Y-%m-%d %H:%M:%S.%f%z')
+    assert read.timestamp() == pytest.approx(account['begin_ns'] / SECOND, abs=1e-6)
+
+
+def test_a_run_says_what_ran_and_with_what(bag: Path, tell: Any) -> None:
+    account = tell(bag)
+    assert account['versions'] == {
+        'linkage_ros': '9.8.7',
+        'python': '3.99.1',
+        'machine': 'abacus',
+        'ros_distro': 'jazzy',
+        'rosbag2_metadata': 9,
+        'written_by': account['versions']['written_by'],
+    }
+    assert account['versions']['written_by'].startswith('linkage_ros ')
+    (linkage,) = account['scene']['linkages']
+    assert account['scene']['name'] == 'scene of mine'
+    assert linkage['inputs'] == [{'joint': 'crank_joint', 'unit': 'rad'}]
+    assert linkage['joints'] == ['coupler_joint', 'rocker_joint']
+    assert (linkage['drive'], linkage['effects']) == ('topic', ['acceleration'])
+    assert linkage['four_bars'] == [{'kind': 'crank-rocker', 'lengths_m': [A, B, C, D]}]
+    assert account['replay'] == {'joint_states': 1500, 'same_bytes': 1500}
+    assert (account['truncated'], account['damage'], account['stopped']) == (False, None, False)
+
+
+def transmission(crank_angle: float, a: float, b: float, c: float, d: float) -> float:
+    """Return the acute angle between coupler and rocker, by the law of cosines, twice."""
+    diagonal = a * a + d * d - 2 * a * d * cos(crank_angle)
+    angle = acos((b * b + c * c - diagonal) / (2 * b * c))
+    return min(angle, pi - angle)
+
+
+def test_the_nearest_approach_to_a_toggle_is_that_of_the_law_of_cosines(
+    bag: Path, tell: Any
+) -> None:
+    (linkage,) = tell(bag)['scene']['linkages']
+    angles = [1.0 + 0.007 * number for number in range(1500)]
+    least = min(range(1500), key=lambda number: transmission(angles[number], A, B, C, D))
+    near = linkage['nearest_to_toggle']
+    mu = transmission(angles[least], A, B, C, D)
+    assert near['transmission_angle_rad'] == pytest.approx(mu, abs=1e-13)
+    assert near['conditioning'] == pytest.approx(sqrt(2) * sin(mu / 2), abs=1e-13)
+    assert near['time_ns'] == BEGIN + least * MS
+    # The tick carries the sample forward by no time at all: it is of the same instant.
+    assert near['inputs'] == [angles[least]]
+    assert near['input_to_toggle'] is None  # a crank that turns fully meets none
+    assert linkage['states'] == 1500
+    assert linkage['toggles'] == 0
+
+
+def test_the_way_to_a_toggle_is_counted_in_the_input(tmp_path: Path, tell: Any) -> None:
+    a, b, c, d = 0.1, 0.05, 0.06, 0.12  # the crank swings: b + c < a + d
+    limit = acos((a * a + d * d - (b + c) ** 2) / (2 * a * d))
+    run = Recorded(
+        tmp_path / 'bag',
+        scene_file(tmp_path, '', f'four_bar: {{a: {a}, b: {b}, c: {c}, d: {d}}}\n'),
+        lambda number: {'crank_joint': (limit - 0.2995 + 0.001 * number, 1.0)},
+    )
+    # The last 100 ticks are beyond the limit: no state, and nothing published.
+    (linkage,) = tell(run.run(400))['scene']['linkages']
+    assert linkage['states'] == 300
+    near = linkage['nearest_to_toggle']
+    assert near['time_ns'] == BEGIN + 299 * MS
+    assert near['input_to_toggle'] == pytest.approx(0.0005, abs=1e-12)
+    # The angle goes as the root of the way that is left: digits are lost on either side.
+    assert near['transmission_angle_rad'] == pytest.approx(
+        transmission(limit - 0.0005, a, b, c, d), rel=1e-10
+    )
+
+
+def test_a_state_at_the_toggle_is_counted_as_one(tmp_path: Path, tell: Any) -> None:
+    # Stretched out where the crank lies along the ground: b + c = d - a, at 0 and only there.
+    run = Recorded(
+        tmp_path / 'bag',
+        scene_file(tmp_path, '', 'four_bar: {a: 0.25, b: 0.375, c: 0.375, d: 1.0}\n'),
+        lambda number: {'crank_joint': (-1.0 + 0.25 * number, 1.0)},
+    )
+    (linkage,) = tell(run.run(9))['scene']['linkages']
+    assert (linkage['states'], linkage['toggles']) == (1, 1)
+    assert linkage['nearest_to_toggle']['conditioning'] == 0.0
+    assert linkage['nearest_to_toggle']['inputs'] == [0.0]
+
+
+def test_the_worst_residual_is_the_greatest_of_all_and_stands_where_it_was(
+    bag: Path, tell: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (linkage,) = tell(bag)['scene']['linkages']
+    worst = linkage['worst_residual']
+    assert 0.0 < worst['residual_m'] < 1e-15
+    # With something else in its place that the bag tells too: the rocker's angle.
+    monkeypatch.setattr(Closure, 'residual', lambda _, position: position.joints[1])
+    states = [message for name, _, message in told(bag) if name == '/joint_states']
+    greatest = max(states, key=lambda message: message.position[1])
+    (linkage,) = tell(bag)['scene']['linkages']
+    worst = linkage['worst_residual']
+    assert worst['residual_m'] == greatest.position[1]
+    assert worst['time_ns'] == stamp_of(greatest)
+    assert worst['inputs'] == [1.0 + 0.007 * (stamp_of(greatest) - BEGIN) / MS]
+
+
+TWO = """
+linkages:
+- {name: left, linkage: l.yaml, drive: {constant_rate: {rate: 5.0}}}
+- {name: right, linkage: l.yaml, drive: {constant_rate: {rate: -3.0, start: 2.0}}}
+"""
+
+
+def test_each_of_several_linkages_has_its_own_account(tmp_path: Path, tell: Any) -> None:
+    account = tell(Recorded(tmp_path / 'bag', scene_file(tmp_path, TWO)).run(400))
+    left, right = account['scene']['linkages']
+    assert (left['name'], right['name']) == ('left', 'right')
+    assert left['inputs'] == [{'joint': 'left_crank_joint', 'unit': 'rad'}]
+    for linkage, start, rate in ((left, 0.0, 5.0), (right, 2.0, -3.0)):
+        angles = [start + rate * number * 1e-3 for number in range(400)]
+        least = min(transmission(angle, A, B, C, D) for angle in angles)
+        near = linkage['nearest_to_toggle']
+        assert near['transmission_angle_rad'] == pytest.approx(least, abs=1e-12)
+        assert near['inputs'][0] == pytest.approx(
+            start + rate * (near['time_ns'] - BEGIN) * 1e-9, abs=1e-12
+        )
+
+
+def test_a_person_reads_the_same(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert answer(info, bag) == 0
+    lines = [' '.join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert 'duration 1.499000000 s' in lines
+    assert 'dropped 3' in lines
+    assert 'run again 1500 of 1500 joint states come to the same bytes' in lines
+    assert f'/crank_states {JOINT_STATE} 1500 1000 0 best effort' in lines
+    least = min(range(1500), key=lambda k: transmission(1.0 + 0.007 * k, A, B, C, D))
+    angle = remainder(1.0 + 0.007 * least, tau)
+    mu = transmission(angle, A, B, C, D)
+    # Samples and joint states are logged a quarter of a millisecond after what they tell of.
+    assert (
+        f'nearest toggle conditioning {sqrt(2) * sin(mu / 2):.4g}, '
+        f'transmission angle {degrees(mu):.4g}°, at {least * 1e-3 - 0.00025:+.6f} s, '
+        f'crank_joint {degrees(angle):.3f}° ({angle:.6g} rad)'
+    ) in lines
+
+
+def test_the_file_alone_says_what_the_folder_says(bag: Path, tell: Any) -> None:
+    whole, alone = tell(bag), tell(bag / 'bag_0.mcap')
+    assert alone | {'bag': ''} == whole | {'bag': ''}
+
+
+def test_a_bag_of_nothing(tmp_path: Path, tell: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    BagWriter(tmp_path / 'empty', [topic('/a', JOINT_STATE)]).close()
+    account = tell(tmp_path / 'empty')
+    assert (account['duration_ns'], account['begin'], account['messages']) == (None, None, 0)
+    assert answer(info, tmp_path / 'empty') == 0
+    assert 'no messages' in capsys.readouterr().out
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Path:
+    """Return a bag by rosbags, compressed, without a scene."""
+    writer = RosbagsWriter(tmp_path / 'foreign', version=8, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    text = STORE.types['std_msgs/msg/String']
+    with writer:
+        chatter = writer.add_connection('/chatter', 'std_msgs/msg/String', typestore=STORE)
+        for number in range(30):
+            data = STORE.serialize_cdr(text('again ' * 1000), 'std_msgs/msg/String')
+            writer.write(chatter, BEGIN + number * SECOND // 10, data)
+    return tmp_path / 'foreign'
+
+
+def test_of_a_foreign_bag_the_rest_is_told(
+    foreign: Path, tell: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    account = tell(foreign)
+    (chatter,) = account['topics']
+    assert (chatter['type'], chatter['messages']) == ('std_msgs/msg/String', 30)
+    assert chatter['rate_hz'] == pytest.approx(10.0)
+    assert chatter['dropped'] is None
+    assert account['versions']['rosbag2_metadata'] == 8
+    (compression,) = account['compressions']
+    assert compression['name'] == 'zstd'
+    assert compression['content_bytes'] > 30 * 6000 > 20 * compression['stored_bytes']
+    assert account['scene'] is None
+    assert 'carries no run.json, scene.yaml' in account['scene_missing']
+    assert answer(info, foreign) == 0
+    assert 'carries no run.json, scene.yaml; so neither residual' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ('attached', 'reason'),
+    [
+        ({RUN_FILE: b'{"scene": 3'}, 'its run.json is damaged'),
+        ({'scene.yaml': b'linkage: l.yaml\nrate: warp\n'}, 'rate'),
+        ({'scene.yaml': b'linkage: l.yaml\neffects: {telepathy: {}}\n'}, 'telepathy'),
+        ({'linkage.yaml': b'four_bar: {a: 9, b: 1, c: 1, d: 1}\n'}, 'the loops close at no value'),
+        ({'scene.yaml': b'linkage: l.yaml\ndrive: {bag: {file: gone}}\n'}, 'gone'),
+    ],
+)
+def test_of_a_scene_that_cannot_be_run_the_rest_is_told(
+    tmp_path: Path, tell: Any, attached: dict[str, bytes], reason: str
+) -> None:
+    run = {'scene': 's', 'joint_states_topic': '/a', 'linkage_ros': '99.0'}
+    files = {
+        'scene.yaml': b'linkage: l.yaml\n',
+        'linkage.yaml': FOUR_BAR.encode(),
+        RUN_FILE: json.dumps(run).encode(),
+    } | attached
+    writer = BagWriter(
+        tmp_path / 'bag',
+        [topic('/a', JOINT_STATE)],
+        {name: ('', data) for name, data in files.items()},
+    )
+    writer.write(0, 5, 5, bytes(60))
+    writer.close()
+    account = tell(tmp_path / 'bag')
+    assert account['replay'] is None
+    assert reason in account['scene_missing']
+    assert account['messages'] == 1
+
+
+@pytest.mark.parametrize('kept', [0.3, 0.6, 0.9])
+def test_of_a_bag_that_was_cut_its_whole_part_is_told(
+    bag: Path, tmp_path: Path, tell: Any, kept: float
+) -> None:
+    content = (bag / 'bag_0.mcap').read_bytes()
+    cut = tmp_path / 'cut.mcap'
+    cut.write_bytes(content[: int(kept * len(content))])
+    expected = 0
+    with cut.open('rb') as stream, suppress(EndOfFile):
+        for _ in NonSeekingReader(stream).iter_messages(log_time_order=False):
+            expected += 1
+    account = tell(cut)
+    assert account['truncated']
+    assert account['messages'] == expected > 100
+    assert account['topics'][0]['dropped'] is None
+    (linkage,) = account['scene']['linkages']
+    assert linkage['states'] == account['replay']['joint_states'] > 30
+
+
+def test_of_a_damaged_bag_what_lies_before_is_told(
+    bag: Path, tmp_path: Path, tell: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content = bytearray((bag / 'bag_0.mcap').read_bytes())
+    content[len(content) // 2] ^= 4
+    damaged = tmp_path / 'damaged.mcap'
+    damaged.write_bytes(content)
+    account = tell(damaged)
+    assert 'is damaged' in account['damage']
+    assert 1000 < account['messages'] < 3500
+    assert answer(info, damaged) == 0
+    assert 'what lies before is told here' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    'said', ['rubbish', '[1, 2]', '{"/a": "many"}', '{"/b": 2}', '{"/a": NaN}', 'null', '']
+)
+def test_drops_that_are_not_told_are_not_made_up(tmp_path: Path, tell: Any, said: str) -> None:
+    writer = BagWriter(tmp_path / 'bag', [topic('/a', JOINT_STATE)])
+    writer.close({'linkage_ros.dropped': said, 'linkage_ros.failure': 'the disk is full'})
+    account = tell(tmp_path / 'bag')
+    assert account['topics'][0]['dropped'] is None
+    assert account['recording_failure'] == 'the disk is full'
+
+
+@pytest.mark.parametrize('version', ['new', '9.5', '[9]', 'null', '&a [9], ros_distro: [*a, *a]'])
+def test_a_version_that_is_no_number_is_not_told(
+    bag: Path, tmp_path: Path, tell: Any, version: str
+) -> None:
+    folder = tmp_path / 'bag'
+    folder.mkdir()
+    (folder / 'bag_0.mcap').write_bytes((bag / 'bag_0.mcap').read_bytes())
+    (folder / METADATA_FILE).write_text(f'rosbag2_bagfile_information: {{version: {version}}}\n')
+    account = tell(folder)
+    assert account['messages'] == 4500
+    assert account['versions']['rosbag2_metadata'] is None
+    assert account['versions']['ros_distro'] is None
+
+
+def test_a_signal_ends_the_reading_and_what_was_read_is_told(
+    bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stop = Event()
+    stop.set()
+    assert answer(info, bag, '--json', stop=stop) == 1
+    told = capsys.readouterr()
+    account = json.loads(told.out)
+    assert account['stopped']
+    assert account['messages'] == 4096
+    assert account['scene']['linkages'][0]['states'] == 1024
+    assert told.err == 'linkage info: stopped; not all of the bag was read\n'
+
+
+class Later(Event):
+    """A signal that comes after somebody has asked for it once."""
+
+    def is_set(self) -> bool:
+        before = super().is_set()
+        self.set()
+        return before
+
+
+def test_a_signal_ends_looking_at_states_too(
+    bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert answer(info, bag, '--json', stop=Later()) == 1
+    account = json.loads(capsys.readouterr().out)
+    assert account['stopped']
+    assert account['messages'] == 4500
+    assert account['scene']['linkages'][0]['states'] == 1024
+
+
+def test_joint_states_that_come_out_otherwise_are_counted(
+    bag: Path, tmp_path: Path, tell: Any
+) -> None:
+    original = read_bag(bag)
+    names = [topic.name for topic in original.topics]
+    attached = {name: ('', data) for name, data in original.attachments.items()}
+    writer = BagWriter(tmp_path / 'bag', original.topics, attached)
+    for number, (name, log, publish, data) in enumerate(original.messages()):
+        changed = name == '/joint_states' and 300 < number < 400
+        writer.write(names.index(name), log, publish, data[:-16] + bytes(16) if changed else data)
+    writer.close()
+    assert tell(tmp_path / 'bag')['replay'] == {'joint_states': 1500, 'same_bytes': 1467}
+
+
+def test_what_a_terminal_would_obey_is_spelled_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    BagWriter(tmp_path / 'bag', [topic('/a\x1b[2J\n', JOINT_STATE)]).close()
+    assert answer(info, tmp_path / 'bag') == 0
+    out = capsys.readouterr().out
+    assert '/a\\x1b[2J\\n' in out
+    assert '\x1b' not in out
+
+
+def bad_bags(folder: Path) -> Iterator[tuple[str, str]]:
+    (folder / 'text.mcap').write_text('no bag at all')
+    (folder / 'empty.mcap').touch()
+    (folder / 'nothing').mkdir()
+    yield 'text.mcap', 'starts with'
+    yield 'empty.mcap', 'is empty'
+    yield 'nothing', 'holds no .mcap file'
+    yield 'gone', 'does not exist'
+
+
+def test_what_is_no_bag_is_answered_in_a_line(tmp_path: Path) -> None:
+    for name, reason in bad_bags(tmp_path):
+        with pytest.raises(LinkageError, match=reason) as caught:
+            answer(info, tmp_path / name)
+        assert '\n' not in str(caught.value)
+
+
+def test_from_the_command_line(linkage: Run, bag: Path) -> None:
+    found = linkage('info', str(bag))
+    assert (found.returncode, found.stderr) == (0, '')
+    assert found.stdout.startswith(f'{bag}\n')
+    missing = linkage('info', 'gone')
+    assert missing.returncode == 2
+    assert missing.stderr.splitlines() == [
+        'linkage info: gone: does not exist; name the folder of a bag, or its file'
+    ]

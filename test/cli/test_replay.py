@@ -1,0 +1,410 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``linkage replay``: a run comes to the same bytes again, or is told where it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+import json
+from pathlib import Path
+from struct import pack, unpack
+from threading import Event
+from types import SimpleNamespace
+from typing import Any
+
+from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.cli import replay
+from linkage_ros.errors import LinkageError
+from linkage_ros.replay import versions_here
+from linkage_ros.ros.run_recording import RunRecording
+from linkage_ros.scene.load import load_scene
+import pytest
+
+from .conftest import Run
+from .recorded import (
+    answer,
+    BEGIN,
+    JOINT_STATE,
+    MS,
+    Recorded,
+    scene_file,
+    STORE,
+    topic,
+)
+
+TICKS = 300
+LINKAGE = (Path(__file__).parents[2] / 'config/linkages/four_bar.yaml').read_text()
+TWO = 'linkages: [{name: a, linkage: l.yaml}, {name: b, linkage: l.yaml}]\n'
+NOISE = 'noise: {joints: {rocker_joint: {white: 1.0e-3, walk: 1.0e-2}}}'
+
+SCENES = {
+    'positions': '',
+    'rates': 'effects: {velocity: {}}\n',
+    'wrapped': 'angles: wrapped\n',
+    'motions and forces': 'effects: {acceleration: {}, effort: {}, pin_forces: {}}\n'
+    'loads: {gravity: [0, -9.81]}\n',
+    'readings withheld': f'effects: {{{NOISE}, dropout: {{probability: 0.3}}}}\n',
+    'late readings': 'effects: {velocity: {}, delay: {seconds: 0.05}}\n',
+    'two that withhold': f'{TWO}drive: {{sine: {{amplitude: 1.0, frequency: 2.0}}}}\n'
+    'effects: {dropout: {probability: 0.5}}\n',
+    'driven by itself': 'drive: {sine: {amplitude: 1.0, frequency: 2.0}}\n',
+}
+
+
+def turning(number: int) -> Mapping[str, tuple[float, float]]:
+    """Turn the crank at 20 rad/s; samples come every third tick."""
+    return {} if number % 3 else {'crank_joint': (0.02 * number, 20.0)}
+
+
+def recorded(folder: Path, text: str, ticks: int = TICKS, **options: Any) -> Path:
+    scene = scene_file(folder, text, LINKAGE)
+    crank = None if 'drive: {sine' in text else turning
+    return Recorded(folder / 'bag', scene, crank, **options).run(ticks)
+
+
+Edit = Callable[[int, BagMessage], BagMessage | None]
+"""Makes of a message, by its number, what is written; nothing for none."""
+
+
+def rewritten(bag_path: Path, name: str, edit: Edit, twice: str = '', **said: object) -> Path:
+    """Write a bag once more with other messages, so that its checksums fit, and another run."""
+    bag = read_bag(bag_path)
+    files = {key: ('', data) for key, data in bag.attachments.items()}
+    account = json.loads(bag.attachments[RUN_FILE]) | said
+    files[RUN_FILE] = ('', json.dumps(account).encode())
+    numbers = {each.name: number for number, each in enumerate(bag.topics)}
+    writer = BagWriter(bag_path.with_name(name), bag.topics, files)
+    for number, message in enumerate(bag.messages()):
+        edited = edit(number, message)
+        for _ in range(1 + (message.topic == twice) if edited else 0):
+            writer.write(numbers[edited.topic], *edited[1:])
+    writer.close()
+    return writer.folder
+
+
+def told(capsys: pytest.CaptureFixture[str], *typed: object) -> tuple[int, dict[str, Any]]:
+    """Return exit code and account of ``linkage replay --json``."""
+    capsys.readouterr()
+    code = answer(replay, *typed, '--json')
+    return code, json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize('name', SCENES)
+def test_a_run_comes_to_the_same_bytes(tmp_path, capsys, name):
+    bag = recorded(tmp_path, SCENES[name])
+    code, account = told(capsys, bag)
+    assert (code, account['verdict']) == (0, 'identical')
+    in_bag = [message.topic for message in read_bag(bag).messages()]
+    for each in account['topics']:
+        assert each['same'] == each['recorded'] == in_bag.count(each['name'])
+    assert account['topics'][0]['recorded'] > 50
+    times = {m.publish_time for m in read_bag(bag).messages() if m.topic == '/linkage/withheld'}
+    assert account['withheld_ticks'] == len(times)
+    assert account['greatest'] == []
+    assert account['first_difference'] is None
+    assert answer(replay, bag) == 0
+    assert 'identical' in capsys.readouterr().out
+
+
+def test_two_linkages_that_withhold_at_one_tick_say_so_twice(tmp_path, capsys):
+    # As the tick loop has it: for each linkage without a reading, where no other has one.
+    bag = recorded(tmp_path, SCENES['two that withhold'])
+    twice = rewritten(bag, 'twice', lambda _, message: message, twice='/linkage/withheld')
+    code, account = told(capsys, twice)
+    assert (code, account['verdict']) == (0, 'identical')
+    assert 2 * account['withheld_ticks'] == sum(
+        message.topic == '/linkage/withheld' for message in read_bag(twice).messages()
+    )
+    assert account['withheld_ticks'] > 30
+
+
+def spoil(data: bytes, place: int, bits: int) -> tuple[bytes, float, float]:
+    """Return a message with bits of a position flipped; and the position, before and after."""
+    value = float(STORE.deserialize_cdr(data, JOINT_STATE).position[place])
+    (raw,) = unpack('<q', pack('<d', value))
+    (other,) = unpack('<d', pack('<q', raw ^ bits))
+    assert data.count(pack('<d', value)) == 1
+    return data.replace(pack('<d', value), pack('<d', other)), value, other
+
+
+def test_one_bit_of_one_position_is_named(tmp_path, capsys):
+    bag = recorded(tmp_path, SCENES['rates'])
+    found = {}
+
+    def edit(_: int, message: BagMessage) -> BagMessage:
+        if message.topic != '/joint_states' or message.publish_time != BEGIN + 122 * MS:
+            return message
+        data, found['before'], found['after'] = spoil(message.data, 1, 1)
+        return message._replace(data=data)
+
+    code, account = told(capsys, rewritten(bag, 'spoilt', edit))
+    assert (code, account['verdict']) == (3, 'different')
+    assert account['different_ticks'] == 1
+    assert account['topics'][0]['different'] == 1
+    assert account['topics'][0]['same'] == TICKS - 1
+    apart = abs(found['after'] - found['before'])
+    where = {'tick': 123, 'time_ns': BEGIN + 122 * MS}
+    assert account['first_difference'] == where | {
+        'topic': '/joint_states',
+        'what': 'position',
+        'joint': 'rocker_joint',
+        'unit': 'rad',
+        'recorded': found['after'],
+        'now': found['before'],
+        'difference': apart,
+        'ulp': 1,
+    }
+    (row,) = account['greatest']
+    at = where | {'joint': 'rocker_joint'}
+    assert row == {
+        'quantity': 'position', 'unit': 'rad', 'difference': apart, 'difference_at': at,
+        'ulp': 1, 'ulp_at': at,
+    }  # fmt: skip
+    assert answer(replay, tmp_path / 'spoilt') == 3
+    text = capsys.readouterr().out
+    assert f'{found["after"]!r} recorded, {found["before"]!r} now' in text
+    assert 'tick 123, at +0.122000 s' in text
+    assert 'linkage_ros 9.8.7, Python 3.99.1, on abacus' in text
+    assert f'replayed by linkage_ros {versions_here()["linkage_ros"]}' in text
+
+
+def test_a_bag_of_another_machine_is_told_by_how_much_it_differs(tmp_path, capsys):
+    bag = recorded(tmp_path, SCENES['rates'])
+    apart = []
+
+    def edit(_: int, message: BagMessage) -> BagMessage:
+        if message.topic != '/joint_states':
+            return message
+        tick = (message.publish_time - BEGIN) // MS
+        data, before, after = spoil(message.data, 0, 3 if tick == 200 else 1)
+        apart.append(abs(after - before))
+        return message._replace(data=data)
+
+    code, account = told(capsys, rewritten(bag, 'other', edit, machine='sundial'))
+    assert code == 3
+    assert account['versions']['bag']['machine'] == 'sundial'
+    assert account['versions']['here'] == versions_here()
+    (row,) = account['greatest']
+    assert row['difference'] == max(apart)
+    assert row['ulp'] in (1, 2, 3)
+    assert account['topics'][0]['different'] == TICKS
+    assert (row['ulp_at']['joint'], row['unit']) == ('coupler_joint', 'rad')
+
+
+def test_what_the_recorder_dropped_is_no_difference(tmp_path, capsys):
+    text = 'effects: {acceleration: {}}\n'
+    bag = recorded(
+        tmp_path, text, drop=lambda number, name: name == '/joint_states' and not number % 5
+    )
+    code, account = told(capsys, bag)
+    assert (code, account['verdict']) == (0, 'identical')
+    states, motions = account['topics']
+    assert (states['recorded'], states['not_recorded']) == (240, 60)
+    assert motions['recorded'] == motions['same'] == 300
+
+
+def test_a_tick_that_withheld_and_would_not_now_is_a_difference(tmp_path, capsys):
+    bag = recorded(tmp_path, 'effects: {dropout: {probability: 0.3}}\n')
+    scene = read_bag(bag).attachments['scene.yaml']
+
+    def without(name: str, data: bytes) -> Path:
+        found = read_bag(bag)
+        files = {key: ('', value) for key, value in found.attachments.items()}
+        files['scene.yaml'] = ('', data)
+        numbers = {each.name: number for number, each in enumerate(found.topics)}
+        writer = BagWriter(tmp_path / name, found.topics, files)
+        for message in found.messages():
+            writer.write(numbers[message.topic], *message[1:])
+        writer.close()
+        return writer.folder
+
+    other = scene.replace(b'0.3', b'0.0')
+    assert other != scene
+    code, account = told(capsys, without('never', other))
+    assert code == 3
+    assert account['first_difference']['what'] == 'withheld then, published now'
+    withheld = [m for m in read_bag(bag).messages() if m.topic == '/linkage/withheld']
+    assert account['topics'][0]['not_recorded'] == account['different_ticks'] == len(withheld)
+
+
+# Begun in mid-run: text of the scene, first tick in the bag, its begun, exit code, verdict, and
+# how many ticks cannot be told.
+MID_RUN = {
+    'a sample is soon there': ('effects: {velocity: {}}\n', 31, 'mid-run', 0, 'identical', 2),
+    'at a sample': ('effects: {velocity: {}}\n', 30, 'mid-run', 0, 'identical', 0),
+    'a delay that fills': (
+        'effects: {velocity: {}, delay: {seconds: 0.05}}\n', 100, 'mid-run', 0, 'identical', None
+    ),
+    'random numbers': (f'effects: {{{NOISE}}}\n', 31, 'mid-run', 1, 'cannot be told', TICKS - 31),
+    'readings lost': (
+        'effects: {dropout: {probability: 0.3}}\n', 31, 'mid-run', 1, 'cannot be told', None
+    ),
+    'the bag does not say': ('effects: {velocity: {}}\n', 31, '', 3, 'different', 0),
+    'with the run': ('effects: {velocity: {}}\n', 31, 'with the run', 3, 'different', 0),
+}  # fmt: skip
+
+
+def from_tick(number: int) -> Edit:
+    return lambda _, message: message if message.log_time >= BEGIN + number * MS else None
+
+
+@pytest.mark.parametrize('name', MID_RUN)
+def test_a_bag_that_was_begun_in_mid_run(tmp_path, capsys, name):
+    text, first, begun, code, verdict, untold = MID_RUN[name]
+    said = {'begun': begun} if begun else {}
+    bag = rewritten(recorded(tmp_path, text), 'part', from_tick(first), **said)
+    found, account = told(capsys, bag)
+    assert (found, account['verdict']) == (code, verdict)
+    if untold is not None:
+        assert account['untold_ticks'] == untold
+    elif 'delay' in text:
+        # 50 ms of readings at 1 kHz, and up to two ticks without a sample.
+        assert 50 <= account['untold_ticks'] <= 53
+    assert bool(account['mid_run']) == (begun == 'mid-run')
+    states = account['topics'][0]
+    assert account['compared_ticks'] + account['untold_ticks'] == account['ticks']
+    if verdict == 'identical':
+        assert states['same'] + states['same_but_for_turns'] == states['recorded'] > 100
+    answer(replay, bag)
+    assert ('could not be told' in capsys.readouterr().out) == (begun == 'mid-run')
+
+
+def test_whole_turns_before_the_bag_are_no_difference(tmp_path, capsys):
+    # At 20 rad/s the coupler's angle against the crank's runs back a turn every 314 ticks.
+    bag = recorded(tmp_path, 'effects: {acceleration: {}}\n', 2000)
+    part = rewritten(bag, 'part', from_tick(690), begun='mid-run')
+    code, account = told(capsys, part)
+    assert (code, account['verdict']) == (0, 'identical')
+    states, motions = account['topics']
+    assert states['same_but_for_turns'] == states['recorded'] == 1310
+    assert motions['same_but_for_turns'] == motions['recorded'] == 1310
+    assert answer(replay, rewritten(bag, 'whole', from_tick(690), begun='with the run')) == 3
+
+
+def test_a_bit_is_found_in_a_bag_of_mid_run_too(tmp_path, capsys):
+    bag = recorded(tmp_path, 'effects: {velocity: {}}\n')
+
+    def edit(number: int, message: BagMessage) -> BagMessage | None:
+        if message.topic == '/joint_states' and message.publish_time == BEGIN + 200 * MS:
+            return message._replace(data=spoil(message.data, 1, 1)[0])
+        return from_tick(31)(number, message)
+
+    code, account = told(capsys, rewritten(bag, 'part', edit, begun='mid-run'))
+    assert (code, account['verdict'], account['untold_ticks']) == (3, 'different', 2)
+    assert account['first_difference']['ulp'] == 1
+    assert account['first_difference']['time_ns'] == BEGIN + 200 * MS
+
+
+@pytest.mark.parametrize(('running', 'said'), [(True, 'mid-run'), (False, 'with the run')])
+def test_a_recording_says_when_it_was_begun(tmp_path, running, said):
+    logger = SimpleNamespace(info=lambda _: None, error=lambda _: None)
+    loop = SimpleNamespace(running=running, recorder=None)
+    recording = RunRecording(logger)
+    scene = load_scene(scene_file(tmp_path, ''))
+    states = topic('/joint_states', JOINT_STATE)
+    recording.start(scene, loop, str(tmp_path), lambda: [('joint_states_topic', states)])
+    folder = loop.recorder.folder
+    recording.stop(loop)
+    assert json.loads(read_bag(folder).attachments[RUN_FILE])['begun'] == said
+
+
+def test_a_truncated_bag_is_replayed_as_far_as_it_goes(tmp_path, capsys):
+    bag = recorded(tmp_path, SCENES['rates'], 12_000)
+    whole = (bag / 'bag_0.mcap').read_bytes()
+    part = tmp_path / 'part.mcap'
+    part.write_bytes(whole[: len(whole) * 2 // 3])
+    assert answer(replay, part, '--json') == 0
+    out, err = capsys.readouterr()
+    account = json.loads(out)
+    assert account['truncated']
+    assert account['verdict'] == 'identical'
+    assert 1000 < account['topics'][0]['same'] < 12_000
+    assert err == f'linkage replay: {part}: has no end; its whole part was replayed\n'
+
+
+def test_a_damaged_bag_is_replayed_up_to_the_damage(tmp_path, capsys):
+    bag = recorded(tmp_path, SCENES['rates'], 12_000)
+    file = bag / 'bag_0.mcap'
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(data)
+    assert answer(replay, bag, '--json') == 1
+    out, err = capsys.readouterr()
+    account = json.loads(out)
+    assert account['verdict'] == 'identical'
+    assert 'is damaged' in account['damage']
+    assert 0 < account['topics'][0]['same'] < 12_000
+    assert 'what lies before was replayed' in err
+
+
+def test_a_wish_to_stop_is_heard(tmp_path, capsys):
+    bag = recorded(tmp_path, '', 6000)
+    stop = Event()
+    stop.set()
+    assert answer(replay, bag, stop=stop) == 1
+    out, err = capsys.readouterr()
+    assert 'identical' in out
+    assert err == 'linkage replay: stopped; the rest of the bag was not replayed\n'
+
+
+def test_what_is_typed_is_answered_with_an_exit_code(linkage: Run, tmp_path: Path) -> None:
+    bag = recorded(tmp_path, '')
+    rewritten(bag, 'part', from_tick(31))
+    codes = {'bag': 0, 'part': 3, 'missing': 2}
+    for name, code in codes.items():
+        answered = linkage('replay', name)
+        assert answered.returncode == code
+        assert answered.stderr.count('\n') == (code == 2)
+    assert 'linkage replay: missing: does not exist' in answered.stderr
+
+
+def test_a_bag_that_does_not_say_what_ran_is_answered_with_what_is_missing(tmp_path):
+    with BagWriterOf(tmp_path / 'foreign') as write:
+        write(0)
+    with pytest.raises(LinkageError) as raised:
+        answer(replay, tmp_path / 'foreign')
+    assert str(raised.value) == (
+        f'{tmp_path}/foreign: carries no run.json, scene.yaml; name a scene to run with --scene'
+    )
+
+
+def test_a_bag_of_no_joint_states_is_refused(tmp_path):
+    bag = rewritten(
+        recorded(tmp_path, ''), 'silent', lambda _, m: m if m.topic == '/crank_states' else None
+    )
+    with pytest.raises(LinkageError, match='holds no joint states'):
+        answer(replay, bag)
+
+
+@pytest.mark.parametrize('typed', [['-o', 'new'], ['--crank-topic', '/c']])
+def test_options_of_another_scene_need_one(tmp_path, typed):
+    bag = recorded(tmp_path, '')
+    with pytest.raises(LinkageError, match='name it with --scene'):
+        answer(replay, bag, *typed)
+
+
+class BagWriterOf:
+    """A bag with a topic of joint states and nothing that says what it is."""
+
+    def __init__(self, folder: Path) -> None:
+        self._writer = BagWriter(folder, [topic('/joints', JOINT_STATE)])
+
+    def __enter__(self) -> Callable[[int], bool]:
+        return lambda number: self._writer.write(0, BEGIN + number, BEGIN, b'\0\1\0\0')
+
+    def __exit__(self, *_: object) -> None:
+        self._writer.close()

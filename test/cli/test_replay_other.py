@@ -1,0 +1,356 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``linkage replay --scene``: what would have been, by the closed form; and into a new bag."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import json
+from math import acos, atan2, cos, hypot, remainder, sin, sqrt, tau
+from pathlib import Path
+from typing import Any
+
+from linkage_ros.bag.reader import read_bag, RUN_FILE
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.cli import replay
+from linkage_ros.errors import LinkageError
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.scene.load import load_scene
+import pytest
+from rosbags.highlevel import AnyReader
+
+from .recorded import (
+    answer,
+    BEGIN,
+    FOUR_BAR,
+    JOINT_STATE,
+    MS,
+    Recorded,
+    scene_file,
+    SECOND,
+    topic,
+)
+from .recorded import (
+    told as messages_of,
+)
+
+TICKS = 300
+PLAIN = 'effects: {velocity: {}}\n'
+GENERAL = (Path(__file__).parents[2] / 'config/linkages/four_bar.yaml').read_text()
+SWINGING = 'four_bar: {a: 0.1, b: 0.1, c: 0.05, d: 0.12}\n'  # its crank cannot turn fully
+
+
+def angle(number: int) -> float:
+    return 0.3 + 0.02 * number
+
+
+def crank(number: int) -> Mapping[str, tuple[float, float]]:
+    """Turn the crank at 20 rad/s; samples come every other tick."""
+    return {} if number % 2 else {'crank_joint': (angle(number), 20.0)}
+
+
+def rocker(a: float, b: float, c: float, d: float, theta: float) -> float:
+    """Return the rocker's angle, B on the left of A→O4: two circles that meet."""
+    x, y = d - a * cos(theta), -a * sin(theta)
+    s = hypot(x, y)
+    return remainder(atan2(-y, -x) - acos((s * s + c * c - b * b) / (2.0 * s * c)), tau)
+
+
+def recorded(folder: Path, text: str = PLAIN, linkage: str = FOUR_BAR, ticks: int = TICKS) -> Path:
+    own = None if 'drive: {' in text and 'topic' not in text else crank
+    return Recorded(folder / 'bag', scene_file(folder, text, linkage), own).run(ticks)
+
+
+def other(folder: Path, text: str, linkage: str = FOUR_BAR) -> Path:
+    (folder / 'other_linkage.yaml').write_text(linkage)
+    scene = folder / 'other.yaml'
+    scene.write_text(text if 'linkages' in text else f'linkage: other_linkage.yaml\n{text}')
+    return scene
+
+
+def told(capsys: pytest.CaptureFixture[str], *typed: object) -> dict[str, Any]:
+    capsys.readouterr()
+    assert answer(replay, *typed, '--json') == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def row(account: Mapping[str, Any], joint: str, quantity: str = 'position') -> dict[str, Any]:
+    (found,) = (
+        each
+        for each in account['joints']
+        if (each['joint'], each['quantity']) == (joint, quantity)
+    )
+    return found
+
+
+def test_a_bias_is_found_in_its_joint_and_no_other(tmp_path, capsys):
+    scene = other(tmp_path, 'effects: {velocity: {}, bias: {joints: {rocker_joint: 0.125}}}\n')
+    account = told(capsys, recorded(tmp_path), '--scene', scene)
+    assert row(account, 'rocker_joint')['rms'] == pytest.approx(0.125, rel=1e-12)
+    assert row(account, 'rocker_joint')['greatest'] == pytest.approx(0.125, rel=1e-12)
+    assert row(account, 'rocker_joint')['unit'] == 'rad'
+    for joint, quantity in (('coupler_joint', 'position'), ('rocker_joint', 'rate')):
+        found = row(account, joint, quantity)
+        assert (found['rms'], found['greatest'], found['different']) == (0.0, 0.0, 0)
+        assert found['compared'] == TICKS
+    assert account['new_bag'] is None
+
+
+def test_another_linkage_differs_by_what_the_closed_form_says(tmp_path, capsys):
+    longer = FOUR_BAR.replace('0.12', '0.125')
+    scene = other(tmp_path, PLAIN, longer)
+    account = told(capsys, recorded(tmp_path), '--scene', scene)
+    apart = [
+        rocker(0.04, 0.125, 0.08, 0.1, angle(k)) - rocker(0.04, 0.12, 0.08, 0.1, angle(k))
+        for k in range(TICKS)
+    ]
+    found = row(account, 'rocker_joint')
+    assert found['compared'] == TICKS
+    assert found['greatest'] == pytest.approx(max(map(abs, apart)), rel=1e-9)
+    assert found['rms'] == pytest.approx(sqrt(sum(x * x for x in apart) / TICKS), rel=1e-9)
+    number = max(range(TICKS), key=lambda k: abs(apart[k]))
+    assert found['greatest_at'] == {'tick': number + 1, 'time_ns': BEGIN + number * MS}
+    assert answer(replay, tmp_path / 'bag', '--scene', scene) == 0
+    assert f'{found["rms"]:.3g}' in capsys.readouterr().out
+
+
+NOISE = 'noise: {joints: {rocker_joint: {white: 1.0e-3, walk: 1.0e-2}}}'
+LOST = 'effects: {dropout: {probability: 0.5}}\n'
+FAULTS = """
+effects: {velocity: {}}
+faults:
+  quiet: {silence: {}, at: [0.1], seconds: 0.02}
+  spoilt: {not_a_number: {}, at: [0.15], seconds: 0.01}
+"""
+JUMP = f"""
+effects: {{{NOISE}}}
+drive: {{topic: {{max_lead: 10.0, max_age: 10.0}}}}
+faults: {{back: {{time_jump: {{by: -0.05}}, at: [0.101], seconds: 0.05}}}}
+"""
+
+# The scene that was run, its linkage, the other, its linkage, and how many joint states that has.
+RUNS = {
+    'the same': (PLAIN, FOUR_BAR, PLAIN, FOUR_BAR, TICKS),
+    'noise': (PLAIN, FOUR_BAR, f'effects: {{{NOISE}}}\n', FOUR_BAR, TICKS),
+    'motions': (PLAIN, FOUR_BAR, 'effects: {acceleration: {}}\n', FOUR_BAR, TICKS),
+    'a delay': (PLAIN, FOUR_BAR, 'effects: {delay: {seconds: 0.05}}\n', FOUR_BAR, TICKS - 50),
+    'readings lost': (PLAIN, FOUR_BAR, LOST, FOUR_BAR, None),
+    'no longer lost': (LOST, FOUR_BAR, PLAIN, FOUR_BAR, TICKS),
+    'a tenth of the rate': (PLAIN, FOUR_BAR, f'rate: 100\n{PLAIN}', FOUR_BAR, TICKS // 10),
+    'twice the rate': (PLAIN, FOUR_BAR, f'rate: 2000\n{PLAIN}', FOUR_BAR, 2 * TICKS - 1),
+    'for every sample': (PLAIN, FOUR_BAR, f'rate: 0\n{PLAIN}', FOUR_BAR, TICKS // 2),
+    'from a tick a sample': (f'rate: 0\n{PLAIN}', FOUR_BAR, PLAIN, FOUR_BAR, None),
+    'a linkage that closes': (PLAIN, SWINGING, PLAIN, FOUR_BAR, TICKS),
+    'a linkage that opens': (PLAIN, FOUR_BAR, PLAIN, SWINGING, None),
+    'play, and open': (
+        PLAIN, FOUR_BAR, 'effects: {velocity: {}, backlash: {play: 0.3}}\n', SWINGING, None
+    ),
+    'faults of its own': (PLAIN, FOUR_BAR, FAULTS, FOUR_BAR, TICKS - 20),
+    # At the tick that it begins with no sample comes, and time that jumps back has no crank.
+    'a clock that jumps': (PLAIN, FOUR_BAR, JUMP, FOUR_BAR, TICKS - 1),
+    'from what drove itself': (
+        'drive: {sine: {amplitude: 1.0, frequency: 2.0}}\n', FOUR_BAR,
+        'drive: {topic: {carry_forward: false}}\n', FOUR_BAR, TICKS,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', RUNS)
+def test_the_new_bag_replays_by_itself(tmp_path, capsys, name):
+    text, linkage, other_text, other_linkage, expected = RUNS[name]
+    bag, scene = recorded(tmp_path, text, linkage), other(tmp_path, other_text, other_linkage)
+    account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new')
+    again = told(capsys, tmp_path / 'new')
+    assert again['verdict'] == 'identical'
+    states = again['topics'][0]
+    assert states['same'] == account['joint_states'] == account['written'][states['name']]
+    if expected is None:
+        assert TICKS // 20 < states['same'] <= TICKS
+    else:
+        assert states['same'] == expected
+    counts = dict.fromkeys(account['written'], 0)
+    for kind, _, _ in messages_of(tmp_path / 'new'):  # by rosbags, with the types in the bag
+        counts[kind] += 1
+    assert counts == account['written']
+
+
+def test_the_new_bag_says_what_it_is(tmp_path, capsys):
+    bag = recorded(tmp_path, 'effects: {acceleration: {}}\n')
+    text = 'effects: {acceleration: {}, dropout: {probability: 0.1}, pin_forces: {}}\nseed: 3\n'
+    scene = other(tmp_path, text, GENERAL)
+    answer(replay, bag, '--scene', scene, '-o', tmp_path / 'new')
+    new = read_bag(tmp_path / 'new')
+    assert new.attachments['scene.yaml'] == scene.read_bytes()
+    assert new.attachments['linkage.yaml'] == GENERAL.encode()
+    said = json.loads(new.attachments[RUN_FILE])
+    assert said['made_from']['bag'] == str(bag)
+    assert said['made_from']['run']['linkage_ros'] == '9.8.7'
+    assert said['scene'] == 'other'
+    assert said['begun'] == 'with the run'
+    # As the bag's own run has named them, and as its node would have named the others.
+    names = {each.name for each in new.topics}
+    assert names == {
+        '/joint_states', '/crank_states', '/linkage/withheld', '/linkage/motion',
+        '/linkage/pin_forces',
+    }  # fmt: skip
+    samples = [m[1:] for m in read_bag(bag).messages() if m.topic == '/crank_states']
+    assert [m[1:] for m in new.messages() if m.topic == '/crank_states'] == samples
+    with AnyReader([tmp_path / 'new']) as reader:
+        assert {each.topic for each in reader.connections} == names
+
+
+def foreign(folder: Path, *topics: str, joints: tuple[str, ...] = ('a', 'crank_joint')) -> Path:
+    """Write a bag that nothing of ours has recorded."""
+    writer = BagWriter(folder / 'foreign', [topic(name, JOINT_STATE) for name in topics])
+    write = JointStateWriter(joints).write
+    for number in range(TICKS):
+        stamp = BEGIN + number * 5 * MS
+        for each in range(len(topics)):
+            numbers = [0.1, angle(number)][: len(joints)]
+            writer.write(each, stamp + MS, stamp, write(stamp, numbers, [0.0] * len(joints)))
+    writer.close()
+    return writer.folder
+
+
+@pytest.mark.parametrize(
+    ('topics', 'typed', 'used'),
+    [
+        (['/motor'], [], '/motor'),
+        (['/joint_states'], [], '/joint_states'),
+        (['/motor', '/crank_states'], [], '/crank_states'),
+        (['/motor', '/gripper'], ['--crank-topic', '/gripper'], '/gripper'),
+    ],
+)
+def test_a_foreign_bag_takes_a_scene(tmp_path, capsys, topics, typed, used):
+    bag = foreign(tmp_path, *topics)
+    scene = other(tmp_path, f'rate: 0\n{PLAIN}')
+    account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new', *typed)
+    assert account['crank_topic'] == used
+    assert account['joint_states'] == TICKS
+    again = told(capsys, tmp_path / 'new')
+    assert (again['verdict'], again['topics'][0]['same']) == ('identical', TICKS)
+    at = {
+        time: message.position[1]
+        for name, time, message in messages_of(tmp_path / 'new')
+        if name == again['topics'][0]['name']
+    }
+    for number in (0, 100, 299):
+        expected = rocker(0.04, 0.12, 0.08, 0.1, angle(number))
+        assert at[BEGIN + (5 * number + 1) * MS] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_foreign_bag_is_ticked_at_the_rate_of_the_scene(tmp_path, capsys):
+    bag, scene = foreign(tmp_path, '/motor'), other(tmp_path, f'rate: 1000\n{PLAIN}')
+    account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new')
+    # From the first sample's log time up to the last one's, both included.
+    assert account['joint_states'] == (TICKS - 1) * 5 + 1
+    assert told(capsys, tmp_path / 'new')['verdict'] == 'identical'
+
+
+@pytest.mark.parametrize(('rate', 'each'), [(0, 100), (1000, 99 * 5 + 1)])
+def test_time_that_jumps_back_begins_anew(tmp_path, capsys, rate, each):
+    writer = BagWriter(tmp_path / 'jump', [topic('/motor', JOINT_STATE)])
+    write = JointStateWriter(['crank_joint']).write
+    for begin in (BEGIN + 5 * SECOND, BEGIN + 2 * SECOND):
+        for number in range(100):
+            stamp = begin + number * 5 * MS
+            writer.write(0, stamp, stamp, write(stamp, [angle(number)], [4.0]))
+    writer.close()
+    scene = other(tmp_path, f'rate: {rate}\neffects: {{{NOISE}}}\n')
+    account = told(capsys, tmp_path / 'jump', '--scene', scene, '-o', tmp_path / 'new')
+    assert account['joint_states'] == 2 * each
+    again = told(capsys, tmp_path / 'new')
+    assert (again['verdict'], again['ticks']) == ('identical', 2 * each)
+
+
+def test_a_run_that_was_silent_has_ticked_where_it_took_samples(tmp_path, capsys):
+    loaded = load_scene(scene_file(tmp_path, PLAIN, SWINGING))
+    files = {name: ('', data) for name, data in loaded.files.items()}
+    run = {'scene': 's', 'joint_states_topic': '/joint_states', 'crank_topic': '/crank_states'}
+    files[RUN_FILE] = ('', json.dumps(run).encode())
+    topics = [topic('/joint_states', JOINT_STATE), topic('/crank_states', JOINT_STATE)]
+    writer = BagWriter(tmp_path / 'open', topics, files)
+    write = JointStateWriter(['crank_joint']).write
+    times = [BEGIN + number * MS + number * number * 37_000 % 300_000 for number in range(100)]
+    for time in times:  # the pins of SWINGING are too far apart here
+        writer.write(1, time, time, write(time, [3.0], [0.0]))
+    writer.close()
+    scene = other(tmp_path, PLAIN)
+    account = told(capsys, tmp_path / 'open', '--scene', scene, '-o', tmp_path / 'new')
+    assert account['joint_states'] == 100
+    made = read_bag(tmp_path / 'new').messages()
+    assert [m.publish_time for m in made if m.topic == '/joint_states'] == times
+
+
+def test_a_long_silence_is_passed_over(tmp_path, capsys):
+    writer = BagWriter(tmp_path / 'gap', [topic('/motor', JOINT_STATE)])
+    write = JointStateWriter(['crank_joint']).write
+    for stamp in (BEGIN, BEGIN + 500_000 * SECOND):  # six days
+        writer.write(0, stamp, stamp, write(stamp, [1.0], [0.0]))
+    writer.close()
+    scene = other(tmp_path, f'{PLAIN}drive: {{topic: {{max_age: 0.2}}}}\n')
+    account = told(capsys, tmp_path / 'gap', '--scene', scene)
+    assert account['joint_states'] == 201 + 1
+
+
+BAD = {
+    'a drive of its own': (
+        PLAIN, 'drive: {sine: {amplitude: 1.0, frequency: 1.0}}\n', FOUR_BAR,
+        'other.yaml: its drive is sine',
+    ),
+    'other joints': (
+        PLAIN, '', GENERAL.replace('coupler_joint', 'rod').replace('rocker_joint', 'swing'),
+        'publishes rod, swing, and ',
+    ),
+    'other inputs': (
+        PLAIN, 'linkages: [{name: left, linkage: other_linkage.yaml}]\n', FOUR_BAR,
+        'holds no samples of left_crank_joint on /crank_states, which has crank_joint',
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', BAD)
+def test_a_scene_that_does_not_go_with_the_bag_is_refused_in_a_line(tmp_path, name):
+    text, other_text, linkage, line = BAD[name]
+    scene = other(tmp_path, other_text, linkage)
+    with pytest.raises(LinkageError) as raised:
+        answer(replay, recorded(tmp_path, text), '--scene', scene)
+    assert line in str(raised.value)
+    assert '\n' not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ('topics', 'joints', 'typed', 'line'),
+    [
+        (['/a', '/b'], ('x', 'crank_joint'), [], 'on /a and /b; name one with --crank-topic'),
+        (['/a'], ('x', 'y'), [], 'holds no samples of crank_joint on /a, which has x, y'),
+        (['/a'], ('x', 'y'), ['--crank-topic', '/b'], 'holds no topic /b of sensor_msgs'),
+        ([], ('x',), [], 'holds no samples of crank_joint; it has no topic of sensor_msgs'),
+    ],
+)
+def test_a_foreign_bag_without_the_crank_is_refused(tmp_path, topics, joints, typed, line):
+    bag = foreign(tmp_path, *topics, joints=joints)
+    with pytest.raises(LinkageError) as raised:
+        answer(replay, bag, '--scene', other(tmp_path, ''), *typed)
+    assert line in str(raised.value)
+
+
+def test_a_folder_that_exists_is_not_touched(tmp_path):
+    bag, scene = recorded(tmp_path), other(tmp_path, PLAIN)
+    (tmp_path / 'new').mkdir()
+    with pytest.raises(LinkageError, match='exists already'):
+        answer(replay, bag, '--scene', scene, '-o', tmp_path / 'new')
+    assert list((tmp_path / 'new').iterdir()) == []

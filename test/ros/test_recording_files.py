@@ -1,0 +1,93 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A recording in a ring of packed files: read, replayed from, and accounted for to the message."""
+
+import json
+import time
+
+from mcap.reader import make_reader
+import pytest
+from rosbags.highlevel import AnyReader
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+import yaml
+
+from .graph import crank, wait_for
+
+ERROR = b'\2'
+INCOMPLETE = 1
+WORDS = ('Recorded', 'Dropped', 'Waiting', 'Let go')
+
+
+def told(status, word):
+    values = {pair.key: pair.value for pair in status.values}
+    return int(values.get(f'{word}: /joint_states', 0))
+
+
+@pytest.mark.parametrize('compression', ['lz4', 'zstd'])
+def test_a_ring_of_packed_files(graph, tmp_path, write_scene, start, compression):
+    record = f'split_seconds: 1, keep_files: 2, compression: {compression}, flush_period: 0.1'
+    node = start(
+        write_scene('ring', f'rate: 500\nrecord: {{directory: {tmp_path}, name: bag, {record}}}')
+    )
+    publisher = graph.publisher(JointState, '/crank_states')
+    end = time.monotonic() + 4.5
+    while time.monotonic() < end:
+        publisher.publish(crank(0.5, 1.0))
+        time.sleep(0.01)
+    status = wait_for(
+        lambda: (status := graph.status('recording')) and told(status, 'Let go') and status,
+        'files that made way',
+    )
+    assert told(status, 'Received') == sum(told(status, word) for word in WORDS)
+    answer = graph.call(Trigger, '/linkage_node/stop_recording')
+    assert answer.success
+    assert ' let go' in answer.message
+    assert node.end() == 0
+
+    said = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text())
+    information = said['rosbag2_bagfile_information']
+    names = information['relative_file_paths']
+    assert len(names) == 2
+    there = {path.name for path in (tmp_path / 'bag').iterdir()}
+    assert there == {'metadata.yaml', *names}
+    with AnyReader([tmp_path / 'bag']) as reader:
+        found = {name: topic.msgcount for name, topic in reader.topics.items()}
+        assert sum(1 for _ in reader.messages()) == sum(found.values())
+    for name in names:
+        with AnyReader([tmp_path / 'bag' / name]) as reader:
+            assert sum(1 for _ in reader.messages()) > 100
+    with (tmp_path / 'bag' / names[-1]).open('rb') as stream:
+        records = {record.name: record.metadata for record in make_reader(stream).iter_metadata()}
+        account = {word: json.loads(text) for word, text in records['linkage_ros.account'].items()}
+    for topic, count in found.items():
+        assert account['recorded'][topic] == count
+        assert account['received'][topic] == sum(
+            account[word][topic] for word in ('recorded', 'dropped', 'let_go')
+        )
+    for word in ('received', 'dropped', 'let_go'):
+        assert json.loads(information['custom_data'][f'linkage_ros.{word}']) == account[word]
+
+
+def test_a_disk_with_less_room_than_is_to_stay(graph, tmp_path, write_scene, start):
+    record = f'record: {{directory: {tmp_path}, name: bag, min_free_bytes: 1000000000000000}}'
+    node = start(write_scene('scarce', f'rate: 100\n{record}'))
+    message = graph.wait_for_level('recording', ERROR).message
+    assert (
+        'bytes are free on its disk, fewer than min_free_bytes: 1,000,000,000,000,000' in message
+    )
+    assert node.end() == INCOMPLETE
+    assert list(tmp_path.iterdir()) == []
