@@ -29,7 +29,7 @@ help:
 	@echo 'make accuracy  prove the kinematics on 11 million cases (30 min)'
 	@echo 'make synthesis compute and draw what docs/synthesis.md says'
 	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
-	@echo 'make damage    read and recover a bag cut at every byte, spoilt in every bit'
+	@echo 'make damage    cut a bag at every byte and flip every bit of it (30 min)'
 	@echo 'make gallery   draw the linkages that come with the package'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
 	@echo 'make cost      measure what every effect costs, into docs/cost.md'
