@@ -25,6 +25,7 @@ from pathlib import Path
 import shutil
 from typing import Any
 
+from linkage_ros.bag.account import UNFINISHED
 from linkage_ros.bag.being_written import is_being_written
 from linkage_ros.bag.folder import custom_of, files_of, information_of, unreadable
 from linkage_ros.bag.metadata import METADATA_FILE
@@ -104,6 +105,8 @@ def recover(
                         return None
             recovery = _recovery(target, bag, information, findings)
             custom = custom_of(information or bag.information)
+            # The old one had no end; the new one has.
+            custom = {key: text for key, text in custom.items() if key != UNFINISHED}
             bag.close({**custom, RECOVERED: recovery.in_short(path)})
         finally:
             bag.abandon()

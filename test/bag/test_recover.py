@@ -25,6 +25,7 @@ from __future__ import annotations
 from io import BytesIO
 from pathlib import Path
 
+from linkage_ros.bag.account import UNFINISHED, UNFINISHED_DATA
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.recover import recover
 from linkage_ros.bag.writer import BagWriter
@@ -263,3 +264,12 @@ def test_metadata_that_are_none_are_made_anew(run, messages, text):
     assert recovery.repaired == ('metadata.yaml',)
     assert data_of(recovery.folder) == without(messages, range(0))
     assert read_bag(recovery.folder).custom['seed'] == '7', 'from the record in the file'
+
+
+def test_what_was_killed_and_is_recovered_is_finished(run):
+    custom = yaml.safe_load((run / 'metadata.yaml').read_text())
+    custom['rosbag2_bagfile_information']['custom_data'] = {**UNFINISHED_DATA, 'seed': '7'}
+    (run / 'metadata.yaml').write_text(yaml.safe_dump(custom))
+    found = read_bag(recover(run).folder).custom
+    assert UNFINISHED not in found
+    assert found['seed'] == '7'
