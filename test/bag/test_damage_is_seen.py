@@ -17,76 +17,22 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 import os
-from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.recover import recover
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
-from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 import pytest
 import yaml
 
-ATTACHMENTS = {
-    'scene.yaml': ('text/yaml', b'linkage: four_bar\n' * 9),
-    'linkage.yaml': ('text/yaml', b'four_bar: {}\n' * 9),
-}
-COUNT = 600
-EACH = 100  # messages in a chunk
+from .damage import chunks_of, COUNT, damaged, data_of, flip, in_chunk, without, write_run
 
 
 @pytest.fixture
 def run(tmp_path, topics, messages):
-    """Return the folder of a finished bag of six chunks of a hundred messages."""
-    writer = BagWriter(tmp_path / 'run', topics, ATTACHMENTS)
-    for number, message in enumerate(messages[:COUNT]):
-        writer.write(*message)
-        if number % EACH == EACH - 1:
-            writer.flush()
-    writer.close({'seed': '7'})
-    return tmp_path / 'run'
-
-
-def chunks_of(content: bytes) -> list[tuple[int, int]]:
-    """Return where chunks begin and end, by mcap's reader."""
-    with_index = make_reader(BytesIO(content)).get_summary()
-    return [
-        (each.chunk_start_offset, each.chunk_start_offset + each.chunk_length)
-        for each in with_index.chunk_indexes
-    ]
-
-
-def data_of(folder: Path) -> list[bytes]:
-    return [message.data for message in read_bag(folder).messages()]
-
-
-def damaged(run: Path, change) -> Path:
-    """Change the bag's file as told."""
-    file = run / 'run_0.mcap'
-    content = bytearray(file.read_bytes())
-    file.write_bytes(change(content) or content)
-    return run
-
-
-def without(messages, lost: range) -> list[bytes]:
-    return [m.data for number, m in enumerate(messages[:COUNT]) if number not in lost]
-
-
-def flip(at: int, bit: int = 0):
-    def change(content):
-        content[at] ^= 1 << bit
-
-    return change
-
-
-def in_chunk(number: int, offset: int):
-    def change(content):
-        content[chunks_of(content)[number][0] + offset] ^= 0x80
-
-    return change
+    return write_run(tmp_path / 'run', topics, messages)
 
 
 def test_a_chunk_that_calls_itself_something_else_is_seen(run):

@@ -18,54 +18,22 @@
 from __future__ import annotations
 
 from io import BytesIO
-from pathlib import Path
 
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
-from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.records import Message, Source
 from linkage_ros.bag.recover import recover
 from linkage_ros.bag.salvage import Salvage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError, RecordingError
-from mcap.reader import make_reader
 import pytest
 
-ATTACHMENTS = {
-    'scene.yaml': ('text/yaml', b'linkage: four_bar\n' * 9),
-    'linkage.yaml': ('text/yaml', b'four_bar: {}\n' * 9),
-}
-COUNT = 600
-EACH = 100  # messages in a chunk
+from .damage import ATTACHMENTS, chunks_of, COUNT, data_of, without, write_run
 
 
 @pytest.fixture
 def run(tmp_path, topics, messages):
-    """Return the folder of a finished bag of six chunks of a hundred messages."""
-    writer = BagWriter(tmp_path / 'run', topics, ATTACHMENTS)
-    for number, message in enumerate(messages[:COUNT]):
-        writer.write(*message)
-        if number % EACH == EACH - 1:
-            writer.flush()
-    writer.close({'seed': '7'})
-    return tmp_path / 'run'
-
-
-def chunks_of(content: bytes) -> list[tuple[int, int]]:
-    """Return where chunks begin and end, by mcap's reader."""
-    with_index = make_reader(BytesIO(content)).get_summary()
-    return [
-        (each.chunk_start_offset, each.chunk_start_offset + each.chunk_length)
-        for each in with_index.chunk_indexes
-    ]
-
-
-def data_of(folder: Path) -> list[bytes]:
-    return [message.data for message in read_bag(folder).messages()]
-
-
-def without(messages, lost: range) -> list[bytes]:
-    return [m.data for number, m in enumerate(messages[:COUNT]) if number not in lost]
+    return write_run(tmp_path / 'run', topics, messages)
 
 
 @settings(

@@ -17,7 +17,6 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from pathlib import Path
 import struct
 import sys
@@ -27,7 +26,6 @@ from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.recover import recover
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
-from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
@@ -35,21 +33,10 @@ import pytest
 import yaml
 import zstandard
 
+from .damage import chunks_of, data_of
+
 CHECKSUM = 33
 """Where in a chunk's record its checksum stands."""
-
-
-def chunks_of(content: bytes) -> list[tuple[int, int]]:
-    """Return where chunks begin and end, by mcap's reader."""
-    with_index = make_reader(BytesIO(content)).get_summary()
-    return [
-        (each.chunk_start_offset, each.chunk_start_offset + each.chunk_length)
-        for each in with_index.chunk_indexes
-    ]
-
-
-def data_of(folder: Path) -> list[bytes]:
-    return [message.data for message in read_bag(folder).messages()]
 
 
 def written(file: Path, messages, *, count: int = 90, chunk_size: int = 5000, **options) -> Path:
