@@ -21,10 +21,8 @@ what comes out does not depend on how the work was shared, and any linkage can b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable
 from math import ceil
-import multiprocessing
 import random
 from typing import NamedTuple
 
@@ -33,6 +31,7 @@ from campaigns.accuracy.judge import Findings, judge
 from campaigns.accuracy.mechanism import Mechanism
 from campaigns.accuracy.random_families import ANGLES, RANDOM
 from campaigns.accuracy.tally import Tally
+from campaigns.processes import results_of
 
 _PART = 20
 """Linkages that a process is given at a time: about a tenth of a second's work."""
@@ -104,14 +103,8 @@ def run(
 
     """
     tallies = {family: Tally() for family in (*RANDOM, *ADVERSARIAL)}
-    with ExitStack() as stack:
-        done: Iterator[tuple[Part, Tally]] = map(do, work)
-        if jobs > 1:
-            # Spawned, not forked: whoever calls may have threads.
-            pool = stack.enter_context(multiprocessing.get_context('spawn').Pool(jobs))
-            done = pool.imap_unordered(do, work)
-        for part, tally in done:
-            tallies[part.family].merge(tally)
-            if progress is not None:
-                progress(part)
+    for part, tally in results_of(do, work, jobs):
+        tallies[part.family].merge(tally)
+        if progress is not None:
+            progress(part)
     return {family: tally for family, tally in tallies.items() if tally.counts}

@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
 from random import Random
 import tempfile
@@ -28,6 +27,7 @@ from typing import NamedTuple
 
 from campaigns.damage.judge import FAULT, judge_reading, judge_salvage
 from campaigns.damage.subject import make, Subject
+from campaigns.processes import results_of
 
 _PART = 4000
 """Damages that a process takes at a time."""
@@ -96,12 +96,7 @@ def parts(kinds: list[str], seed: int, size: int, sample: int | None) -> list[Pa
 
 def run(work: list[Part], jobs: int) -> Iterator[tuple[Part, Tally]]:
     """Damage and judge; yield each part as it is done."""
-    if jobs == 1:
-        for part in work:
-            yield part, run_part(part)
-        return
-    with get_context('spawn').Pool(jobs) as pool:
-        yield from pool.imap_unordered(_with_part, work)
+    yield from results_of(_with_part, work, jobs)
 
 
 def _with_part(part: Part) -> tuple[Part, Tally]:

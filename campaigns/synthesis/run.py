@@ -22,13 +22,12 @@ what comes out does not depend on how the work was shared, and any linkage can b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable
 from dataclasses import dataclass
-import multiprocessing
 from random import Random
 from typing import NamedTuple
 
+from campaigns.processes import results_of
 from campaigns.synthesis.families import Case, draw, FAMILIES
 from linkage_ros.synthesis.pairs.freudenstein import three_pairs, TRUSTED
 import numpy as np
@@ -157,16 +156,10 @@ def run(
 
     """
     tallies: dict[str, Tally] = {part.family: Tally() for part in work}
-    with ExitStack() as stack:
-        done: Iterator[tuple[Part, Tally]] = map(do, work)
-        if jobs > 1:
-            # Spawned, not forked: whoever calls may have threads.
-            pool = stack.enter_context(multiprocessing.get_context('spawn').Pool(jobs))
-            done = pool.imap_unordered(do, work)
-        for part, tally in done:
-            tallies[part.family].merge(tally)
-            if progress is not None:
-                progress(part)
+    for part, tally in results_of(do, work, jobs):
+        tallies[part.family].merge(tally)
+        if progress is not None:
+            progress(part)
     return tallies
 
 
