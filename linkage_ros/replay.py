@@ -30,8 +30,8 @@ import platform
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros import __version__
-from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
-from linkage_ros.bag.run_events import Made, recorded_events, run_account, Taken, VERSIONS
+from linkage_ros.bag.reading.reader import Bag, BagMessage, RUN_FILE
+from linkage_ros.bag.reading.run_events import Made, recorded_events, run_account, Taken, VERSIONS
 from linkage_ros.cdr import text_of
 from linkage_ros.errors import BagError
 from linkage_ros.joint_state import JointStateWriter

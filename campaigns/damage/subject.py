@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
-from linkage_ros.bag.reader import BagMessage, read_bag
+from linkage_ros.bag.reading.reader import BagMessage, read_bag
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag.writing.writer import BagWriter
 from mcap.writer import CompressionType, Writer
 
 START = 1_700_000_000_000_000_000

@@ -23,10 +23,10 @@ import json
 from math import isfinite
 from typing import Any
 
-from linkage_ros.bag.contents import Contents
-from linkage_ros.bag.folder import custom_of, information_of
-from linkage_ros.bag.layout import Layout
-from linkage_ros.bag.reader import Bag, RUN_FILE
+from linkage_ros.bag.reading.contents import Contents
+from linkage_ros.bag.reading.folder import custom_of, information_of
+from linkage_ros.bag.reading.layout import Layout
+from linkage_ros.bag.reading.reader import Bag, RUN_FILE
 from linkage_ros.cli.worst_states import Examined, WorstStates
 from linkage_ros.kinematics.four_bars import four_bars
 from linkage_ros.scene.scene import Member, Scene

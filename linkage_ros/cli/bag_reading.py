@@ -22,9 +22,9 @@ from contextlib import contextmanager
 from itertools import count
 from threading import Event
 
-from linkage_ros.bag.contents import TOLD_EVERY
-from linkage_ros.bag.layout import layout_of
-from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.bag.reading.contents import TOLD_EVERY
+from linkage_ros.bag.reading.layout import layout_of
+from linkage_ros.bag.reading.reader import Bag, BagMessage
 from linkage_ros.cli.progress import progress
 from linkage_ros.errors import BagError
 

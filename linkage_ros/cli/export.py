@@ -34,8 +34,8 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.layout import layout_of
-from linkage_ros.bag.reader import Bag, read_bag, RUN_FILE
+from linkage_ros.bag.reading.layout import layout_of
+from linkage_ros.bag.reading.reader import Bag, read_bag, RUN_FILE
 from linkage_ros.cli.message_values import JOINT_STATE, Key, TYPES
 from linkage_ros.cli.progress import progress
 from linkage_ros.cli.table_files import block_rows, check_kind, table_file

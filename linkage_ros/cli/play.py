@@ -30,9 +30,9 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.bag.being_written import is_being_written
-from linkage_ros.bag.in_time import TimeOrder
-from linkage_ros.bag.reader import Bag, read_bag
+from linkage_ros.bag.reading.being_written import is_being_written
+from linkage_ros.bag.reading.in_time import TimeOrder
+from linkage_ros.bag.reading.reader import Bag, read_bag
 from linkage_ros.bag.topic import Topic
 from linkage_ros.cli.progress import progress, Told
 from linkage_ros.errors import BagError, did_you_mean, LinkageError

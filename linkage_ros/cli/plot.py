@@ -24,7 +24,7 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.reading.reader import read_bag
 from linkage_ros.effects.turns import wrapped
 from linkage_ros.errors import BagError, LinkageError
 from linkage_ros.joint_state import JointStateReader, Rejection

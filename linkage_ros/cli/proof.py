@@ -26,8 +26,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from linkage_ros.bag.reader import Bag, BagMessage
-from linkage_ros.bag.run_events import MID_RUN, run_account
+from linkage_ros.bag.reading.reader import Bag, BagMessage
+from linkage_ros.bag.reading.run_events import MID_RUN, run_account
 from linkage_ros.cli.message_values import JOINT_STATE
 from linkage_ros.cli.replay_comparison import At, Comparison, First
 from linkage_ros.kinematics.linkage import RevoluteJoint

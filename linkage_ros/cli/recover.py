@@ -22,8 +22,8 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.bag.recover import recover
-from linkage_ros.bag.recovery import Recovery
+from linkage_ros.bag.recovering.recover import recover
+from linkage_ros.bag.recovering.recovery import Recovery
 from linkage_ros.cli.progress import progress
 from linkage_ros.cli.tables import show, Table
 

@@ -34,8 +34,8 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.bag.run_events import run_account
+from linkage_ros.bag.reading.reader import Bag, read_bag
+from linkage_ros.bag.reading.run_events import run_account
 from linkage_ros.cli.bag_reading import BagReading
 from linkage_ros.cli.proof import DIFFERENT, IDENTICAL, prove, turning_joints
 from linkage_ros.cli.replay_account import (

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.reading.reader import read_bag
 from linkage_ros.cli.proof import mid_run_text, prove
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.status import Status

@@ -26,7 +26,7 @@ from collections import Counter
 from collections.abc import Mapping
 import json
 
-from linkage_ros.bag.reader import Bag, RUN_FILE
+from linkage_ros.bag.reading.reader import Bag, RUN_FILE
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import BagError
 from linkage_ros.joint_state import JointStateReader, Rejection

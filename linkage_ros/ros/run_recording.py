@@ -25,11 +25,11 @@ from pathlib import Path
 import platform
 
 from linkage_ros import __version__
-from linkage_ros.bag.reader import RUN_FILE
-from linkage_ros.bag.recorder import Recorder, RecordingSummary
-from linkage_ros.bag.run_events import BEGUN, MID_RUN, WITH_THE_RUN
+from linkage_ros.bag.reading.reader import RUN_FILE
+from linkage_ros.bag.reading.run_events import BEGUN, MID_RUN, WITH_THE_RUN
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag.writing.recorder import Recorder, RecordingSummary
+from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
 from linkage_ros.ros.tick_loop import TickLoop
 from linkage_ros.scene.scene import RecordParameters, Scene

@@ -19,9 +19,9 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.bag import in_time
-from linkage_ros.bag.in_time import TimeOrder
-from linkage_ros.bag.reader import BagMessage, read_bag
+from linkage_ros.bag.reading import in_time
+from linkage_ros.bag.reading.in_time import TimeOrder
+from linkage_ros.bag.reading.reader import BagMessage, read_bag
 from linkage_ros.errors import BagError
 from mcap.writer import CompressionType, Writer
 import pytest

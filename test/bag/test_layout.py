@@ -19,8 +19,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.bag.layout import layout_of
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag.reading.layout import layout_of
+from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import BagError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader

@@ -22,9 +22,9 @@ import struct
 import sys
 import tracemalloc
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recover import recover
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.recovering.recover import recover
+from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import BagError
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader

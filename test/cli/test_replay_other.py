@@ -23,8 +23,8 @@ from math import acos, atan2, cos, hypot, remainder, sin, sqrt, tau
 from pathlib import Path
 from typing import Any
 
-from linkage_ros.bag.reader import read_bag, RUN_FILE
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag.reading.reader import read_bag, RUN_FILE
+from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cli import replay
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter

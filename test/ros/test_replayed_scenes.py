@@ -26,10 +26,10 @@ from functools import partial
 import json
 from math import cos, sin
 
-from linkage_ros.bag.reader import read_bag
-from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.reading.reader import read_bag
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag.writing.recorder import Recorder
+from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cdr import text_message
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline

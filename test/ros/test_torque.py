@@ -31,7 +31,7 @@ import subprocess
 import sys
 import time
 
-from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.reading.reader import read_bag
 from linkage_ros.replay import recorded_scene, replay
 import pytest
 from sensor_msgs.msg import JointState

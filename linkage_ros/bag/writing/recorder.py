@@ -33,7 +33,7 @@ import time
 
 from linkage_ros.bag.account import Account
 from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
 
 _POLL = 0.02  # [s]

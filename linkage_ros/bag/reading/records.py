@@ -30,7 +30,7 @@ from struct import Struct
 from typing import Any, BinaryIO, NamedTuple
 from zlib import crc32
 
-from linkage_ros.bag.compression import DamagedError, LARGEST, unpacked
+from linkage_ros.bag.reading.compression import DamagedError, LARGEST, unpacked
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Schema

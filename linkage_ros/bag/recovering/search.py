@@ -20,8 +20,8 @@ from __future__ import annotations
 from contextlib import suppress
 import re
 
-from linkage_ros.bag.compression import DamagedError, LARGEST
-from linkage_ros.bag.records import HEAD, is_whole_attachment, is_whole_chunk, Source
+from linkage_ros.bag.reading.compression import DamagedError, LARGEST
+from linkage_ros.bag.reading.records import HEAD, is_whole_attachment, is_whole_chunk, Source
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 

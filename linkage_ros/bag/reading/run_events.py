@@ -21,7 +21,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import json
 from typing import NamedTuple
 
-from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
+from linkage_ros.bag.reading.reader import Bag, BagMessage, RUN_FILE
 from linkage_ros.errors import BagError
 
 BEGUN, MID_RUN, WITH_THE_RUN = 'begun', 'mid-run', 'with the run'

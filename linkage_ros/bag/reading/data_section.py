@@ -21,8 +21,8 @@ from collections.abc import Iterable
 from struct import Struct
 from zlib import crc32
 
-from linkage_ros.bag.compression import DamagedError
-from linkage_ros.bag.records import (
+from linkage_ros.bag.reading.compression import DamagedError
+from linkage_ros.bag.reading.records import (
     attachment_at,
     Chunk,
     chunk_at,

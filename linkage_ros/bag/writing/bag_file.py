@@ -29,9 +29,9 @@ import time
 from typing import cast, IO
 
 from linkage_ros import __version__
-from linkage_ros.bag.disk import CHUNK_SIZE, FIRST_RESERVE, RecordFile, Reserve
 from linkage_ros.bag.metadata import BagSummary, NO_START, qos_text
 from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.disk import CHUNK_SIZE, FIRST_RESERVE, RecordFile, Reserve
 from mcap.records import Statistics
 from mcap.writer import CompressionType, Writer
 

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 
-from linkage_ros.bag.storage import NONE
+from linkage_ros.bag.writing.storage import NONE
 from linkage_ros.errors import RecordingError
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.writer import CompressionType, Writer

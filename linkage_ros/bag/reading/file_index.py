@@ -21,8 +21,8 @@ from struct import Struct
 from typing import Any, NamedTuple
 from zlib import crc32
 
-from linkage_ros.bag.compression import DamagedError
-from linkage_ros.bag.records import Definitions, HEAD, Source, strict
+from linkage_ros.bag.reading.compression import DamagedError
+from linkage_ros.bag.reading.records import Definitions, HEAD, Source, strict
 from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, ChunkIndex, MetadataIndex, Statistics
 from mcap.writer import MCAP0_MAGIC

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from linkage_ros.bag.reader import Bag
+from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError
 

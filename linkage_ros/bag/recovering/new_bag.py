@@ -25,8 +25,6 @@ from pathlib import Path
 from typing import Any
 
 from linkage_ros import __version__
-from linkage_ros.bag.data_section import Found
-from linkage_ros.bag.disk import CHUNK_SIZE
 from linkage_ros.bag.metadata import (
     BagSummary,
     metadata_text,
@@ -34,9 +32,11 @@ from linkage_ros.bag.metadata import (
     sync_folder,
     write_metadata,
 )
-from linkage_ros.bag.reader import topic_of
-from linkage_ros.bag.records import Definitions, Message
+from linkage_ros.bag.reading.data_section import Found
+from linkage_ros.bag.reading.reader import topic_of
+from linkage_ros.bag.reading.records import Definitions, Message
 from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.disk import CHUNK_SIZE
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.records import Attachment, Channel
 from mcap.writer import CompressionType, Writer

@@ -24,10 +24,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
-from linkage_ros.bag.compression import DamagedError
-from linkage_ros.bag.data_section import DataSection, Found
-from linkage_ros.bag.file_index import index_of
-from linkage_ros.bag.folder import (
+from linkage_ros.bag.reading.compression import DamagedError
+from linkage_ros.bag.reading.data_section import DataSection, Found
+from linkage_ros.bag.reading.file_index import index_of
+from linkage_ros.bag.reading.folder import (
     custom_of,
     files_of,
     information_of,
@@ -35,7 +35,7 @@ from linkage_ros.bag.folder import (
     is_finished,
     unreadable,
 )
-from linkage_ros.bag.records import attachment_at, Definitions, Message, Source
+from linkage_ros.bag.reading.records import attachment_at, Definitions, Message, Source
 from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.errors import BagError
 from mcap.records import Attachment, Channel, Schema

@@ -30,10 +30,10 @@ from collections.abc import Iterable, Iterator
 from struct import Struct
 from typing import NamedTuple
 
-from linkage_ros.bag.compression import DamagedError
-from linkage_ros.bag.data_section import DataSection, Found
-from linkage_ros.bag.file_index import FileIndex, index_of
-from linkage_ros.bag.records import (
+from linkage_ros.bag.reading.compression import DamagedError
+from linkage_ros.bag.reading.data_section import DataSection, Found
+from linkage_ros.bag.reading.file_index import FileIndex, index_of
+from linkage_ros.bag.reading.records import (
     attachment_at,
     Chunk,
     chunk_at,
@@ -42,7 +42,7 @@ from linkage_ros.bag.records import (
     Message,
     Source,
 )
-from linkage_ros.bag.search import next_whole
+from linkage_ros.bag.recovering.search import next_whole
 from mcap.opcode import Opcode
 from mcap.records import AttachmentIndex, ChunkIndex, MetadataIndex
 from mcap.writer import MCAP0_MAGIC

@@ -37,11 +37,11 @@ from linkage_ros.bag.account import (
     last_records,
     UNFINISHED_DATA,
 )
-from linkage_ros.bag.bag_file import BagFile
 from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_metadata
-from linkage_ros.bag.packing import compression_type
-from linkage_ros.bag.storage import scarcity, Storage
 from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.bag_file import BagFile
+from linkage_ros.bag.writing.packing import compression_type
+from linkage_ros.bag.writing.storage import scarcity, Storage
 from linkage_ros.errors import RecordingError
 
 _MAKE_ROOM = 'make room there before the next recording'

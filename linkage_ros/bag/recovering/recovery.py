@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from linkage_ros.bag.salvage import Loss
+from linkage_ros.bag.recovering.salvage import Loss
 
 RECOVERED = 'linkage_ros.recovered'
 """Key in the ``custom_data`` of a recovered bag: what it was made of, and what was lost."""

@@ -26,13 +26,13 @@ import shutil
 from typing import Any
 
 from linkage_ros.bag.account import UNFINISHED
-from linkage_ros.bag.being_written import is_being_written
-from linkage_ros.bag.folder import custom_of, files_of, information_of, unreadable
 from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.new_bag import NewBag
-from linkage_ros.bag.records import Message, Source
-from linkage_ros.bag.recovery import promised_counts, RECOVERED, Recovery, TopicRecovery
-from linkage_ros.bag.salvage import BEGINNING, Loss, Salvage
+from linkage_ros.bag.reading.being_written import is_being_written
+from linkage_ros.bag.reading.folder import custom_of, files_of, information_of, unreadable
+from linkage_ros.bag.reading.records import Message, Source
+from linkage_ros.bag.recovering.new_bag import NewBag
+from linkage_ros.bag.recovering.recovery import promised_counts, RECOVERED, Recovery, TopicRecovery
+from linkage_ros.bag.recovering.salvage import BEGINNING, Loss, Salvage
 from linkage_ros.errors import BagError, quoted, RecordingError
 
 Told = Callable[[int, int], None]

@@ -28,7 +28,7 @@ from pathlib import Path
 from struct import Struct
 from typing import Any, BinaryIO, NamedTuple
 
-from linkage_ros.bag.folder import unreadable
+from linkage_ros.bag.reading.folder import unreadable
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Header, Metadata
