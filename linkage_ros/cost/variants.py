@@ -71,20 +71,24 @@ class Variants:
         self._closures: dict[bool, list[Closure]] = {}
 
     def build(self, named: Names) -> Variant:
-        """Return the scene with these of its effects, and without its recording."""
+        """Return the scene with these of its effects, and without its recording; one of each."""
         if named not in self.built:
-            scene = replace(
-                self.scene,
-                members=tuple(_with(member, named) for member in self.scene.members),
-                faults=self.scene.faults if FAULTS in named else {},
-                record=None,
-            )
-            # To solve a linkage for the first time may take a second where it is iterated.
-            altered = 'tolerance' in named
-            pipeline = Pipeline(scene, self._closures.get(altered))
-            self._closures.setdefault(altered, pipeline.closures)
-            self.built[named] = Variant(pipeline)
+            self.built[named] = Variant(self.pipeline(named))
         return self.built[named]
+
+    def pipeline(self, named: Names) -> Pipeline:
+        """Return the scene with these of its effects at its start; another one each time."""
+        scene = replace(
+            self.scene,
+            members=tuple(_with(member, named) for member in self.scene.members),
+            faults=self.scene.faults if FAULTS in named else {},
+            record=None,
+        )
+        # To solve a linkage for the first time may take a second where it is iterated.
+        altered = 'tolerance' in named
+        pipeline = Pipeline(scene, self._closures.get(altered))
+        self._closures.setdefault(altered, pipeline.closures)
+        return pipeline
 
     def attempt(self, named: Names) -> Variant | None:
         """Return the scene with these effects; nothing where they do not go together."""

@@ -171,18 +171,18 @@ def test_median_and_percentile_are_of_these_numbers():
     times = _times([*calm, *(value + 10**9 for value in calm), *calm])
     assert times.median == 750.5
     assert times.p99 == 990.0
-    assert _times([3000]) == Times(3.0, 3.0)
-    assert _difference([5000, 5000], [2000, 2000]) == Times(3.0, 3.0)
+    assert _times([3000]) == Times(3.0, 3.0, 3.0, 3.0)
+    assert _difference([5000, 5000], [2000, 2000]) == Times(3.0, 3.0, 3.0, 3.0)
 
 
 COST = SceneCost(
-    offer=Times(1.0, 2.0),
-    bare=Times(4.0, 6.0),
-    whole=Times(10.0, 15.0),
+    offer=Times(1.0, 2.0, 1.0, 2.0),
+    bare=Times(4.0, 6.0, 4.0, 6.0),
+    whole=Times(10.0, 15.0, 10.0, 15.0),
     effects=(
-        EffectCost('velocity', Times(2.0, 2.5), '', None, '', ('effort',)),
-        EffectCost('friction', Times(-0.5, 1.0), 'effort', 0.25, '', ()),
-        EffectCost('effort', Times(4.5, 5.0), '', 5.0, 'friction', ()),
+        EffectCost('velocity', Times(2.0, 2.5, 2.0, 2.5), '', None, '', ('effort',)),
+        EffectCost('friction', Times(-0.5, 1.0, -0.5, 1.0), 'effort', 0.25, '', ()),
+        EffectCost('effort', Times(4.5, 5.0, 4.5, 5.0), '', 5.0, 'friction', ()),
         EffectCost('bias', None, '', None, '', ()),
     ),
     published=0.5,
