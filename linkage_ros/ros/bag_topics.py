@@ -24,7 +24,7 @@ from pathlib import Path
 import re
 from typing import Any
 
-from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.bag.topic import INFINITE, QosProfile, Topic
 from linkage_ros.errors import LinkageError, RecordingError
 from linkage_ros.shipped import share_folders
 from rclpy.qos import QoSProfile
@@ -114,9 +114,9 @@ def _collect(package: str, kind: str, texts: dict[str, str]) -> None:
     if f'{package}/{kind}' in texts:
         return
     text = texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
-    for needed in _types(text):
-        needed_package, _, needed_kind = needed.rpartition('/')
-        _collect(needed_package or package, needed_kind, texts)
+    # In the order of their full names, as rosbag2 has them.
+    for needed in sorted(name if '/' in name else f'{package}/{name}' for name in _types(text)):
+        _collect(*needed.rsplit('/', 1), texts)
 
 
 def _types(text: str) -> Iterator[str]:
@@ -147,4 +147,10 @@ def _qos(profile: QoSProfile) -> QosProfile:
         depth=profile.depth,
         reliability=profile.reliability.name.lower(),
         durability=profile.durability.name.lower(),
+        # Of rclpy's own profiles these are 0, which stands for no limit and for automatic.
+        deadline=profile.deadline.nanoseconds or INFINITE,
+        lifespan=profile.lifespan.nanoseconds or INFINITE,
+        liveliness=profile.liveliness.name.lower() if profile.liveliness else 'automatic',
+        liveliness_lease_duration=profile.liveliness_lease_duration.nanoseconds or INFINITE,
+        avoid_ros_namespace_conventions=bool(profile.avoid_ros_namespace_conventions),
     )

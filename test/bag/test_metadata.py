@@ -203,3 +203,17 @@ def test_an_old_file_stays_whole_when_the_new_one_cannot_be_written(summary, mon
     assert [path.name for path in summary.folder.iterdir()] == ['metadata.yaml']
     assert (summary.folder / 'metadata.yaml').read_bytes() == before
     assert Path(summary.folder, 'metadata.yaml').stat().st_size == len(before)
+
+
+def test_keys_stand_in_the_order_of_rosbag2(summary):
+    # rosbag2_storage's yaml.hpp: of a file first when it begins, of the whole bag first how long.
+    information = yaml.safe_load(metadata_text(summary, {}))['rosbag2_bagfile_information']
+    assert list(information)[:5] == [
+        'version',
+        'storage_identifier',
+        'duration',
+        'starting_time',
+        'message_count',
+    ]
+    (file,) = information['files']
+    assert list(file) == ['path', 'starting_time', 'duration', 'message_count']
