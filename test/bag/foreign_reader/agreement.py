@@ -46,7 +46,12 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 import yaml
 
-from .install import FOLDER, install, node, UnreachableError
+from ...node_packages import (  # noqa: TID252
+    FOREIGN_READER,
+    install_foreign_reader,
+    node,
+    UnreachableError,
+)
 
 _SCRIPT = Path(__file__).with_name('read.cjs')
 
@@ -56,7 +61,7 @@ Record = dict[str, Any]
 def require_reader() -> None:
     """Skip what needs the foreign reader where it cannot be had, and say so loudly."""
     try:
-        install()
+        install_foreign_reader()
     except UnreachableError as error:
         loss = 'NO BAG IS READ IN ANOTHER LANGUAGE: the npm registry cannot be reached'
         warnings.warn(f'{loss}: {error}', stacklevel=1)
@@ -67,7 +72,7 @@ def require_reader() -> None:
 
 def read(file: Path, how: str) -> list[Record]:
     """Return all that the foreign reader finds in a file, 'indexed' or 'streamed'."""
-    environment = os.environ | {'NODE_PATH': str(FOLDER / 'node_modules')}
+    environment = os.environ | {'NODE_PATH': str(FOREIGN_READER / 'node_modules')}
     process = subprocess.run(
         [node(), _SCRIPT, how, file], env=environment, capture_output=True, text=True, check=False
     )

@@ -1,0 +1,120 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A page that needs nothing but itself: style, script, data and plotting library within one file.
+
+Its policy forbids the browser to ask anybody for anything, whatever the page holds.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterable
+from html import escape
+from importlib.resources import files
+from importlib.util import find_spec
+import json
+from typing import Any
+
+from linkage_ros.errors import LinkageError
+
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
+    "base-uri 'none'; form-action 'none'"
+)
+
+_HERE = 'linkage_ros.accuracy.page'
+
+
+def document(title: str, body: Iterable[str], data: Any) -> str:
+    """
+    Return a page.
+
+    Parameters
+    ----------
+    title
+        Of the window.
+    body
+        Lines of HTML.
+    data
+        For the script, as JSON has it; numbers are finite.
+
+    Raises
+    ------
+    LinkageError
+        Where plotly is not installed.
+
+    """
+    return '\n'.join(
+        [
+            '<!doctype html>',
+            '<html lang="en">',
+            '<head>',
+            '<meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<meta name="color-scheme" content="light dark">',
+            # Without it a browser asks the server for one.
+            '<link rel="icon" href="data:,">',
+            f'<title>{escape(title)}</title>',
+            f'<style>\n{_own("page.css")}</style>',
+            '</head>',
+            '<body>',
+            *body,
+            f'<script type="application/json" id="data">{_json(data)}</script>',
+            f'<script>{_within_script(plotting_library())}</script>',
+            f'<script>\n{_own("page.js")}</script>',
+            '</body>',
+            '</html>',
+            '',
+        ]
+    )
+
+
+def picture(svg: bytes) -> str:
+    """Return an SVG as the address of an image that holds it."""
+    return f'data:image/svg+xml;base64,{b64encode(svg).decode()}'
+
+
+def plotting_library() -> str:
+    """
+    Return the script of Plotly.
+
+    Raises
+    ------
+    LinkageError
+        Where it is not installed.
+
+    """
+    if find_spec('plotly') is None:
+        raise LinkageError('plotly', 'is not installed', 'pip install linkage_ros[report]')
+    from plotly.offline import get_plotlyjs  # local import: an extra, and slow to load
+
+    return str(get_plotlyjs())
+
+
+def _own(name: str) -> str:
+    return files(_HERE).joinpath(name).read_text('utf-8')
+
+
+def _json(data: Any) -> str:
+    # No text within can end the element, or open a comment.
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
+    return text.replace('<', r'\u003c')
+
+
+def _within_script(text: str) -> str:
+    return text.replace('</script', r'<\/script')

@@ -1,0 +1,114 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Numbers as texts: as many digits as tell something."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from math import ceil, floor, inf, isfinite, log10
+from numbers import Integral, Real
+
+from linkage_ros.accuracy.results import Table
+from linkage_ros.accuracy.spread import Spread
+
+Cell = float | int | str | Spread | None
+"""What a table holds."""
+
+_SMALL, _LARGE = 1e-3, 1e6
+"""Beyond these a number has an exponent."""
+
+_DIGITS = 3
+_MOST_DIGITS = 4
+"""However close the quartiles are."""
+
+
+def cell_text(cell: Cell) -> str:
+    """Return what stands in a table: '' for nothing, '0.70 (0.68–0.75)' for a spread."""
+    if cell is None:
+        return ''
+    if isinstance(cell, str):
+        return cell
+    if isinstance(cell, Spread):
+        return spread_text(cell)
+    return number_text(cell)
+
+
+def number_text(value: float | Integral) -> str:
+    """Return a number with three digits that count; a whole number as it is."""
+    if isinstance(value, Integral):
+        return str(int(value))
+    value = float(value)
+    if not value:
+        return '0'
+    if not isfinite(value):
+        return {inf: '∞', -inf: '-∞'}.get(value, 'nan')
+    if not _SMALL <= abs(value) < _LARGE:
+        mantissa, _, exponent = f'{value:.{_DIGITS - 1}e}'.partition('e')
+        return f'{_short(mantissa)}e{int(exponent)}'
+    return _short(f'{value:.{max(0, _DIGITS - 1 - _power(value))}f}')
+
+
+def spread_text(spread: Spread) -> str:
+    """
+    Return median and quartiles, with the digits that the quartiles leave.
+
+    Where all three are the same, as of a single measurement, it is that number alone.
+    """
+    if spread.low == spread.middle == spread.high:
+        return number_text(spread.middle)
+    if not all(map(isfinite, spread)) or spread.high <= spread.low:
+        low, middle, high = map(number_text, spread)
+        return f'{middle} ({_range(low, high)})'
+    exponent = 0
+    largest = max(map(abs, spread))
+    if not _SMALL <= largest < _LARGE:
+        near = abs(spread.middle) > _SMALL * largest
+        exponent = _power(spread.middle if near else largest)
+    # As decimals: of the least double no power of ten is left to divide by.
+    scaled = [float(Decimal(value).scaleb(-exponent)) for value in spread]
+    decimals = _decimals(*scaled)
+    # A negative zero is what rounding makes of a small loss.
+    low, middle, high = (f'{round(value, decimals) + 0.0:.{decimals}f}' for value in scaled)
+    text = f'{middle} ({_range(low, high)})'
+    return f'{text}e{exponent}' if exponent else text
+
+
+def numeric_columns(table: Table) -> list[bool]:
+    """Say which columns of a table hold numbers, if only in some rows; they are set right."""
+    return [
+        any(isinstance(row[place], Real | Spread) for row in table.rows)
+        for place in range(len(table.columns))
+    ]
+
+
+def _range(low: str, high: str) -> str:
+    return f'{low} to {high}' if low.startswith('-') else f'{low}–{high}'
+
+
+def _decimals(low: float, middle: float, high: float) -> int:
+    """Return how many decimals tell the quartiles apart, and the median from 0 if these let it."""
+    power = _power(middle or high or low)
+    apart = ceil(-log10(high - low))
+    wanted = min(max(1 - power, apart), apart + 1, _MOST_DIGITS - 1 - power)
+    return max(0, wanted)
+
+
+def _power(value: float) -> int:
+    return floor(log10(abs(value)))
+
+
+def _short(digits: str) -> str:
+    return digits.rstrip('0').rstrip('.') if '.' in digits else digits

@@ -1,0 +1,140 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Points lie where their numbers say; what an axis has no place for stands on its edge, hollow."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from math import inf, nan
+
+from hypothesis import given, strategies
+from linkage_ros.accuracy.page.places import places
+from linkage_ros.accuracy.page.styles import styles_of
+from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Results
+from linkage_ros.accuracy.spread import Spread
+import pytest
+
+from .shown import DIAGRAMS, EMPTY, FAILED, POSITION, RESULTS
+
+LOGARITHMIC, LINEAR = Axis('x', 'm'), Axis('x', 'm', logarithmic=False)
+
+
+def drawn(*points, x=LOGARITHMIC, y=LOGARITHMIC):
+    return places(Diagram('key', '', x, y, [Curve('curve', points)]))
+
+
+@pytest.mark.parametrize(
+    ('point', 'edge'),
+    [
+        (Point(1.0, 1.0), None),
+        (Point(1.0, 0.0), 'bottom'),
+        (Point(1.0, -1.0), 'bottom'),
+        (Point(1.0, -inf), 'bottom'),
+        (Point(1.0, 1e-310), 'bottom'),
+        (Point(1.0, inf), 'top'),
+        (Point(0.0, 1.0), 'left'),
+        (Point(inf, 1.0), 'right'),
+    ],
+)
+def test_a_point_without_a_place_stands_on_the_nearer_edge(point, edge):
+    found = drawn(Point(0.5, 0.5), point, Point(2.0, 2.0))
+    placed = found.curves[0].points[1]
+    edges = {
+        'bottom': placed.y == found.y.low,
+        'top': placed.y == found.y.high,
+        'left': placed.x == found.x.low,
+        'right': placed.x == found.x.high,
+    }
+    assert [name for name, at in edges.items() if at] == ([edge] if edge else [])
+    assert placed.on_edge == (edge is not None)
+
+
+def test_a_linear_axis_has_a_place_for_zero_and_less():
+    found = drawn(Point(0.0, -1.0), Point(-1.0, 0.0), x=LINEAR, y=LINEAR)
+    assert not found.on_edge
+    assert [(point.x, point.y) for point in found.curves[0].points] == [(0.0, -1.0), (-1.0, 0.0)]
+
+
+@pytest.mark.parametrize(
+    ('values', 'said'),
+    [
+        ((1.0, 2.0), ''),
+        ((1.0, 0.0), '0'),
+        ((1.0, -1.0), 'less than 0'),
+        ((0.0, inf), '0 or ∞'),
+        ((nan, 1.0), ''),
+    ],
+)
+def test_it_is_said_what_stands_on_an_edge(values, said):
+    assert drawn(*(Point(1.0, value) for value in values)).on_edge == said
+
+
+def test_what_is_not_a_number_breaks_the_line():
+    found = drawn(Point(1.0, 1.0), Point(nan, 1.0), Point(1.0, 0.0), Point(2.0, 2.0))
+    assert [point is None for point in found.curves[0].points] == [False, True, False, False]
+    assert [point is None for point in found.curves[0].within] == [False, True, True, False]
+
+
+@pytest.mark.parametrize('diagram', [EMPTY, FAILED], ids=lambda diagram: diagram.key)
+def test_a_diagram_may_have_nothing_to_draw(diagram):
+    found = places(diagram)
+    assert found.empty
+    assert found.x.low < found.x.high
+
+
+def test_quartiles_reach_to_the_edge_where_the_axis_has_no_place_for_them():
+    found = drawn(Point(1.0, 2.0, None, Spread(0.0, 2.0, inf)), Point(1.0, 1.0))
+    below, above = found.curves[0].points[0].y_arms
+    assert 2.0 - below == pytest.approx(found.y.low)
+    assert 2.0 + above == pytest.approx(found.y.high)
+
+
+def test_a_point_says_its_values_with_their_units_and_its_setting():
+    newton = places(POSITION).curves[1].points[0]
+    assert newton.text[1:] == (
+        'tolerance 1e-2',
+        'time per state: 1.9 (1.8–2.1) µs',
+        'greatest error: 0.0010 (0.0005–0.0020) rad',
+    )
+
+
+NUMBERS = strategies.floats()
+
+
+@given(strategies.lists(strategies.tuples(NUMBERS, NUMBERS)), strategies.booleans())
+def test_every_point_is_drawn_within_the_axes(values, logarithmic):
+    axis = Axis('x', 'm', logarithmic)
+    found = drawn(*(Point(x, y) for x, y in values), x=axis, y=axis)
+    for point in filter(None, found.curves[0].points):
+        assert found.x.low <= point.x <= found.x.high
+        assert found.y.low <= point.y <= found.y.high
+
+
+def test_a_method_looks_the_same_in_all_diagrams_and_like_no_other_beside_it():
+    styles = styles_of([RESULTS])
+    for diagram in DIAGRAMS:
+        names = [curve.name for curve in diagram.curves]
+        pairs = [(styles[name].colour, styles[name].mark) for name in names]
+        assert all(one != other for one, other in combinations(pairs, 2))
+
+
+def test_methods_that_never_meet_share_the_first_look():
+    def part(name):
+        diagram = Diagram(name, '', LINEAR, LINEAR, [Curve(name, [])])
+        return Part(name, '', [], [diagram])
+
+    styles = styles_of([Results('', [], [part('one'), part('two')])])
+    assert styles['one'] == styles['two']
