@@ -28,11 +28,11 @@ import time
 from bench.empty_scene import EmptyPlan, measure_empty_scene
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
-from bench.machine import describe_machine
 from bench.processes import BenchError, Graph
 from bench.report import say, show, Table
 from bench.tick_tables import cost_table, lateness_table
 from bench.ticks import bare, idiomatic, many, measure_ticks, ours, TickPlan
+from linkage_ros.accuracy.machine import describe_machine
 
 SLOW, FAST = 1000.0, 10_000.0
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 import time
 
-from bench.machine import cpu_time
+from bench.cpu_time import cpu_time
 from bench.processes import BenchError, Graph, Process
 from bench.report import say
 from bench.scenes import write_many, write_scene

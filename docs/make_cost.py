@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from linkage_ros.accuracy.machine import describe_machine
 from linkage_ros.cli.cost import all_effects
 from linkage_ros.cli.tables import Table
 
@@ -38,8 +39,6 @@ _LEFT_OUT = ('governor', 'kernel', 'rclpy', 'middleware')
 
 def main() -> int:
     """Measure and write."""
-    from bench.machine import describe_machine  # who reads the page's functions need not have it
-
     table = all_effects(_TICKS)
     assert table is not None, 'nobody stops it'
     PAGE.write_text(filled(PAGE.read_text('utf-8'), measured(table, describe_machine())), 'utf-8')

@@ -28,7 +28,6 @@ from pathlib import Path
 import sys
 import time
 
-from bench.machine import describe_machine
 from bench.report import say, show, Table
 from campaigns.accuracy import report
 from campaigns.accuracy.adversarial import ADVERSARIAL
@@ -37,6 +36,7 @@ from campaigns.accuracy.random_families import RANDOM
 from campaigns.accuracy.run import Part, parts, run
 from campaigns.accuracy.show import show_case
 from campaigns.accuracy.tally import Tally
+from linkage_ros.accuracy.machine import describe_machine
 
 LIMIT = 4.0
 

@@ -28,11 +28,11 @@ from collections import Counter
 import sys
 import time
 
-from bench.machine import describe_machine
 from bench.report import say, show, Table
 from campaigns.damage.judge import FAULT
 from campaigns.damage.run import JUDGES, parts, run, Tally
 from campaigns.damage.subject import KINDS
+from linkage_ros.accuracy.machine import describe_machine
 
 
 def main() -> int:

@@ -77,6 +77,14 @@ def test_share_is_what_the_checkout_has(prefix, root):
     assert index.is_file()
 
 
+def test_what_pages_are_made_with_is_there(prefix, root):
+    packages = [folder for folder in prefix.rglob('linkage_ros/accuracy/page') if folder.is_dir()]
+    assert len(packages) == 1
+    for name in ('page.css', 'page.js'):
+        here = root / 'linkage_ros' / 'accuracy' / 'page' / name
+        assert (packages[0] / name).read_bytes() == here.read_bytes()
+
+
 def test_tests_and_benchmarks_stay_out(prefix):
     packages = {path.name for path in prefix.glob('lib/python*/site-packages/*')}
     assert not {'test', 'bench', 'launch'} & packages
