@@ -23,7 +23,7 @@ import sys
 
 from linkage_ros import __version__
 from linkage_ros.errors import LinkageError
-from linkage_ros.stop import stop_on_signals
+from linkage_ros.stop import stop_on_signals, StoppedError
 
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
@@ -36,12 +36,19 @@ COMMANDS = {
     'replay': 'run the scene of a bag once more and compare, or another scene over its samples',
     'scene': 'say what a scene consists of; list all effects; print the schemas of the files',
     'cost': 'say what each effect of a scene costs on this machine',
+    'accuracy': 'show what accuracy costs in time, on a scene: tables, and a page with pictures',
     'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
     'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
     'draw': 'draw a linkage, and its joints over its range',
+    'urdf': 'write a linkage or a scene as URDF, for robot_state_publisher and RViz',
+    'mjcf': 'write a linkage or a scene as MJCF, for MuJoCo, with its closed loops',
+    'import': 'make a linkage file of a URDF and the pins that close it',
     'synthesize': 'design a four-bar: from pairs of angles, a function, a curve or poses',
 }
 """Name of each subcommand, also that of its module in this folder, and what it does."""
+
+_MODULES = {'import': 'import_urdf'}
+"""Modules of another name: no module can be named as a word of Python's."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -60,7 +67,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('command', choices=COMMANDS, metavar='COMMAND')
     name = parser.parse_args(arguments[:1]).command
 
-    module = import_module(f'linkage_ros.cli.{name}')
+    module = import_module(f'linkage_ros.cli.{_MODULES.get(name, name)}')
     subparser = argparse.ArgumentParser(prog=f'linkage {name}', description=module.__doc__)
     module.add_arguments(subparser)
     try:
@@ -68,6 +75,9 @@ def main(arguments: list[str] | None = None) -> int:
     except LinkageError as error:
         print(f'linkage {name}: {error}', file=sys.stderr)
         return 2
+    except StoppedError:
+        print(f'linkage {name}: stopped', file=sys.stderr)
+        return 1
     except BrokenPipeError:
         # Who read our output has gone; there is nobody to tell.
         sys.stderr.close()

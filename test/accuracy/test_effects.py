@@ -20,8 +20,8 @@ from __future__ import annotations
 from itertools import islice
 from math import isclose, pi, radians, sin, sqrt, tau
 
-from linkage_ros.accuracy.departure import departure
-from linkage_ros.accuracy.effects import measure_effects, WHOLE
+from linkage_ros.accuracy.effects.departure import departure
+from linkage_ros.accuracy.effects.measure import measure_effects, WHOLE
 from linkage_ros.accuracy.spread import Spread
 from linkage_ros.cost.feed import feed
 from linkage_ros.cost.variants import Names, Variants

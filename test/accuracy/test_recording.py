@@ -19,10 +19,11 @@ from __future__ import annotations
 
 from collections import Counter
 
-from linkage_ros.accuracy import recording, recording_cost
-from linkage_ros.accuracy.recorded_run import Flush, record_run, Recorded
-from linkage_ros.accuracy.recording import measure_recording, part_of
-from linkage_ros.accuracy.recording_cost import Cost, cost_of, measure_costs
+from linkage_ros.accuracy.recording import cost as recording_cost
+from linkage_ros.accuracy.recording import measure as recording
+from linkage_ros.accuracy.recording.cost import Cost, cost_of, measure_costs
+from linkage_ros.accuracy.recording.measure import measure_recording, part_of
+from linkage_ros.accuracy.recording.recorded_run import Flush, record_run, Recorded
 from linkage_ros.accuracy.spread import Spread
 from linkage_ros.bag.writing.storage import Storage
 from linkage_ros.kinematics.closure import Closure

@@ -28,7 +28,7 @@ from statistics import median
 import tempfile
 from typing import NamedTuple
 
-from linkage_ros.accuracy.recorded_run import record_run, Recorded
+from linkage_ros.accuracy.recording.recorded_run import record_run, Recorded
 from linkage_ros.accuracy.spread import Spread, spread_of
 from linkage_ros.bag.writing.packing import compression_type
 from linkage_ros.bag.writing.storage import COMPRESSIONS, NONE, Storage

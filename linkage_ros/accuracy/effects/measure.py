@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import islice
 
-from linkage_ros.accuracy.departure import Departure, departure
+from linkage_ros.accuracy.effects.departure import Departure, departure
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
 from linkage_ros.accuracy.spread import Spread
 from linkage_ros.cost.feed import feed

@@ -20,8 +20,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from linkage_ros.accuracy.recorded_run import FASTEST
-from linkage_ros.accuracy.recording_cost import Cost, measure_costs, settings
+from linkage_ros.accuracy.recording.cost import Cost, measure_costs, settings
+from linkage_ros.accuracy.recording.recorded_run import FASTEST
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
 from linkage_ros.accuracy.spread import Spread
 from linkage_ros.bag.writing.storage import COMPRESSIONS, NONE

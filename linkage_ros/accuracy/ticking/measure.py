@@ -27,10 +27,10 @@ from math import sqrt
 from pathlib import Path
 import tempfile
 
-from linkage_ros.accuracy.crank_motions import motions_of
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
 from linkage_ros.accuracy.spread import Spread, spread_of
-from linkage_ros.accuracy.use_of_states import (
+from linkage_ros.accuracy.ticking.crank_motions import motions_of
+from linkage_ros.accuracy.ticking.use_of_states import (
     CARRIED,
     CRANK_RATE,
     HELD,

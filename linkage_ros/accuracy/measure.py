@@ -1,0 +1,80 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+All that is measured of a scene, part by part.
+
+Each part is a room, whose module `measure` is imported only where it is asked for, with a function
+
+``measure_PART(scene, quick, told) -> Part | None``
+    Measure; nothing where the scene has no such part. ``quick``: a few seconds are to do.
+    ``told`` takes what is done and how much of it, 0 to 1, now and then; what it raises ends the
+    measurement, and nothing is left behind. Recording takes a folder too, behind the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+
+from linkage_ros.accuracy.machine import describe_machine
+from linkage_ros.accuracy.results import Part, Results
+from linkage_ros.scene.scene import Scene
+
+PARTS = ('solving', 'ticking', 'effects', 'dynamics', 'recording')
+"""In the order of the page."""
+
+Told = Callable[[str, float], None]
+"""Takes the name of a part, and how much of it is done, 0 to 1."""
+
+
+def measure_accuracy(
+    scene: Scene, parts: Sequence[str], quick: bool, folder: Path, told: Told
+) -> Results:
+    """
+    Measure a scene.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    parts
+        Which of `PARTS`.
+    quick
+        Whether a few seconds are to do for each.
+    folder
+        On the disk whose recording is measured.
+    told
+        Takes how it goes.
+
+    Raises
+    ------
+    LinkageError
+        Where something does not go together, or is not installed.
+
+    """
+    found: list[Part] = []
+    for name in PARTS:
+        if name not in parts:
+            continue
+        told(name, 0.0)
+        measure = getattr(import_module(f'linkage_ros.accuracy.{name}.measure'), f'measure_{name}')
+        where = (folder,) if name == 'recording' else ()
+        part = measure(scene, *where, quick, lambda _, share, name=name: told(name, share))
+        if part is not None:
+            found.append(part)
+        told(name, 1.0)
+    return Results(scene.name, describe_machine(), found)

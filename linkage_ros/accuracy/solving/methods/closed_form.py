@@ -1,0 +1,94 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The closed form, as the node has it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from linkage_ros.accuracy.solving.methods.method import (
+    ACCELERATION,
+    Joints,
+    Method,
+    Motion,
+    NOTHING,
+    RATE,
+)
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.groups import Iterated
+from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.status import Status
+
+NAME, ITERATED = 'closed form', 'iteration from knots'
+NAMES = (NAME, ITERATED)
+"""What the node does: the one where dyads cover a linkage, else the other."""
+
+_CLOSED = Status.CLOSED
+
+
+def closed_form(linkage: Linkage) -> Method:
+    """Return it; links that no dyad covers are iterated, as the node does."""
+    closure = Closure(linkage)
+    iterated = any(isinstance(group, Iterated) for group in closure.structure.groups)
+    return closure_method(closure, ITERATED if iterated else NAME)
+
+
+def closure_method(
+    closure: Any,
+    name: str,
+    setting: str = '',
+    memory: int | None = None,
+    build: float | None = None,
+) -> Method:
+    """Return what a closure comes to, or anything with its calls, as a method."""
+    linkage: Linkage = closure.linkage
+    rates = [RATE] * len(linkage.inputs)
+    accelerations = [ACCELERATION] * len(linkage.inputs)
+    solve, solve_velocity, solve_acceleration = (
+        closure.position,
+        closure.velocity,
+        closure.acceleration,
+    )
+
+    def position(*inputs: float) -> Joints:
+        joints: Joints = solve(*inputs).joints
+        return joints
+
+    def motion(*inputs: float) -> Motion:
+        found = solve(*inputs)
+        if found.status is not _CLOSED:
+            return NOTHING
+        velocity = solve_velocity(found, *rates)
+        change = solve_acceleration(found, velocity, *accelerations)
+        return found.joints, velocity.joints, change.joints
+
+    def batch(inputs: Sequence[Any], derivatives: int) -> Sequence[Any]:
+        found: Sequence[Any] = closure.solve(
+            *inputs, rates=rates, accelerations=accelerations, derivatives=derivatives
+        )
+        end = 2 + derivatives
+        return found[1:end]
+
+    return Method(
+        name,
+        setting,
+        position,
+        motion,
+        batch if hasattr(closure, 'solve') else None,
+        memory,
+        build,
+    )
