@@ -39,12 +39,15 @@ class Axis(NamedTuple):
         In which unit: 'rad'; '' for a number.
     logarithmic
         Whether equal steps are equal factors.
+    least
+        Of a logarithmic axis, the smallest value worth a place of its own; 0 for any.
 
     """
 
     name: str
     unit: str
     logarithmic: bool = True
+    least: float = 0.0
 
 
 class Point(NamedTuple):

@@ -62,6 +62,16 @@ def test_a_point_without_a_place_stands_on_the_nearer_edge(point, edge):
     assert placed.on_edge == (edge is not None)
 
 
+def test_what_is_less_than_an_axis_is_to_show_stands_on_its_edge():
+    short = Axis('error', 'rad', least=1e-19)
+    found = drawn(Point(1.0, 1e-3), Point(1.0, 1e-16), Point(1.0, 1e-50), y=short)
+    placed = found.curves[0].points
+    assert [point.on_edge for point in placed] == [False, False, True]
+    assert 1e-19 < placed[2].y == found.y.low < 1e-16
+    assert placed[2].text[-1] == 'error: 1e-50 rad', 'it is told as it is'
+    assert found.on_edge == 'less than 1e-19'
+
+
 def test_a_linear_axis_has_a_place_for_zero_and_less():
     found = drawn(Point(0.0, -1.0), Point(-1.0, 0.0), x=LINEAR, y=LINEAR)
     assert not found.on_edge

@@ -16,8 +16,9 @@
 """
 Where the points of a diagram lie: its range, and what is beyond every range.
 
-A logarithmic axis has no place for 0, and none has one for ∞. Such a point is a result all the
-same, so it is drawn on the edge, hollow; what is not a number is not drawn.
+A logarithmic axis has no place for 0, nor for what is less than it is to show, and none has one
+for ∞. Such a point is a result all the same, so it is drawn on the edge, hollow; what is not a
+number is not drawn.
 """
 
 from __future__ import annotations
@@ -60,7 +61,8 @@ class Range(NamedTuple):
 
     def has(self, value: float) -> bool:
         """Say whether the axis has a place for a value."""
-        return abs(value) <= _GREATEST and (value >= _LEAST or not self.axis.logarithmic)
+        least = max(_LEAST, self.axis.least)
+        return abs(value) <= _GREATEST and (value >= least or not self.axis.logarithmic)
 
     def place(self, value: float) -> float:
         """Return where a value is drawn; one without a place on the nearer edge."""
@@ -194,7 +196,9 @@ def _without_place(points: Iterable[Point], x: Range, y: Range) -> str:
         for shown, value in ((x, point.x), (y, point.y))
         if not shown.has(value)
     }
+    least = max(x.axis.least, y.axis.least)
     kinds = {
+        f'less than {number_text(least)}': any(_LEAST <= value < least for value in values),
         '0': any(0.0 <= value < _LEAST for value in values),
         'less than 0': any(-_GREATEST <= value < 0.0 for value in values),
         '-∞': any(value < -_GREATEST for value in values),

@@ -33,6 +33,10 @@ FLOOR = 1e-18
 _TIME = Axis('time of a state', 'µs')
 _ERROR = 'greatest error'
 _UNIT = 'rad, or of the size'
+_LEAST = 1e-19
+"""Less is drawn on the edge: what has more digits than a double has would flatten all else."""
+
+_ERRORS = Axis(_ERROR, _UNIT, least=_LEAST)
 
 _WITH_PATH = ('easy', 'path')
 """What is integrated goes along a path; it is drawn and told with the easy poses."""
@@ -57,21 +61,21 @@ def _diagrams(found: Sequence[Measured]) -> Iterator[Diagram]:
         'solving_easy',
         f'Position {where}, easy poses: what accuracy costs',
         _TIME,
-        Axis(_ERROR, _UNIT),
+        _ERRORS,
         _curves(easy, 'position', lambda one: one.position),
     )
     yield Diagram(
         'solving_acceleration',
         f'Accelerations {where}, easy poses',
         Axis('time of a state with rates and accelerations', 'µs'),
-        Axis(_ERROR, 'rad/s², or of the greatest'),
+        Axis(_ERROR, 'rad/s², or of the greatest', least=_LEAST),
         _curves(easy, 'motion', lambda one: one.motion and one.motion[2]),
     )
     yield Diagram(
         'solving_batch',
         f'Positions {where} in arrays, easy poses',
         _TIME,
-        Axis(_ERROR, _UNIT),
+        _ERRORS,
         _curves(easy, 'batch', lambda one: one.batch and one.batch[0]),
     )
     for key, words in (('toggle', 'next to a toggle'), ('change_point', 'at a change point')):
@@ -80,7 +84,7 @@ def _diagrams(found: Sequence[Measured]) -> Iterator[Diagram]:
             f'solving_{key}',
             f'Position of {some[0].poses.name} {words}: what accuracy costs',
             _TIME,
-            Axis(_ERROR, _UNIT),
+            _ERRORS,
             _curves(some, 'position', lambda one: one.position),
         )
 
