@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+import errno
 from functools import lru_cache
 import os
 from pathlib import Path
@@ -163,9 +164,14 @@ def write_metadata(summary: BagSummary, custom: Mapping[str, str]) -> None:
     target = summary.folder / METADATA_FILE
     temporary = target.with_suffix('.yaml.tmp')
     try:
-        with temporary.open('w', encoding='utf-8') as file:
-            file.write(metadata_text(summary, custom))
-            file.flush()
+        # Not buffered: Python's buffers ask a disk that takes nothing again and again, for ever.
+        with temporary.open('wb', buffering=0) as file:
+            rest = memoryview(metadata_text(summary, custom).encode())
+            while rest:
+                count = file.write(rest)
+                if not count:
+                    raise OSError(errno.EIO, 'the disk takes nothing')
+                rest = rest[count:]
             os.fsync(file.fileno())
         temporary.replace(target)
     except OSError:
@@ -183,7 +189,7 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-# Topics and finished files stay what they are: a bag of a thousand files is told again for each.
+# Topics and names stay what they are: a bag of a thousand files is told again for each.
 @lru_cache(maxsize=256)
 def _topic_text(topic: Topic) -> str:
     metadata = {
@@ -196,14 +202,19 @@ def _topic_text(topic: Topic) -> str:
     return _dump([{'topic_metadata': metadata}])
 
 
-@lru_cache(maxsize=16384)
 def _file_text(file: str, duration: int, start: int, messages: int) -> str:
     # The keys of a file stand in another order than those of the whole, as rosbag2 writes them.
-    return _dump([{'path': file}]) + _indented(
+    return _path_text(file) + _indented(
         f'starting_time:\n  nanoseconds_since_epoch: {start}\n'
         f'duration:\n  nanoseconds: {duration}\n'
         f'message_count: {messages}\n'
     )
+
+
+# By the name alone: the counts of the newest file are others each second.
+@lru_cache(maxsize=8192)
+def _path_text(file: str) -> str:
+    return _dump([{'path': file}])
 
 
 def _extent(duration: int, start: int, messages: int) -> str:

@@ -20,7 +20,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.cli.proof import mid_run_text, prove
+from linkage_ros.cli.proof import beginning_text, prove
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline
@@ -57,6 +57,16 @@ def summary(node: LinkageNode) -> str:
         for status in (Status.TOGGLE, Status.OPEN, Status.INDETERMINATE)
         if counts.unclosed[status]
     ]
+    for memory in node.recording.memories:
+        rows += [
+            (
+                'memory',
+                f'{t.name}: {t.received} received, {t.kept} in it at the end, {t.let_go} let go'
+                + (f', {t.dropped} dropped' if t.dropped else ''),
+            )
+            for t in memory.topics
+        ]
+        rows.append(('snapshots', memory.snapshots))
     for recording in node.recording.ended:
         rows += [
             (
@@ -95,5 +105,5 @@ def _proof(folder: Path) -> str:
         f'{topic.same} of {topic.recorded} {name}'
         for name, topic in zip(names, proof.comparison.topics, strict=True)
     )
-    untold = f'; {mid_run_text(proof)}' if proof.mid_run else ''
+    untold = f'; {beginning_text(proof)}' if proof.beginning else ''
     return f'{same} replay to the same bytes{untold}; worst loop residual {worst:.1e} m'

@@ -30,6 +30,7 @@ from linkage_ros.kinematics.linkage import Input
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.status import Status
 from linkage_ros.line import Line
+from linkage_ros.ros.run_snapshots import RunSnapshots
 from linkage_ros.ros.tick_loop import Counts, TickLoop
 
 if TYPE_CHECKING:
@@ -103,6 +104,8 @@ class Health:
         Why there is no recording although one was wanted; '' where there is none to tell.
     limits
         For each attribute of the nearness to trouble below what it is warned of; 0 for never.
+    snapshots
+        The memory of the last seconds; nothing where a bag is written as the run goes.
 
     """
 
@@ -117,6 +120,7 @@ class Health:
     now: Snapshot
     recording_failure: str
     limits: Mapping[str, float]
+    snapshots: RunSnapshots | None = None
 
     def statuses(self) -> list[DiagnosticStatus]:
         """Return the statuses, one for each task."""
@@ -278,6 +282,8 @@ class Health:
         return self._status('faults', WARN if on else OK, message, values)
 
     def _recording(self) -> DiagnosticStatus:
+        if self.snapshots is not None:
+            return self._memory(self.snapshots)
         level, message = OK, 'Not recording'
         values: dict[str, object] = {}
         recorder = self.loop.recorder
@@ -297,6 +303,36 @@ class Health:
                 level, message = ERROR, str(recorder.failure)
         elif self.recording_failure:
             level, message = ERROR, self.recording_failure
+        return self._status('recording', level, message, values)
+
+    def _memory(self, snapshots: RunSnapshots) -> DiagnosticStatus:
+        memory = snapshots.memory
+        seconds, size, crowded = memory.extent
+        level, message = OK, f'In memory: the last {memory.seconds:g} s'
+        topics = memory.inspect()
+        values: dict[str, object] = {}
+        for topic in topics:
+            values[f'Received: {topic.name}'] = topic.received
+            values[f'In memory: {topic.name}'] = topic.kept
+            values[f'Let go: {topic.name}'] = topic.let_go
+            values[f'Dropped: {topic.name}'] = topic.dropped
+        values |= {
+            'In memory (s)': f'{seconds:.3f}',
+            'In memory (bytes)': size,
+            'Snapshot being written': 'yes' if snapshots.writing else 'no',
+            'Snapshots written': snapshots.written,
+            'Snapshots failed': snapshots.failed,
+            'Last snapshot': snapshots.last,
+        }
+        if crowded:
+            level = WARN
+            message = f'Room for {seconds:.1f} s of {memory.seconds:g} s: raise snapshot_bytes'
+        if any(topic.dropped for topic in topics):
+            level, message = WARN, 'The memory does not keep up: messages dropped'
+        if snapshots.failure:
+            level, message = ERROR, f'Last snapshot: {snapshots.failure}'
+        if memory.failure is not None:
+            level, message = ERROR, str(memory.failure)
         return self._status('recording', level, message, values)
 
     def _status(

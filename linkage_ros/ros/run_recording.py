@@ -17,20 +17,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 import json
 from os.path import lexists
 from pathlib import Path
 import platform
+from typing import cast
 
 from linkage_ros import __version__
 from linkage_ros.bag.reading.reader import RUN_FILE
-from linkage_ros.bag.reading.run_events import BEGUN, MID_RUN, WITH_THE_RUN
+from linkage_ros.bag.reading.run_events import BEGUN, CHOSEN, MID_RUN, OWN_EFFECTS, WITH_THE_RUN
 from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.packing import compression_type
 from linkage_ros.bag.writing.recorder import Recorder, RecordingSummary
+from linkage_ros.bag.writing.snapshot import SnapshotMemory
+from linkage_ros.bag.writing.storage import Storage
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
+from linkage_ros.line import Line
+from linkage_ros.replay import own_effects_here
+from linkage_ros.ros.run_snapshots import Answer, counts_text, MemorySummary, RunSnapshots
 from linkage_ros.ros.tick_loop import TickLoop
 from linkage_ros.scene.scene import RecordParameters, Scene
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -45,7 +52,7 @@ EXTRA = 'extra'
 
 class RunRecording:
     """
-    Starts and stops the bags of a node, and keeps account of them.
+    Starts and stops the bags of a node, or its memory of the last seconds, and keeps account.
 
     Parameters
     ----------
@@ -57,9 +64,13 @@ class RunRecording:
     def __init__(self, logger: RcutilsLogger) -> None:
         self._logger = logger
         self.ended: list[RecordingSummary] = []
-        """The recordings that have ended."""
+        """The recordings that have ended, and the snapshots."""
+        self.memories: list[MemorySummary] = []
+        """The memories that have ended."""
         self.failure = ''
         """Why a recording could not be started or ended early; '' while none has."""
+        self.snapshots: RunSnapshots | None = None
+        """The memory; nothing where a bag is written as the run goes."""
 
     def start(
         self,
@@ -69,7 +80,7 @@ class RunRecording:
         topics: Callable[[], Sequence[tuple[str, Topic]]],
     ) -> str:
         """
-        Start a bag that explains itself; return what came of it, as one line.
+        Start a bag that explains itself, or a memory; return what came of it, as one line.
 
         Parameters
         ----------
@@ -85,50 +96,109 @@ class RunRecording:
 
         """
         record = scene.record or _DEFAULT
+        storage, runs = record.storage, Path(directory or record.directory)
+        # What a running tick remembers is not in the bag: a replay has to know.
+        with_the_run = not loop.running
+
+        def new_bag(whole: bool) -> BagWriter:
+            begun = WITH_THE_RUN if whole and with_the_run else MID_RUN
+            folder = _folder(runs, record.name, scene.name)
+            files = _attachments(scene, described, begun, loop.pipeline.lines)
+            return BagWriter(folder, [t for _, t in described], files, storage)
+
         try:
             described = topics()
-            folder = _folder(Path(directory or record.directory), record.name, scene.name)
-            # What a running tick remembers is not in the bag: a replay has to know.
-            begun = MID_RUN if loop.running else WITH_THE_RUN
-            files = _attachments(scene, described, begun)
-            writer = BagWriter(folder, [t for _, t in described], files, record.storage)
+            if storage.snapshot_seconds:
+                compression_type(storage.compression, runs)  # not found out at the first snapshot
+                return self._remember(loop, storage, [t for _, t in described], new_bag)
+            writer = new_bag(True)
         except RecordingError as error:
             self.failure = f'not recording: {error}'
             self._logger.error(self.failure)
             return self.failure
-        loop.recorder = Recorder(
-            writer, capacity=record.queue, flush_period=record.storage.flush_period
-        )
-        line = f'recording to {folder}'
-        if record.name and folder.name != record.name:
+        loop.recorder = Recorder(writer, capacity=record.queue, flush_period=storage.flush_period)
+        line = f'recording to {writer.folder}'
+        if record.name and writer.folder.name != record.name:
             line += f': {record.name} exists already'
         self._logger.info(line)
         return line
 
-    def stop(self, loop: TickLoop) -> str:
-        """Close the bag, if there is one, and return what came of it, as one line."""
+    def describe(self, loop: TickLoop) -> str:
+        """Return what is being done, in words; '' for nothing."""
+        if self.snapshots is not None:
+            return str(self.snapshots)
+        return f'recording to {loop.recorder.folder}' if loop.recorder is not None else ''
+
+    def snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
+        """Begin to write what is in memory; as `RunSnapshots.begin`."""
+        if self.snapshots is None:
+            return (
+                'nothing is kept in memory; write record.snapshot_seconds in the scene, or call '
+                '~/start_recording'
+            )
+        return self.snapshots.begin(answer, wake)
+
+    def collect(self) -> None:
+        """Account and answer for a snapshot that has been written, if there is one."""
+        outcome = self.snapshots.collect() if self.snapshots is not None else None
+        if outcome is None:
+            return
+        if outcome.bag is not None:
+            self.ended.append(outcome.bag)
+        if outcome.failure:
+            self.failure = outcome.line
+            self._logger.error(outcome.line)
+        else:
+            self._logger.info(outcome.line)
+
+    def stop(self, loop: TickLoop) -> tuple[bool, str]:
+        """Close the bag or end the memory; return whether all went well, and a line."""
         if loop.recorder is None:
-            return 'not recording'
+            return False, 'not recording'
         recorder, loop.recorder = loop.recorder, None
+        if self.snapshots is not None:
+            return self._forget(self.snapshots)
         summary = recorder.stop()
         self.ended.append(summary)
-        counts = ', '.join(
-            f'{t.name} {t.recorded} recorded {t.dropped} dropped'
-            + (f' {t.let_go} let go' if t.let_go else '')
-            for t in summary.topics
-        )
         if summary.failure:
             self.failure = f'recording ended early: {summary.failure}'
-            line = f'{self.failure}: {counts}'
+            line = f'{self.failure}: {counts_text(summary)}'
             self._logger.error(line)
         else:
-            line = f'recorded {summary.folder}: {counts}'
+            line = f'recorded {summary.folder}: {counts_text(summary)}'
             self._logger.info(line)
+        return not summary.failure, line
+
+    def _remember(
+        self,
+        loop: TickLoop,
+        storage: Storage,
+        topics: Sequence[Topic],
+        new_bag: Callable[[bool], BagWriter],
+    ) -> str:
+        memory = SnapshotMemory(topics, storage.snapshot_seconds, storage.snapshot_bytes)
+        self.snapshots = RunSnapshots(memory, new_bag)
+        # To a tick it is a recorder: it offers, and looks at nothing else.
+        loop.recorder = cast('Recorder', memory)
+        line = str(self.snapshots)
+        self._logger.info(line)
         return line
+
+    def _forget(self, snapshots: RunSnapshots) -> tuple[bool, str]:
+        snapshots.wait()
+        self.collect()
+        self.snapshots, summary = None, snapshots.end()
+        self.memories.append(summary)
+        if summary.failure:
+            self.failure = summary.failure
+            self._logger.error(str(summary))
+        else:
+            self._logger.info(str(summary))
+        return not summary.failure, str(summary)
 
 
 def _attachments(
-    scene: Scene, topics: Sequence[tuple[str, Topic]], begun: str
+    scene: Scene, topics: Sequence[tuple[str, Topic]], begun: str, lines: Sequence[Line]
 ) -> dict[str, tuple[str, bytes]]:
     named = {key: topic.name for key, topic in topics if key != EXTRA}
     run = {
@@ -137,6 +207,9 @@ def _attachments(
         **named,
         'extra_topics': [topic.name for key, topic in topics if key == EXTRA],
         BEGUN: begun,
+        # A replay must not choose again.
+        **({CHOSEN: chosen} if (chosen := _chosen(lines)) else {}),
+        **({OWN_EFFECTS: own} if (own := own_effects_here(scene)) else {}),
         'linkage_ros': __version__,
         'python': platform.python_version(),
         'machine': platform.machine(),
@@ -144,6 +217,15 @@ def _attachments(
     return {
         **{name: ('application/yaml', data) for name, data in scene.files.items()},
         RUN_FILE: ('application/json', json.dumps(run).encode()),
+    }
+
+
+def _chosen(lines: Sequence[Line]) -> dict[str, dict[str, Mapping[str, float]]]:
+    """Return by the name of each linkage the solver that was chosen, where one was."""
+    return {
+        line.member.name: {line.choice.solver: line.choice.parameters}
+        for line in lines
+        if line.choice is not None
     }
 
 

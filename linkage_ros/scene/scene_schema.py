@@ -24,10 +24,18 @@ from typing import Any
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.faults.fault import FAULTS
-from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
+from linkage_ros.parameters import declared
+from linkage_ros.scene.load import (
+    COARSEST_ACCURACY,
+    FINEST_ACCURACY,
+    HIGHEST_RATE,
+    LOWEST_RATE,
+)
 from linkage_ros.scene.schema import (
     CHARACTER,
     DIALECT,
+    DOTTED,
+    is_required,
     mapping,
     named,
     number,
@@ -37,9 +45,22 @@ from linkage_ros.scene.schema import (
     Schema,
     text,
 )
-from linkage_ros.scene.storage import SPLITS, StorageParameters
+from linkage_ros.scene.storage import AS_THE_RUN_GOES, LEASTS, SPLITS, StorageParameters
+from linkage_ros.solvers.registry import SOLVERS
 
 _RATE = 'Ticks a second [Hz]; 0: one for every crank sample.'
+_ONE_SOLVER: Schema = {
+    'if': {'required': ['solver']},
+    'then': {
+        'properties': {
+            'accuracy': {'description': 'leave it out: a solver is named', 'maximum': 0}
+        }
+    },
+}
+_OWN_EFFECT: Schema = {
+    'description': "An effect of one's own: a module that Python finds, and its parameters.",
+    'type': 'object',
+}
 _STRONGEST = 1e9
 _STIFFEST = 1e12
 
@@ -81,6 +102,12 @@ def scene_schema() -> Schema:
                 'propertyNames': text('a name: letters, digits and _, a letter first', ROS_NAME),
             },
             'record': _record(),
+            'robot_description': {
+                'description': 'Whether the node publishes the linkages as URDF on '
+                'robot_description.',
+                'type': 'boolean',
+                'default': False,
+            },
         },
     )
     return {
@@ -90,6 +117,7 @@ def scene_schema() -> Schema:
         'if': {'required': ['linkages']},
         'then': {'properties': {'linkage': False}},
         'else': {'required': ['linkage']},
+        'allOf': [_ONE_SOLVER],
         '$defs': _of_a_linkage(),
     }
 
@@ -107,6 +135,7 @@ def _linkages(own: Mapping[str, Schema]) -> Schema:
         },
         required=('name', 'linkage'),
     )
+    one['allOf'] = [_ONE_SOLVER]
     return {
         'description': 'Several linkages in the place of one.',
         'if': {'type': 'array'},
@@ -132,7 +161,17 @@ def _of_a_linkage() -> dict[str, Schema]:
             'maxProperties': 1,
             'default': {'topic': {}},
         },
-        'effects': {**mapping('What is called for beyond positions.', effects), 'default': {}},
+        'effects': {
+            **mapping('What is called for beyond positions.', effects),
+            'patternProperties': {DOTTED: _OWN_EFFECT},
+            'default': {},
+        },
+        'solver': _solver(),
+        'accuracy': number(
+            'Of the positions [rad or m]: the cheapest solver that proves it is chosen.',
+            least=FINEST_ACCURACY,
+            most=COARSEST_ACCURACY,
+        ),
         'loads': mapping(
             'The forces that act on the links, where effects or the drive ask for them.',
             {
@@ -148,6 +187,26 @@ def _of_a_linkage() -> dict[str, Schema]:
                 },
             },
         ),
+    }
+
+
+def _solver() -> Schema:
+    solvers = parameter_types(SOLVERS)
+    alone = [
+        name
+        for name, of in solvers.items()
+        if not any(is_required(entry) for entry, _ in declared(of))
+    ]
+    one = mapping(
+        'How the loops are closed: one solver.',
+        {name: parameters_schema(of) for name, of in solvers.items()},
+    )
+    return {
+        'description': one['description'],
+        'if': {'type': 'string'},
+        'then': {'enum': alone},
+        'else': {**one, 'minProperties': 1, 'maxProperties': 1},
+        'default': 'closed_form',
     }
 
 
@@ -192,7 +251,7 @@ def _fault() -> Schema:
 
 def _record() -> Schema:
     storage = parameters_schema(StorageParameters)['properties']
-    for key, least in SPLITS.items():
+    for key, least in LEASTS.items():
         above = {'if': {'exclusiveMinimum': 0}, 'then': {'minimum': least}}
         storage[key] = {**storage[key], **above}
     whole = mapping(
@@ -220,7 +279,27 @@ def _record() -> Schema:
             **storage,
         },
     )
-    split = [{'required': [key], 'properties': {key: {'exclusiveMinimum': 0}}} for key in SPLITS]
+    one = {'required': ['split_bytes'], 'properties': {'split_bytes': {'maximum': 0}}}
+    split = {'anyOf': [{'not': one}, _wanted('split_seconds')]}
     one_file = f'without {" or ".join(SPLITS)} there is one file'
     alone = {'properties': {'keep_files': {'description': one_file, 'maximum': 0}}}
-    return {**whole, 'if': {'anyOf': split}, 'else': alone}
+    in_memory = 'leave it out: with snapshot_seconds the run is kept in memory'
+    not_in_memory = 'leave it out: without snapshot_seconds nothing is kept in memory'
+    for_a_run = {'description': in_memory, 'maximum': 0}
+    for_memory = {'description': not_in_memory, 'maximum': 0}
+    return {
+        **whole,
+        'allOf': [
+            {'if': split, 'else': alone},
+            {
+                'if': _wanted('snapshot_seconds'),
+                'then': {'properties': dict.fromkeys(AS_THE_RUN_GOES, for_a_run)},
+                'else': {'properties': {'snapshot_bytes': for_memory}},
+            },
+        ],
+    }
+
+
+def _wanted(key: str) -> Schema:
+    """Return the schema of a mapping in which a number is given that is not 0."""
+    return {'required': [key], 'properties': {key: {'exclusiveMinimum': 0}}}

@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from linkage_ros.bag.writing.storage import COMPRESSIONS, Storage
@@ -30,6 +31,12 @@ What makes files of a bag, and the least that it may be where it is not 0.
 
 Each file begins with the scene, the linkages and the types, and costs the disk some ten waits.
 """
+
+LEASTS: Mapping[str, float] = {**SPLITS, 'snapshot_seconds': 0.1}
+"""What may be 0, for never, and else has to be so much at least."""
+
+AS_THE_RUN_GOES = ('queue', 'flush_period', *SPLITS, 'keep_files')
+"""What has no meaning where a run is kept in memory, and written in one go."""
 
 _DEFAULT = Storage()
 
@@ -73,17 +80,51 @@ class StorageParameters(Storage):
         most=10**15,
     )
     compression: str = choice('how messages are packed', COMPRESSIONS, _DEFAULT.compression)
+    snapshot_seconds: float = number(
+        'no bag as the run goes: the last so many seconds are kept in memory, and written when '
+        '~/snapshot asks for them; 0: off',
+        _DEFAULT.snapshot_seconds,
+        unit='s',
+        least=0.0,
+        most=86_400.0,
+    )
+    snapshot_bytes: int = whole(
+        'how much memory that may take: where it is too little, less than snapshot_seconds is '
+        'kept; twice as much while a snapshot is written',
+        _DEFAULT.snapshot_bytes,
+        unit='bytes',
+        least=1_000_000,
+        most=10**12,
+    )
 
 
 def read_storage(content: Section) -> StorageParameters:
     """Read how a bag is stored out of the section that says how a run is recorded."""
     storage: StorageParameters = read_parameters(content, StorageParameters, {})
-    for key, least in SPLITS.items():
+    for key, least in LEASTS.items():
         value = getattr(storage, key)
         if 0 < value < least:
             raise content.error(key, f'{value:g} is too small', f'write {least:.9g} or more, or 0')
+    if storage.snapshot_seconds:
+        _refuse_what_is_for_a_run(content)
+    elif 'snapshot_bytes' in content:
+        raise content.error(
+            'snapshot_bytes', 'nothing is kept in memory', 'write snapshot_seconds too'
+        )
     if storage.keep_files and not any(getattr(storage, key) for key in SPLITS):
         raise content.error(
             'keep_files', 'there is one file only', f'write {" or ".join(SPLITS)} too'
         )
     return storage
+
+
+def _refuse_what_is_for_a_run(content: Section) -> None:
+    """Raise FileError for a key that a snapshot has no use for; one that is 0 says nothing."""
+    for key in AS_THE_RUN_GOES:
+        if content.mapping.get(key, 0) != 0:
+            raise content.error(
+                key,
+                'is for a bag that is written as the run goes, and snapshot_seconds keeps the run '
+                'in memory',
+                'leave one of the two out',
+            )

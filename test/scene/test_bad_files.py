@@ -37,7 +37,7 @@ BOMB = b'a: &a [1, 1]\n' + b''.join(
 # Appended to a good scene; the error's place and reason, and a part of its remedy.
 SCENES = {
     'unknown key': (b'rtae: 5', ":2: rtae: unknown key; did you mean 'rate'?"),
-    'unlike any key': (b'x: 5', ':2: x: unknown key; known: angles, drive, effects, faults, l'),
+    'unlike any key': (b'x: 5', ':2: x: unknown key; known: accuracy, angles, drive, effects, faults, l'),
     'key twice': (b'rate: 1\nrate: 2', ':3: rate: stands twice (first in line 2); remove one'),
     'key twice, deep': (
         b'drive: {topic: {max_age: 1, max_age: 2}}',
@@ -109,8 +109,35 @@ SCENES = {
         ':2: record.split_seconds: 0.5 is too small; write 1 or more, or 0',
     ),
     'ring of one file': (
-        b'record: {keep_files: 2}',
+        b'record: {keep_files: 2, split_bytes: 0}',
         ':2: record.keep_files: there is one file only; write split_bytes or split_seconds too',
+    ),
+    'memory of a moment': (
+        b'record: {snapshot_seconds: 0.05}',
+        ':2: record.snapshot_seconds: 0.05 is too small; write 0.1 or more, or 0',
+    ),
+    'memory in files': (
+        b'record:\n  snapshot_seconds: 30\n  split_seconds: 60',
+        (
+            ':4: record.split_seconds: is for a bag that is written as the run goes, and '
+            'snapshot_seconds keeps the run in memory; leave one of the two out'
+        ),
+    ),
+    'memory in a ring': (
+        b'record: {snapshot_seconds: 30, split_bytes: 0, keep_files: 3}',
+        ':2: record.keep_files: is for a bag that is written as the run goes',
+    ),
+    'memory that is flushed': (
+        b'record: {flush_period: 1, snapshot_seconds: 30}',
+        ':2: record.flush_period: is for a bag that is written as the run goes',
+    ),
+    'memory that waits for the disk': (
+        b'record: {queue: 1000, snapshot_seconds: 30}',
+        ':2: record.queue: is for a bag that is written as the run goes',
+    ),
+    'room for nothing': (
+        b'record: {snapshot_bytes: 5000000}',
+        ':2: record.snapshot_bytes: nothing is kept in memory; write snapshot_seconds too',
     ),
     'unknown packing': (
         b'record: {compression: gzip}',

@@ -124,6 +124,13 @@ record:
     )
 
 
+def test_a_record_that_is_kept_in_memory(build):
+    scene, _ = build(SCENE + b'record: {snapshot_seconds: 30, min_free_bytes: 1}')
+    assert scene.record.storage == StorageParameters(
+        snapshot_seconds=30.0, snapshot_bytes=256_000_000, min_free_bytes=1
+    )
+
+
 @pytest.mark.parametrize(
     ('text', 'value'),
     [('1e3', 1000.0), ('2E+1', 20.0), ('1e-1', 0.1), ('.5', 0.5), ('7.', 7.0), ('010', 10.0)],

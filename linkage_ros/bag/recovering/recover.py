@@ -131,7 +131,11 @@ def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> l
     if path.is_dir():
         named = files_of(path, information) if information else []
         there = files_of(path, {}) if any(path.glob('*.mcap')) or not named else []
-        files = [*named, *(file for file in there if file not in named)]
+        if [file for file in there if file in named] == named:
+            # By their numbers: one that made way in a ring may be left, before those named.
+            files = there
+        else:
+            files = [*named, *(file for file in there if file not in named)]
     else:
         files = [path]
     found = []

@@ -27,6 +27,10 @@ RECOVERED = 'linkage_ros.recovered'
 """Key in the ``custom_data`` of a recovered bag: what it was made of, and what was lost."""
 
 
+NOTHING_LOST = 'nothing lost'
+"""How that text ends where it is so."""
+
+
 class TopicRecovery(NamedTuple):
     """How many messages of a topic were saved, and how many there were; None if unknown."""
 
@@ -76,7 +80,7 @@ class Recovery(NamedTuple):
     def in_short(self, path: Path) -> str:
         """Return in a line what became of the bag of this name."""
         saved = sum(topic.saved for topic in self.topics)
-        lost = 'nothing lost'
+        lost = NOTHING_LOST
         if not self.whole:
             size = sum(loss.end - loss.start for _, loss in self.losses)
             lost = f'{size} bytes lost in {len(self.losses)} places'

@@ -26,21 +26,15 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import count
 from pathlib import Path
 import threading
 import time
 
 from linkage_ros.bag.account import Account
 from linkage_ros.bag.metadata import BagSummary
+from linkage_ros.bag.writing.handover import BATCH, NAP, POLL, Tally
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
-
-_POLL = 0.02  # [s]
-# Messages between two naps of the thread, about 0.3 ms of work, and the nap [s]. It is not 0:
-# with a nap of 0 the thread often takes the interpreter back before a waiting tick wakes up.
-_BATCH = 50
-_NAP = 50e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +104,9 @@ class Recorder:
         self._flush_period = flush_period
         self._queue: deque[tuple[int, int, int, bytes]] = deque()
         self._open = True
-        self._received = [_Tally() for _ in writer.topics]
+        self._received = [Tally() for _ in writer.topics]
         self._add_received = [tally.add for tally in self._received]
-        self._overflowed = [_Tally() for _ in writer.topics]
+        self._overflowed = [Tally() for _ in writer.topics]
         self._add_overflowed = [tally.add for tally in self._overflowed]
         # The thread's own: what the writer took, and what did not get there. One tuple, so that
         # another thread never sees a message in both, or in neither.
@@ -212,16 +206,19 @@ class Recorder:
             stopping = False
             while not stopping:
                 # Asked before the queue is emptied: what was offered until then is written.
-                stopping = self._stopping.wait(_POLL)
+                stopping = self._stopping.wait(max(0.0, min(POLL, due - time.monotonic())))
                 more = True
                 while more:
                     more = self._write_batch()
-                    if time.monotonic() >= due:
+                    now = time.monotonic()
+                    # A backlog first, lest a slow disk leave time for nothing but flushes.
+                    if now >= due + self._flush_period * more:
                         self._writer.flush()
                         self._safe = tuple(self._done[0])
-                        due = time.monotonic() + self._flush_period
+                        # What came while it lasted is not with the system yet.
+                        due = max(now + self._flush_period, time.monotonic())
                     if more:
-                        time.sleep(_NAP)
+                        time.sleep(NAP)
             self._writer.close(self._custom)
         except Exception as error:  # noqa: BLE001 (nothing may end the thread in silence)
             self._fail(error)
@@ -238,7 +235,7 @@ class Recorder:
     def _write_batch(self) -> bool:
         """Write up to a batch of messages; return whether there may be more."""
         queue, write, (taken, lost) = self._queue, self._writer.write, self._done
-        for _ in range(min(_BATCH, len(queue))):
+        for _ in range(min(BATCH, len(queue))):
             message = queue.popleft()
             # Lost until proven otherwise: a write that raises needs no case of its own.
             lost[message[0]] += 1
@@ -263,25 +260,3 @@ class Recorder:
             lost[self._queue.popleft()[0]] += 1
         self._done = (list(kept), lost)
         self.failure = error
-
-
-class _Tally:
-    """
-    A counter that several threads count up without a lock.
-
-    Stepping an `itertools.count` is one C call, which threads cannot tear apart as they can
-    ``n += 1``. It can only be read by stepping it, so the steps made for reading are taken off.
-    """
-
-    __slots__ = ('_reading', '_readings', 'add')
-
-    def __init__(self) -> None:
-        self.add = count().__next__
-        self._readings = 0
-        self._reading = threading.Lock()
-
-    def value(self) -> int:
-        with self._reading:
-            steps = self.add() - self._readings
-            self._readings += 1
-            return steps

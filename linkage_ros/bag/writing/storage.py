@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""How a bag lies on the disk: in which files, packed how, how soon, and what stays free."""
+"""How a bag lies on the disk, and when it gets there: as the run goes, or when one asks for it."""
 
 from __future__ import annotations
 
@@ -24,11 +24,18 @@ from pathlib import Path
 NONE = 'none'
 COMPRESSIONS = (NONE, 'lz4', 'zstd')
 
+# What is written between two looks, a chunk and what a flush adds [bytes]: with it there is never
+# less than was asked for.
+_ON_ITS_WAY = 256 * 1024
+
 
 @dataclass(frozen=True, slots=True)
 class Storage:
     """
-    How a bag is stored; by default in one file, not packed.
+    How a bag is stored; by default as the run goes, in files of 1 GiB, not packed.
+
+    Until a file ends, mcap keeps in memory where each of its chunks lies, and what is in it: that
+    bounds a file.
 
     Attributes
     ----------
@@ -44,15 +51,22 @@ class Storage:
         What stays free on the disk [bytes].
     compression
         'none', 'lz4' or 'zstd'.
+    snapshot_seconds
+        How much of the run is kept in memory until one asks for it [s], by the log times; 0 for a
+        bag that is written as the run goes.
+    snapshot_bytes
+        How much memory that may take [bytes].
 
     """
 
     flush_period: float = 1.0
-    split_bytes: int = 0
+    split_bytes: int = 2**30
     split_seconds: float = 0.0
     keep_files: int = 0
     min_free_bytes: int = 0
     compression: str = NONE
+    snapshot_seconds: float = 0.0
+    snapshot_bytes: int = 256_000_000
 
 
 def scarcity(folder: Path, least: int) -> str:
@@ -61,6 +75,9 @@ def scarcity(folder: Path, least: int) -> str:
         return ''
     disk = os.statvfs(folder)
     free = disk.f_bavail * disk.f_frsize
-    if free >= least:
+    if free >= least + _ON_ITS_WAY:
         return ''
-    return f'{free:,} bytes are free on its disk, fewer than min_free_bytes: {least:,}'
+    return (
+        f'{free:,} bytes are free on its disk, fewer than min_free_bytes: {least:,} '
+        f'and {_ON_ITS_WAY:,} to go on'
+    )

@@ -1,0 +1,201 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The last seconds of a run in memory, the bags that are made of them, and what came of it all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+from linkage_ros.bag.writing.recorder import RecordingSummary
+from linkage_ros.bag.writing.snapshot import KeptCounts, SnapshotMemory
+from linkage_ros.bag.writing.snapshot_bag import SnapshotWriting
+from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.errors import RecordingError
+
+Answer = Callable[[bool, str], None]
+"""Takes whether something went well, and what came of it, as one line."""
+
+
+@dataclass(frozen=True, slots=True)
+class SnapshotOutcome:
+    """
+    What came of a snapshot.
+
+    Attributes
+    ----------
+    bag
+        What was written; None where no bag could be made.
+    failure
+        Why it is not whole; '' where it is.
+    line
+        All of it, as one line.
+
+    """
+
+    bag: RecordingSummary | None
+    failure: str
+    line: str
+
+
+@dataclass(frozen=True, slots=True)
+class MemorySummary:
+    """
+    What a run came to of which the last seconds were kept in memory.
+
+    Attributes
+    ----------
+    topics
+        Counts for each topic; what was kept to the end is gone now.
+    snapshots
+        How many there are, in words.
+    failure
+        Why the memory has ended early; '' if it has not.
+
+    """
+
+    topics: tuple[KeptCounts, ...]
+    snapshots: str
+    failure: str
+
+    def __str__(self) -> str:
+        counts = ', '.join(
+            f'{t.name} {t.received} received {t.kept} in memory at the end {t.let_go} let go'
+            + (f' {t.dropped} dropped' if t.dropped else '')
+            for t in self.topics
+        )
+        failure = f'{self.failure}; ' if self.failure else ''
+        return f'{failure}nothing is kept any more, {self.snapshots}: {counts}'
+
+
+class RunSnapshots:
+    """
+    A memory, and the snapshots of it.
+
+    Parameters
+    ----------
+    memory
+        To which the tick offers.
+    new_bag
+        Makes a bag, given whether the memory reaches back to its beginning.
+
+    """
+
+    def __init__(self, memory: SnapshotMemory, new_bag: Callable[[bool], BagWriter]) -> None:
+        self.memory = memory
+        self.written = self.failed = 0
+        """How many there are; one that was written in part has failed."""
+        self.last = ''
+        """The folder of the last one that was written."""
+        self.failure = ''
+        """Why the last one failed; '' if it did not."""
+        self._new_bag = new_bag
+        self._writing: SnapshotWriting | None = None
+        self._answer: Answer
+
+    def __str__(self) -> str:
+        """Return what is being done, in words."""
+        seconds = self.memory.seconds
+        return f'keeping the last {seconds:g} s in memory; ~/snapshot writes them'
+
+    @property
+    def writing(self) -> bool:
+        """Whether a snapshot is being written."""
+        return self._writing is not None
+
+    @property
+    def count(self) -> str:
+        """Return how many snapshots there are, in words."""
+        if not self.written and not self.failed:
+            return 'no snapshot was asked for: nothing was written'
+        written = f'{self.written} snapshot{"s" * (self.written != 1)} written'
+        return written + (f', {self.failed} failed' if self.failed else '')
+
+    def begin(self, answer: Answer, wake: Callable[[], None]) -> str:
+        """
+        Begin to write what is in memory into a new bag, on a thread of its own.
+
+        Parameters
+        ----------
+        answer
+            Will be called by `collect` with what came of it.
+        wake
+            Called on that thread when there is something to collect.
+
+        Returns
+        -------
+        str
+            Why it is not begun, as one line; '' if it is.
+
+        """
+        if self._writing is not None:
+            return 'a snapshot is being written; ask again when it is: the memory goes on'
+        try:
+            kept = self.memory.take()
+        except RecordingError as error:
+            return str(error)
+        if not kept.blocks:
+            return 'nothing is in memory yet; ask again when there are messages'
+        self._answer = answer
+        self._writing = SnapshotWriting(kept, partial(self._new_bag, kept.whole), wake)
+        return ''
+
+    def collect(self) -> SnapshotOutcome | None:
+        """Answer for the snapshot that has been written; if there is none, return None."""
+        writing = self._writing
+        if writing is None or writing.outcome is None:
+            return None
+        self._writing = None
+        outcome = _outcome(writing.outcome, writing.kept.seconds)
+        if outcome.bag is None or outcome.failure:
+            self.failed += 1
+        else:
+            self.written += 1
+            self.last = str(outcome.bag.folder)
+        self.failure = outcome.failure
+        self._answer(not outcome.failure, outcome.line)
+        return outcome
+
+    def wait(self) -> None:
+        """Wait for the snapshot that is being written, if there is one, so that it is there."""
+        if self._writing is not None:
+            self._writing.outcome = self._writing.wait()
+
+    def end(self) -> MemorySummary:
+        """Forget what is in memory, and say what became of it all."""
+        topics, failure = self.memory.stop(), self.memory.failure
+        return MemorySummary(topics, self.count, str(failure) if failure else '')
+
+
+def counts_text(summary: RecordingSummary) -> str:
+    """Return what became of a recording's messages, in words."""
+    return ', '.join(
+        f'{t.name} {t.recorded} recorded {t.dropped} dropped'
+        + (f' {t.let_go} let go' if t.let_go else '')
+        for t in summary.topics
+    )
+
+
+def _outcome(found: RecordingSummary | RecordingError, seconds: float) -> SnapshotOutcome:
+    if isinstance(found, RecordingError):
+        return SnapshotOutcome(None, str(found), f'no snapshot: {found}; the memory goes on')
+    counts = counts_text(found)
+    if found.failure:
+        line = f'snapshot incomplete: {found.failure}: {counts}; the memory goes on'
+        return SnapshotOutcome(found, found.failure, line)
+    line = f'the last {seconds:.3f} s recorded to {found.folder}: {counts}'
+    return SnapshotOutcome(found, '', line)
