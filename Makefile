@@ -20,7 +20,7 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy synthesis round_trips gallery schema cost effects lint format
-.PHONY: clean damage
+.PHONY: clean damage kills endurance disk
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
@@ -30,6 +30,9 @@ help:
 	@echo 'make synthesis compute and draw what docs/synthesis.md says'
 	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
 	@echo 'make damage    cut a bag at every byte and flip every bit of it (30 min)'
+	@echo 'make kills     kill recordings at 1,400 instants, into docs/recordings (10 min)'
+	@echo 'make disk      let every call of a recording fail, disks fill and stall (10 min)'
+	@echo 'make endurance run 24 h in minutes and 10 min over DDS, into docs/recordings (25 min)'
 	@echo 'make gallery   draw the linkages that come with the package'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
 	@echo 'make cost      measure what every effect costs, into docs/cost.md'
@@ -59,6 +62,7 @@ demo: $(STAMP)
 # The tests run even when lint finds something, so that one run tells all.
 test: $(STAMP)
 	@status=0; \
+	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory lint || status=$$?; \
 	$(BIN)/python -m pytest || status=$$?; \
 	exit $$status
@@ -77,6 +81,15 @@ round_trips: $(STAMP)
 
 damage: $(STAMP)
 	@$(BIN)/python -m campaigns.damage
+
+kills: $(STAMP)
+	@$(BIN)/python -m campaigns.kills --write
+
+disk: $(STAMP)
+	@$(BIN)/python -m campaigns.disk --write
+
+endurance: $(STAMP)
+	@$(BIN)/python -m campaigns.endurance --write
 
 gallery: $(STAMP)
 	@$(BIN)/python docs/make_gallery.py

@@ -35,7 +35,7 @@ _PATIENCE = 15.0
 """How long a process may take to answer, in [s]."""
 
 _LONGEST = 600
-"""How long a process may live, in [s], whatever becomes of us."""
+"""How long a process may live where nothing else is said, in [s]."""
 
 _MOST = 6
 """How many processes may live at once."""
@@ -131,11 +131,14 @@ class Graph:
         Its ``ROS_DOMAIN_ID``.
     folder
         Where logs go.
+    longest
+        How long a process may live, in [s], whatever becomes of us.
 
     """
 
-    def __init__(self, domain: int, folder: Path) -> None:
+    def __init__(self, domain: int, folder: Path, longest: int = _LONGEST) -> None:
         self._folder = folder
+        self._longest = longest
         self._alive: list[Process] = []
         self._environment = {
             **os.environ,
@@ -163,7 +166,7 @@ class Graph:
             raise BenchError(f'{module}: {_MOST} processes run already')
         name = module.rsplit('.', 1)[-1]
         log = self._folder / f'{name}.log'
-        command = ['-m', 'bench.bounded', str(_LONGEST), '-m', module, *arguments]
+        command = ['-m', 'bench.bounded', str(self._longest), '-m', module, *arguments]
         with log.open('wb') as errors:
             popen = subprocess.Popen(
                 [sys.executable, *command],

@@ -1,0 +1,229 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A day of ticks without the waiting: the node's tick loop and its recorder, on simulated time.
+
+The ticks wait for the recorder's queue now and then, so that nothing is dropped: in a real run
+the disk has the time that is left out here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from math import cos, sin, tau
+import multiprocessing
+from pathlib import Path
+import re
+from tempfile import TemporaryDirectory
+import time
+from typing import Any, NamedTuple
+
+from bench.report import say
+from campaigns.endurance.account import shortcomings
+from campaigns.endurance.memory import Usage, usage
+from campaigns.endurance.telling import telling
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.recorder import Recorder, RecordingSummary
+from linkage_ros.bag.writing.storage import Storage
+from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.ros.tick_loop import TickLoop
+from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.scene import Scene
+from rosbags.typesys import get_typestore, Stores
+
+SCENES = Path(__file__).parents[2] / 'config' / 'scenes'
+_BEGIN = 1_700_000_000 * NANOSECONDS
+_JOINT_STATE = 'sensor_msgs/msg/JointState'
+_SPEED = 0.5  # of the crank, in turns a second
+_AT_ONCE = 500  # ticks between two looks at the queue
+_FLUSH_PERIOD = 0.004
+"""[s]. At a few hundred times the pace of time it is about the second of a real run."""
+
+
+class Plan(NamedTuple):
+    """
+    A run.
+
+    Attributes
+    ----------
+    scene
+        Name of a scene that comes with the package.
+    hours
+        How long, in simulated time.
+    rate
+        Ticks a second, instead of the scene's own.
+    split_seconds, keep_files
+        How the bag is stored.
+
+    """
+
+    scene: str
+    hours: float
+    rate: float
+    split_seconds: float = 60.0
+    keep_files: int = 3
+
+    @property
+    def name(self) -> str:
+        """Return what it is called in tables."""
+        return self.scene if self.split_seconds else f'{self.scene}, one file'
+
+
+@dataclass(slots=True)
+class Run:
+    """
+    How a run went.
+
+    Attributes
+    ----------
+    plan
+        What was run.
+    samples
+        What the process held, from the beginning to the end.
+    summary
+        What became of the messages.
+    published
+        Joint states that the tick loop has counted.
+    seconds
+        How long it took.
+    faults
+        What must not be.
+
+    """
+
+    plan: Plan
+    samples: list[Usage]
+    summary: RecordingSummary
+    published: int
+    seconds: float
+    faults: list[str] = field(default_factory=list)
+
+
+def run_all(plans: Sequence[Plan], jobs: int) -> list[Run]:
+    """Run, some at once, each in a process of its own: what one leaves free hides growth."""
+    with multiprocessing.get_context('spawn').Pool(jobs, maxtasksperchild=1) as pool:
+        return list(pool.imap(_run_and_tell, plans))
+
+
+def _run_and_tell(plan: Plan) -> Run:
+    say(f'{plan.name}: {plan.hours:g} h at {plan.rate:g} Hz')
+    return run(plan, telling(f'of {plan.hours:g} h, {plan.name}'))
+
+
+def run(plan: Plan, told: Callable[[float], None] = lambda hours: None) -> Run:
+    """Run, and hold the bag against what was counted; ``told`` takes the hours done."""
+    with TemporaryDirectory(prefix='linkage_ros_endurance_') as name:
+        return _run(plan, Path(name), told)
+
+
+def _run(plan: Plan, folder: Path, told: Callable[[float], None]) -> Run:
+    scene = _scene(plan, folder)
+    pending: list[tuple[bytes, dict[str, Any]]] = []
+    take = partial(_take, pending)
+    pipeline = Pipeline(scene)
+    extras = [lambda message: None for _ in pipeline.extras]
+    from_topic = bool(pipeline.topic)
+    loop = TickLoop(
+        partial(Pipeline, scene, pipeline.closures),
+        take if from_topic else None,
+        lambda message: None,
+        publish_extras=extras,
+    )
+    storage = Storage(split_seconds=plan.split_seconds, keep_files=plan.keep_files)
+    attached = {name: ('application/yaml', data) for name, data in scene.files.items()}
+    writer = BagWriter(folder / 'bag', _topics(pipeline), attached, storage)
+    loop.recorder = recorder = Recorder(writer, flush_period=_FLUSH_PERIOD)
+    crank = JointStateWriter(scene.members[0].inputs).write
+    period, ticks = round(NANOSECONDS / plan.rate), round(plan.hours * 3600.0 * plan.rate)
+    between = max(ticks // 144, 1)  # of 24 h ten minutes
+    begin = time.monotonic()
+    samples = [usage(0.0)]
+    for tick in range(1, ticks + 1):
+        now = _BEGIN + tick * period
+        if from_topic:
+            angle, rate = _crank_at(tick / plan.rate)
+            message = crank(now - 100_000, (angle,), (rate,))
+            pending.append((message, {'source_timestamp': now - 90_000}))
+        loop.tick_at(now)
+        if tick % _AT_ONCE == 0:
+            _wait_for(recorder, 4 * _AT_ONCE)
+        if tick % between == 0:
+            _wait_for(recorder, 0)
+            samples.append(usage(tick / plan.rate))
+            told(tick / plan.rate / 3600.0)
+    seconds = time.monotonic() - begin
+    summary = recorder.stop(timeout=60.0)
+    done = Run(plan, samples, summary, loop.counts.published, seconds)
+    done.faults += shortcomings(summary.folder)
+    received = {counts.name: counts.received for counts in summary.topics}
+    if received['/joint_states'] != loop.counts.published or not loop.counts.published:
+        done.faults.append('not every joint state went to the recorder')
+    if from_topic and not received['/crank_states'] == loop.counts.used == ticks:
+        done.faults.append('not every sample was taken')
+    if summary.failure or any(c.received != c.recorded + c.let_go for c in summary.topics):
+        done.faults.append(f'dropped: {summary.failure or summary.topics}')
+    if len(list(summary.folder.glob('*.mcap'))) != (plan.keep_files if plan.split_seconds else 1):
+        done.faults.append('not as many files as are to be kept')
+    return done
+
+
+def _wait_for(recorder: Recorder, most: int) -> None:
+    """Wait until no more messages wait than these."""
+    while recorder.failure is None and sum(c.waiting for c in recorder.inspect()) > most:
+        time.sleep(0.001)
+
+
+def _take(pending: list[tuple[bytes, dict[str, Any]]]) -> tuple[bytes, dict[str, Any]] | None:
+    return pending.pop() if pending else None
+
+
+def _crank_at(seconds: float) -> tuple[float, float]:
+    """Return angle and rate of a crank whose speed swings about its mean."""
+    turns = tau * _SPEED * seconds
+    return turns + 0.3 * sin(turns), tau * _SPEED * (1.0 + 0.3 * cos(turns))
+
+
+def _scene(plan: Plan, folder: Path) -> Scene:
+    """Return the scene with another rate; its linkage is where it was."""
+    text = (SCENES / f'{plan.scene}.yaml').read_text()
+    text = re.sub(r'^rate: [\d.]+', f'rate: {plan.rate:g}', text, flags=re.MULTILINE)
+    file = folder / f'{plan.scene}.yaml'
+    file.write_text(text.replace('../linkages', str(SCENES.parent / 'linkages')))
+    return load_scene(file)
+
+
+def _topics(pipeline: Pipeline) -> list[Topic]:
+    """Describe the topics in the order of the tick loop's numbers."""
+    kinds = {
+        '/joint_states': _JOINT_STATE,
+        '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
+    }
+    if pipeline.topic:
+        kinds['/crank_states'] = _JOINT_STATE
+    if pipeline.withholds:
+        kinds['/linkage_node/withheld'] = 'builtin_interfaces/msg/Time'
+    kinds |= {
+        extra.topic.replace('~', '/linkage_node'): extra.message for extra in pipeline.extras
+    }
+    store = get_typestore(Stores.ROS2_JAZZY)
+    return [
+        Topic(name, kind, store.generate_msgdef(kind, ros_version=2)[0], store.hash_rihs01(kind))
+        for name, kind in kinds.items()
+    ]

@@ -1,0 +1,164 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Minutes over DDS: a node and a crank source, each a process; what the node holds and says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import json
+import os
+from pathlib import Path
+import subprocess
+import sys
+from tempfile import TemporaryDirectory
+import time
+from typing import Any
+
+from bench.processes import BenchError, Graph
+from campaigns.endurance.accelerated import SCENES
+from campaigns.endurance.account import Account, account_of, shortcomings
+from campaigns.endurance.memory import Usage, usage
+from linkage_ros.bag.reading.reader import read_bag
+from rosbags.typesys import get_typestore, Stores
+
+_CRANK_RATE = 500
+_START = 30.0
+"""How long the node may take to begin to record [s]."""
+
+_LOOKS = 600
+"""Looks at the node's memory, at most one a second."""
+
+
+@dataclass(slots=True)
+class DdsRun:
+    """
+    How a run went.
+
+    Attributes
+    ----------
+    minutes
+        How long it was.
+    samples
+        What the node's process held.
+    ticks
+        What the last diagnostics say of them.
+    account
+        What the bag says of its messages.
+    replayed
+        The account of ``linkage replay``.
+    faults
+        What must not be.
+
+    """
+
+    minutes: float
+    samples: list[Usage] = field(default_factory=list)
+    ticks: dict[str, str] = field(default_factory=dict)
+    account: Account = field(default_factory=dict)
+    replayed: dict[str, Any] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+
+
+def run(minutes: float, told: Callable[[float], None] = lambda minutes: None) -> DdsRun:
+    """
+    Run the demo over DDS, on a graph of its own; ``told`` takes the minutes done.
+
+    Its bag is split once a minute, since the index of a file stays in memory until its end.
+    """
+    with TemporaryDirectory(prefix='linkage_ros_endurance_') as name:
+        folder = Path(name)
+        scene = _scene(folder, max(min(60.0, 6.0 * minutes), 1.0))
+        # Below 102, so that the ports stay below those which the kernel hands out.
+        graph = Graph(2 + os.getpid() % 100, folder, longest=round(60.0 * minutes) + 120)
+        done = DdsRun(minutes)
+        try:
+            _record(graph, scene, folder / 'bag', done, told)
+        except BenchError as error:
+            done.faults.append(str(error))
+            return done
+        done.faults += shortcomings(folder / 'bag')
+        done.account = account_of(folder / 'bag')
+        done.ticks = _ticks(folder / 'bag')
+        done.replayed = _replayed(folder / 'bag')
+        if done.replayed.get('verdict') != 'identical':
+            done.faults.append(f'the replay is {done.replayed.get("verdict")}')
+        return done
+
+
+def _record(
+    graph: Graph, scene: Path, bag: Path, done: DdsRun, told: Callable[[float], None]
+) -> None:
+    """Run node and source, and look at the node; both are ended, the node with its bag closed."""
+    node_arguments = ['--ros-args', '-p', f'scene:={scene}']
+    with graph.run('linkage_ros.ros.linkage_node', node_arguments) as node:
+        until = time.monotonic() + _START
+        while not (bag / 'metadata.yaml').exists() and time.monotonic() < until:
+            node.check()
+            time.sleep(0.05)
+        source_arguments = ['--ros-args', '-p', f'rate:={_CRANK_RATE}.0']
+        with graph.run('linkage_ros.ros.crank_source', source_arguments) as source:
+            begin = time.monotonic()
+            seconds = 60.0 * done.minutes
+            step = max(seconds / _LOOKS, min(1.0, seconds / 40))
+            while (now := time.monotonic() - begin) < seconds:
+                node.check()
+                source.check()
+                done.samples.append(usage(now, node.pid))
+                told(now / 60.0)
+                time.sleep(max(0.0, begin + step * len(done.samples) - time.monotonic()))
+    node.check_end()
+    source.check_end()
+
+
+def _scene(folder: Path, split_seconds: float) -> Path:
+    """Write the demo with a bag that is split."""
+    text = (SCENES / 'demo.yaml').read_text()
+    text = text.replace('../linkages', str(SCENES.parent / 'linkages'))
+    record = f'record: {{directory: {folder}, name: bag, split_seconds: {split_seconds:g}}}'
+    text = text.replace('record: {directory: runs}', record)
+    file = folder / 'demo.yaml'
+    file.write_text(text)
+    return file
+
+
+def _ticks(bag: Path) -> dict[str, str]:
+    """Return what the last diagnostics in a bag say of the ticks and of the crank."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    last = b''
+    for message in read_bag(bag).messages():
+        if message.topic == '/diagnostics':
+            last = message.data
+    if not last:
+        return {}
+    told: Any = store.deserialize_cdr(last, 'diagnostic_msgs/msg/DiagnosticArray')
+    return {
+        pair.key: pair.value
+        for status in told.status
+        if status.name.endswith((': tick', ': crank'))
+        for pair in status.values
+    }
+
+
+def _replayed(bag: Path) -> dict[str, Any]:
+    """Return what ``linkage replay`` says of a bag."""
+    command = [sys.executable, '-m', 'linkage_ros.cli.main', 'replay', str(bag), '--json']
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    try:
+        said: dict[str, Any] = json.loads(answer.stdout)
+    except ValueError:
+        return {'verdict': f'missing: {answer.stderr.strip()}'}
+    return said

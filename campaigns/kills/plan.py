@@ -1,0 +1,177 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What is recorded, how, and when it is killed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import IntEnum
+from random import Random
+from typing import NamedTuple
+
+from linkage_ros.bag.reading.reader import BagMessage
+from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.bag.writing.storage import COMPRESSIONS, Storage
+from linkage_ros.joint_state import JointStateWriter
+
+PERIOD_NS = 1_000_000
+"""Of the ticks: 1 kHz."""
+
+FLUSH_PERIODS = (0.05, 0.1, 0.25, 0.5, 1.0)  # [s]
+
+_TYPE = 'sensor_msgs/msg/JointState'
+_HASH = 'RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e'
+_LINE = 80 * '=' + '\n'
+_DEFINITION = f"""\
+std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+{_LINE}MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+{_LINE}MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+TOPICS = (
+    Topic('/crank_states', _TYPE, _DEFINITION, _HASH, QosProfile(depth=5)),
+    Topic('/joint_states', _TYPE, _DEFINITION, _HASH),
+)
+ATTACHMENTS = {
+    'scene.yaml': ('application/yaml', b'linkage: four_bar.yaml\nrate: 1000\n' * 10),
+    'linkage.yaml': ('application/yaml', b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n' * 10),
+}
+
+
+class Phase(IntEnum):
+    """What the recording was doing; in the order in which it comes to it."""
+
+    STARTING = 0
+    MAKING = 1
+    RECORDING = 2
+    FLUSHING = 3
+    SPLITTING = 4
+    CLOSING = 5
+    CLOSED = 6
+
+
+class Plan(NamedTuple):
+    """
+    One kill.
+
+    Attributes
+    ----------
+    number
+        Which.
+    storage
+        How the bag is stored.
+    ticks
+        How many are recorded before the bag is closed.
+    aim
+        The phase whose beginning the delay counts from; MAKING, the first, for any instant.
+    time
+        The how manyth time that the phase comes, from 1 on.
+    delay
+        From there to the kill [s].
+
+    """
+
+    number: int
+    storage: Storage
+    ticks: int
+    aim: Phase
+    time: int
+    delay: float
+
+
+AIMS: Mapping[Phase, float] = {
+    # The longest delay from the beginning of a phase [s]: on a fast disk twice what it takes.
+    Phase.MAKING: 0.008,
+    Phase.FLUSHING: 0.002,
+    Phase.SPLITTING: 0.010,
+    Phase.CLOSING: 0.006,
+}
+
+
+def plans(seed: int, kills: int, aimed: int, seconds: tuple[float, float]) -> list[Plan]:
+    """
+    Return kills at random instants of runs of random settings, then some aimed at what is short.
+
+    Parameters
+    ----------
+    seed
+        Of all that is random.
+    kills, aimed
+        How many of each.
+    seconds
+        Shortest and longest run.
+
+    """
+    return [
+        _plan(Random(f'{seed} {number}'), number, aimed=number >= kills, seconds=seconds)
+        for number in range(kills + aimed)
+    ]
+
+
+def _plan(random: Random, number: int, *, aimed: bool, seconds: tuple[float, float]) -> Plan:
+    run = random.uniform(*seconds)
+    phases = [*AIMS]
+    aim = phases[number % len(phases)] if aimed else Phase.MAKING
+    kinds = ['', 'bytes', 'seconds']
+    if aim is Phase.SPLITTING:
+        kinds, run = kinds[1:], seconds[1]
+    split = random.choice(kinds)
+    storage = Storage(
+        flush_period=random.choice(FLUSH_PERIODS),
+        split_bytes=random.randrange(20_000, 120_000) if split == 'bytes' else 0,
+        split_seconds=random.uniform(0.05, 0.4) if split == 'seconds' else 0.0,
+        keep_files=random.choice([0, 2, 3]) if split else 0,
+        compression=random.choice(COMPRESSIONS),
+    )
+    delay = random.uniform(0.0, AIMS[aim] if aimed else run + 0.1)
+    time = random.randrange(1, 5) if aim in (Phase.FLUSHING, Phase.SPLITTING) else 1
+    return Plan(number, storage, round(run * 1e9 / PERIOD_NS), aim, time, delay)
+
+
+_WRITE = (
+    JointStateWriter(['crank_joint']).write,
+    JointStateWriter(['coupler_joint', 'rocker_joint']).write,
+)
+
+
+def message(number: int, time: int) -> tuple[int, int, int, bytes]:
+    """
+    Return the message of a number as it is offered: a crank's and joint states in turn.
+
+    Parameters
+    ----------
+    number
+        From 0 on; two for each tick.
+    time
+        When it is offered, in [ns]; it and the number are in its bytes.
+
+    """
+    topic = number % len(TOPICS)
+    joints = (float(number), 0.1 * number)[: topic + 1]
+    return topic, time, time - 137_000, _WRITE[topic](time, joints, (1.0, -1.0)[: topic + 1], ())
+
+
+def expected(number: int, time: int) -> BagMessage:
+    """Return the message of a number as the bag has to give it."""
+    topic, log_time, publish_time, data = message(number, time)
+    return BagMessage(TOPICS[topic].name, log_time, publish_time, data)

@@ -1,0 +1,159 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A sample of the disk campaign: calls that fail, disks that fill, and one that stalls."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from campaigns.disk import filling, stalling
+from campaigns.disk.failing import attempt, injections, Part, Tried
+from campaigns.disk.faults import FAULTS
+from campaigns.disk.judge import EARLY, Expectation, judge, REFUSED, WHOLE
+from campaigns.disk.notifications import why_not
+from campaigns.disk.small_disks import Disk, NotPermittedError
+from campaigns.disk.subject import expected_messages, MESSAGES, record, Recorded, SETTINGS
+from campaigns.processes import results_of
+from linkage_ros.bag.metadata import METADATA_FILE
+import pytest
+
+EVERY = 23
+"""A sample of one in so many; it shares no divisor with the ways in which a call can fail."""
+
+
+@pytest.fixture(scope='module')
+def tried() -> list[Tried]:
+    if why_not():
+        pytest.skip(why_not())
+    work = []
+    for first, setting in enumerate(SETTINGS):
+        (dry,) = next(results_of(attempt, [Part(setting, (None,))] * 2, 2))
+        assert (dry.outcome.faults, dry.outcome.verdict) == ([], WHOLE)
+        chosen = tuple([*injections(dry.calls)][first::EVERY])
+        work += [Part(setting, chosen[:25]), Part(setting, chosen[25:])]
+    return [one for some in results_of(attempt, work, 2) for one in some]
+
+
+def test_a_call_that_fails_costs_nothing_that_is_counted(tried: list[Tried]) -> None:
+    assert [(one.injection, one.outcome.faults) for one in tried if one.outcome.faults] == []
+
+
+def test_the_sample_has_seen_all_there_is_to_see(tried: list[Tried]) -> None:
+    assert len(tried) > 100
+    verdicts = [one.outcome.verdict for one in tried]
+    assert min(verdicts.count(verdict) for verdict in (EARLY, WHOLE, REFUSED)) > 5
+    struck = [one.struck for one in tried if one.struck]
+    assert len(struck) == len(tried)
+    assert {call.what for call in struck} >= {'file', 'metadata', 'folder', 'reserve'}
+    assert {call.phase for call in struck} == {'beginning', 'recording', 'closing'}
+    assert {one.injection.fault for one in tried if one.injection} >= {
+        fault for fault in FAULTS if fault != 'EOPNOTSUPP'
+    }
+
+
+@pytest.mark.parametrize('disk', [Disk('tmpfs', 'tmpfs', 4), Disk('ext4', 'ext4', 6, 20)])
+@pytest.mark.parametrize(
+    ('storage', 'filler'),
+    [
+        ('one file, a floor', 'the recording alone'),
+        ('split', 'another that takes whatever is freed'),
+        ('ring of 3', 'the recording alone'),
+    ],
+)
+def test_a_disk_that_fills(disk: Disk, storage: str, filler: str) -> None:
+    try:
+        filled = filling.fill(disk, storage, filler, 40_000)
+    except NotPermittedError as error:
+        pytest.skip(str(error))
+    assert filled.outcome.faults == []
+    assert filled.outcome.recorded > 1000
+    assert bool(filled.failure) == (not storage.startswith('ring'))
+
+
+@pytest.fixture(params=['the kernel', 'the process'])
+def stalled(request: pytest.FixtureRequest) -> stalling.Stalled:
+    pytest.importorskip('rclpy')
+    plan = stalling.Plan('1 s', 3.0, 1.0, queue=20_000, rate=200)
+    try:
+        return stalling.run(plan, frozen=request.param == 'the kernel')
+    except NotPermittedError as error:
+        pytest.skip(str(error))
+
+
+@pytest.mark.ros
+def test_a_disk_that_stalls_costs_nothing(stalled: stalling.Stalled) -> None:
+    assert stalled.faults == []
+    assert stalled.total('received') == stalled.total('recorded') > 200
+    # The ticks went on meanwhile: none of them waited for the disk.
+    assert stalled.during > 100
+
+
+def at_rest(folder: Path) -> Recorded:
+    return record(folder, SETTINGS['one file'], lambda phase: None)
+
+
+def test_the_judge_sees_a_count_too_many(tmp_path: Path) -> None:
+    done = at_rest(tmp_path / 'bag')
+    received, recorded, *rest = done.counts[0]
+    done.counts[0] = (received + 1, recorded + 1, *rest)  # type: ignore[assignment]
+    outcome = judge(done, tmp_path / 'bag', Expectation(expected_messages(MESSAGES)))
+    assert any('received' in fault for fault in outcome.faults)
+    assert any('says nothing, and holds' in fault for fault in outcome.faults)
+
+
+FALSE = {
+    'an exception': ({'escaped': 'KeyError: 1'}, 'escaped'),
+    'two lines': ({'failure': 'bag: it\nended; why'}, 'said badly'),
+    'no remedy': ({'failure': 'it ended'}, 'said badly'),
+    'a failure that is none': ({'failure': '{folder}: it ended; mend it'}, 'metadata say nothing'),
+}
+
+
+@pytest.mark.parametrize('name', FALSE)
+def test_the_judge_sees_what_is_said_badly(tmp_path: Path, name: str) -> None:
+    done = at_rest(tmp_path / 'bag')
+    said, fault = FALSE[name]
+    done = replace(done, **{k: v.format(folder=tmp_path / 'bag') for k, v in said.items()})
+    outcome = judge(done, tmp_path / 'bag', Expectation(expected_messages(MESSAGES)))
+    assert any(fault in found for found in outcome.faults)
+
+
+def test_the_judge_sees_what_is_broken(tmp_path: Path) -> None:
+    done = at_rest(tmp_path / 'bag')
+    expectation = Expectation(expected_messages(MESSAGES))
+    assert judge(done, tmp_path / 'bag', expectation).faults == []
+    (tmp_path / 'bag' / 'metadata.yaml.tmp').touch()
+    (tmp_path / 'bag' / METADATA_FILE).write_text('rosbag2_bagfile_information: {version')
+    faults = judge(done, tmp_path / 'bag', expectation).faults
+    assert 'left behind: metadata.yaml.tmp' in faults
+    assert any(fault.startswith('metadata: ') for fault in faults)
+    assert judge(None, tmp_path / 'bag', expectation).faults == ['came to no end']
+
+
+@pytest.mark.parametrize(
+    'found',
+    [
+        expected_messages(10)[::-1],
+        expected_messages(10)[::2],
+        [*expected_messages(5), expected_messages(5)[-1]],
+        [expected_messages(1)[0]._replace(data=b'')],
+    ],
+    ids=['another order', 'gaps', 'one twice', 'other bytes'],
+)
+def test_a_run_is_in_order_whole_and_true(found: list) -> None:
+    assert Expectation(expected_messages(20)).run_of(found) is None
+    assert Expectation(expected_messages(20)).run_of(expected_messages(20)[3:9]) == range(3, 9)

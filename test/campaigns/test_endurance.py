@@ -1,0 +1,138 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A sample of the endurance campaign, and what its judge says of series made up for it."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+import os
+from pathlib import Path
+import shutil
+
+from campaigns.endurance import over_dds
+from campaigns.endurance.accelerated import Plan, run
+from campaigns.endurance.account import shortcomings
+from campaigns.endurance.memory import flatness, MOST_GROWTH, Usage, usage
+from linkage_ros.bag.account import Account
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.writer import BagWriter
+import pytest
+
+MINUTES = 15.0 / 60.0  # h
+
+
+@pytest.mark.parametrize('scene', ['demo', 'excavator_delay', 'worn_press'])
+def test_a_quarter_of_an_hour_is_flat_and_accounted_for(scene: str) -> None:
+    done = run(Plan(scene, MINUTES / (3 if scene == 'worn_press' else 1), 100.0))
+    assert done.faults == []
+    assert flatness(done.samples).flat
+    counts = done.summary.topics[0]
+    assert counts.received == done.published > 0
+    assert counts.let_go > 0
+
+
+@pytest.mark.ros
+@pytest.mark.skipif(find_spec('rclpy') is None, reason='rclpy is not installed')
+def test_seconds_over_dds_are_accounted_for_and_replay() -> None:
+    done = over_dds.run(6.0 / 60.0)
+    assert done.faults == []
+    assert done.replayed['verdict'] == 'identical'
+    assert done.account['recorded']['/joint_states'] > 1000
+    assert len(done.samples) > 20
+    found = flatness(done.samples)
+    assert (found.files, found.threads) == (0, 0)
+
+
+def series(memory, files=lambda _: 8, threads=lambda _: 2) -> list[Usage]:
+    """Return 101 samples of a run of 100 s."""
+    return [Usage(float(t), round(memory(t)), files(t), threads(t)) for t in range(101)]
+
+
+HELD = {
+    # what was held by the second, and whether that is flat
+    'the same': (series(lambda t: 30_000), True),
+    'more at first': (series(lambda t: 30_000 + 5000 * min(t, 20) / 20), True),
+    'a peak': (series(lambda t: 30_000 + 50_000 * (t == 60)), True),
+    'up and down': (series(lambda t: 30_000 + 4000 * (t % 2)), True),
+    'a little more': (series(lambda t: 30_000 + 0.9 * MOST_GROWTH * t / 75), True),
+    'more and more': (series(lambda t: 30_000 + 1.1 * MOST_GROWTH * t / 75), False),
+    'ever more, in steps': (series(lambda t: 30_000 + 100 * MOST_GROWTH * (t // 10)), False),
+    'a file left open': (series(lambda t: 30_000, files=lambda t: 8 + (t > 50)), False),
+    'a file open for moments': (series(lambda t: 30_000, files=lambda t: 8 + t % 2), True),
+    'a thread more': (series(lambda t: 30_000, threads=lambda t: 2 + (t > 70)), False),
+}
+
+
+@pytest.mark.parametrize('name', HELD)
+def test_what_counts_as_flat(name: str) -> None:
+    samples, flat = HELD[name]
+    assert flatness(samples).flat is flat
+
+
+def test_the_slope_is_that_of_a_line_whatever_a_few_samples_say() -> None:
+    line = series(lambda t: 30_000 + 40 * t)
+    for at in (40, 55, 90):
+        line[at] = line[at]._replace(resident=90_000)
+    assert flatness(line).slope == 40.0
+    assert flatness(line).growth == 40.0 * 75
+
+
+def test_memory_that_is_held_is_seen_and_so_are_files_and_threads() -> None:
+    before = usage(0.0)
+    held = b'1' * 64_000_000
+    read, write = os.pipe()
+    after = usage(1.0, os.getpid())
+    os.close(read)
+    os.close(write)
+    assert after.resident - before.resident >= 0.9 * len(held) / 1024
+    assert after.files == before.files + 2
+    assert after.threads == before.threads >= 1
+
+
+def write_bag(folder: Path, account: Account | None) -> Path:
+    """Write three messages of one topic, with this account of it."""
+    writer = BagWriter(folder, [Topic('/a', 'std_msgs/msg/Empty', '', '')])
+    writer.account = lambda summary: account
+    for time in range(3):
+        writer.write(0, time, time, b'\0\1\0\0')
+    writer.close()
+    return folder
+
+
+ACCOUNTS = {
+    'whole': (Account([3], [3], [0], [0]), []),
+    'let go': (Account([9], [3], [0], [6]), []),
+    'none': (None, ['the bag has no account']),
+    'open': (Account([4], [3], [0], [0]), ['/a: the account does not close']),
+    'dropped': (Account([5], [3], [2], [0]), ['/a: 2 dropped']),
+    'more than is there': (
+        Account([4], [4], [0], [0]),
+        ['/a: 4 recorded by the account, 3 in the bag'],
+    ),
+}
+
+
+@pytest.mark.parametrize('name', ACCOUNTS)
+def test_what_does_not_add_up_is_said(tmp_path: Path, name: str) -> None:
+    account, said = ACCOUNTS[name]
+    assert shortcomings(write_bag(tmp_path / 'bag', account)) == said
+
+
+def test_a_bag_that_is_not_there_is_said(tmp_path: Path) -> None:
+    folder = write_bag(tmp_path / 'bag', None)
+    shutil.rmtree(folder)
+    (said,) = shortcomings(folder)
+    assert 'does not exist' in said
