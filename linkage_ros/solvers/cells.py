@@ -1,0 +1,301 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The joints of a linkage and their derivatives over cells of its input, enclosed for certain.
+
+Over a cell, an interval T of the input with the middle t, the loop equations F(T, y) = 0 of a
+group of links are shown to have one solution y within ρ of what the closed form has at t, by the
+operator of Krawczyk (R. Krawczyk, Computing 4, 1969): with Y near F_y⁻¹ it is so where::
+
+    |Y·F(T, y(t))| + |1 − Y·F_y(T, y(t) ± ρ)|·ρ < ρ
+
+All Taylor coefficients of y by the input follow from F_y·y_k = −(what F_k comes to with y_k = 0),
+as discs that hold them over the whole cell. Groups are taken in the order of solution, each with
+the discs of those before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from linkage_ros.solvers.discs import Disc, facing, Jet, jet_product, times, total, ZERO
+from linkage_ros.solvers.loops import Loops, Vector
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_ROUNDING = 2.0**-50
+_UP = 1.0 + 2.0**-40
+"""What makes up for the rounding of bounds that are worked out in matrices."""
+
+
+class Cells(NamedTuple):
+    """
+    Cells of the input, in the coordinate of the input, and the closed form in their middles.
+
+    Attributes
+    ----------
+    middle, half
+        Of each cell.
+    coordinates
+        A row for each coordinate, NaN where the loops do not close.
+    pins
+        Likewise, of what iterations have placed.
+
+    """
+
+    middle: Array
+    half: Array
+    coordinates: Array
+    pins: NDArray[np.complex128]
+
+
+class Unknowns(NamedTuple):
+    """
+    The solution of a group over each cell, an array (cells, unknowns) each.
+
+    Attributes
+    ----------
+    middle
+        What the closed form has.
+    box
+        ρ: so near to it there is no other solution.
+    radius
+        And so near to it is the one that there is.
+    turning
+        For each unknown whether it is an angle.
+
+    """
+
+    middle: Array
+    box: Array
+    radius: Array
+    turning: Mask
+
+
+class Enclosure(NamedTuple):
+    """
+    What holds over each cell.
+
+    Attributes
+    ----------
+    proven
+        Whether there is one solution.
+    jets
+        For each coordinate its Taylor coefficients by the coordinate of the input.
+    groups
+        The unknowns of each group.
+
+    """
+
+    proven: Mask
+    jets: dict[int, Jet]
+    groups: list[Unknowns]
+
+
+def enclose(groups: Sequence[Loops], cells: Cells, order: int) -> Enclosure:
+    """
+    Enclose all coordinates.
+
+    Parameters
+    ----------
+    groups
+        The loops of a linkage of one input.
+    cells
+        Where.
+    order
+        Up to which.
+
+    """
+    zero = [ZERO] * (order + 1)
+    given: Jet = [Disc(cells.middle, cells.half), Disc(1.0, 0.0), *zero][: order + 1]
+    jets: dict[int, Jet] = {0: zero, 1: given}
+    pins: dict[int, Jet] = {}
+    proven: Mask = np.asarray(np.isfinite(cells.coordinates).all(axis=0))
+    found = []
+    for loops in groups:
+        group = _Group(loops, cells, jets, pins)
+        unknowns, held = group.find(order)
+        proven &= held
+        found.append(unknowns)
+    return Enclosure(proven, jets, found)
+
+
+class _Group:
+    """A group of links, with what is known before it."""
+
+    def __init__(
+        self, loops: Loops, cells: Cells, jets: dict[int, Jet], pins: dict[int, Jet]
+    ) -> None:
+        self._loops = loops
+        self._jets, self._pins = jets, pins
+        self._count = len(cells.middle)
+        rows = [cells.coordinates[k] for k in loops.coordinates]
+        rows += [part for k in loops.pins for part in (cells.pins[k].real, cells.pins[k].imag)]
+        self._middle = np.nan_to_num(np.array(rows)).T
+        turning = {k for equation in loops.equations for vector in equation for k, _ in vector[1]}
+        self._turning = np.array(
+            [k in turning for k in loops.coordinates] + [False] * (2 * len(loops.pins))
+        )
+
+    def find(self, order: int) -> tuple[Unknowns, Mask]:
+        """Append the jets of the unknowns; return their solution, and where it is proven."""
+        middle = self._middle
+        self._set(0, middle, np.zeros_like(middle))
+        slopes, _ = self._slopes()
+        inverse, regular = _inverse(slopes)
+        step, spread = self._step(0, inverse)
+        first = np.abs(step) + spread
+        box = 2.0 * first
+        self._set(0, middle, box)
+        radius = (first + _image(self._loss(inverse), box)) * _UP
+        proven = regular & (radius < box).all(axis=1)
+        self._set(0, middle, radius)
+        loss = self._loss(inverse)
+        worst = loss.sum(axis=2).max(axis=1)
+        proven &= worst < 1.0
+        for k in range(1, order + 1):
+            for jets, numbers in (
+                (self._jets, self._loops.coordinates),
+                (self._pins, self._loops.pins),
+            ):
+                for number in numbers:
+                    jets[number].append(ZERO)
+            step, spread = self._step(k, inverse)
+            with np.errstate(all='ignore'):
+                largest = (np.abs(step) + spread).max(axis=1) / (1.0 - worst)
+            self._set(k, step, (spread + loss.sum(axis=2) * largest[:, None]) * _UP)
+        return Unknowns(middle, box, radius, self._turning), proven
+
+    def _step(self, order: int, inverse: Array) -> tuple[Array, Array]:
+        """Return −Y·F of an order: middles and radii."""
+        errors, spread = self._errors(order)
+        n = errors.shape[1]
+        radius = _image(np.abs(inverse), spread + n * _ROUNDING * np.abs(errors))
+        return -_image(inverse, errors), radius * _UP
+
+    def _loss(self, inverse: Array) -> Array:
+        """Return a bound of |1 − Y·F_y| over the unknowns as they are set."""
+        slopes, spread = self._slopes()
+        n = slopes.shape[1]
+        size = np.abs(inverse)
+        off = np.abs(np.eye(n) - inverse @ slopes) + n * _ROUNDING * (size @ np.abs(slopes) + 1.0)
+        loss: Array = (off + size @ spread) * _UP
+        return loss
+
+    def _set(self, order: int, middle: Array, radius: Array) -> None:
+        """Set the unknowns of an order."""
+        coordinates, pins = self._loops.coordinates, self._loops.pins
+        for column, k in enumerate(coordinates):
+            jet = self._jets.setdefault(k, [ZERO])
+            jet[order] = Disc(middle[:, column], radius[:, column])
+        for number, k in enumerate(pins):
+            column = len(coordinates) + 2 * number
+            jet = self._pins.setdefault(k, [ZERO])
+            place = middle[:, column] + 1j * middle[:, column + 1]
+            jet[order] = Disc(place, radius[:, column] + radius[:, column + 1])
+
+    def _errors(self, order: int) -> tuple[Array, Array]:
+        """Return what the equations come to at an order: middles and radii, (cells, equations)."""
+        middles, radii = [], []
+        for equation in self._loops.equations:
+            found = total([self._jet(vector, order)[order] for vector in equation])
+            middles += [np.real(found.center), np.imag(found.center)]
+            radii += [found.radius, found.radius]
+        for terms, constant, turning in self._loops.balances:
+            parts = [times(self._jets[k][order], sign) for k, sign in terms]
+            found = total([*parts, Disc(constant if order == 0 else 0.0, 0.0)])
+            center = np.real(found.center)
+            if turning and order == 0:
+                center = np.remainder(center + np.pi, 2.0 * np.pi) - np.pi
+            middles.append(center)
+            radii.append(found.radius + 4.0 * _ROUNDING)
+        shape = (self._count,)
+        return (
+            np.stack([np.broadcast_to(one, shape) for one in middles], axis=1),
+            np.stack([np.broadcast_to(one, shape) for one in radii], axis=1),
+        )
+
+    def _jet(self, vector: Vector, order: int) -> Jet:
+        factor, turns, slide, pin = vector
+        if pin >= 0:
+            return [times(disc, factor) for disc in self._pins[pin][: order + 1]]
+        if turns:
+            angle = [
+                total([times(self._jets[k][i], sign) for k, sign in turns])
+                for i in range(order + 1)
+            ]
+            way = facing(angle)
+        else:
+            way = [Disc(1.0 + 0j, 0.0), *[ZERO] * order]
+        if slide >= 0:
+            way = jet_product(way, self._jets[slide][: order + 1])
+        return [times(disc, factor) for disc in way]
+
+    def _slopes(self) -> tuple[Array, Array]:
+        """Return the derivatives of equations by unknowns, (cells, equations, unknowns)."""
+        coordinates, pins = self._loops.coordinates, self._loops.pins
+        n = self._middle.shape[1]
+        middle, radius = np.zeros((2, self._count, n, n))
+        for number, equation in enumerate(self._loops.equations):
+            row = 2 * number
+            for vector in equation:
+                for column, slope in self._by_unknowns(vector, coordinates, pins):
+                    middle[:, row, column] += np.real(slope.center)
+                    middle[:, row + 1, column] += np.imag(slope.center)
+                    radius[:, [row, row + 1], column] += np.broadcast_to(
+                        slope.size * _ROUNDING + slope.radius, (self._count,)
+                    )[:, None]
+        for row, balance in enumerate(self._loops.balances, 2 * len(self._loops.equations)):
+            for k, sign in balance.terms:
+                if k in coordinates:
+                    middle[:, row, coordinates.index(k)] += sign
+        return middle, radius
+
+    def _by_unknowns(
+        self, vector: Vector, coordinates: tuple[int, ...], pins: tuple[int, ...]
+    ) -> list[tuple[int, Disc]]:
+        factor, turns, slide, pin = vector
+        if pin in pins:
+            column = len(coordinates) + 2 * pins.index(pin)
+            return [(column, Disc(factor, 0.0)), (column + 1, Disc(1j * factor, 0.0))]
+        found: list[tuple[int, Disc]] = []
+        whole = self._jet(vector, 0)[0]
+        for k, sign in turns:
+            if k in coordinates:
+                found.append((coordinates.index(k), times(whole, sign * 1j)))
+        if slide in coordinates:
+            unit = self._jet(vector._replace(slide=-1), 0)[0]
+            found.append((coordinates.index(slide), unit))
+        return found
+
+
+def _image(matrix: Array, vector: Array) -> Array:
+    """Return the products of matrices and vectors, cell by cell."""
+    found: Array = np.einsum('cij,cj->ci', matrix, vector)
+    return found
+
+
+def _inverse(matrices: Array) -> tuple[Array, Mask]:
+    """Return the inverse of each, and which have one."""
+    regular: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
+    safe = np.where(regular[:, None, None], matrices, np.eye(matrices.shape[1]))
+    regular &= np.abs(np.linalg.det(safe)) > 0.0
+    safe = np.where(regular[:, None, None], safe, np.eye(matrices.shape[1]))
+    return np.linalg.inv(safe), regular

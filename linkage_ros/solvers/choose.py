@@ -1,0 +1,165 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The cheapest solver that proves an accuracy of the published positions, by a short timing here.
+
+The closed form always qualifies: it is off by a few times what the rounding of the lengths alone
+makes of the answer. A table qualifies by its `proof`. Newton's method qualifies where the loops
+are those of one RRR dyad: after a last correction δ the angles are off by less than::
+
+    (1 + r)·δ²/(2·sin μ)      r the ratio of the two links, sin μ ≥ `LEAST_SINE`
+
+which is what is left of the second order of the loop (L. V. Kantorovich, 1948). In a chain, errors
+of one dyad grow in the next by what is not known beforehand, so there it is not chosen.
+
+What is faster by less than a tenth is not faster: then the closed form stays. A timing is not
+repeatable, so that a recorded run says what was chosen, and its replay does not choose again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from statistics import median
+from time import perf_counter
+from typing import Any
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.groups import Dyad, Iterated
+from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.survey import usual_inputs, Way
+from linkage_ros.solvers.newton import NewtonClosure
+from linkage_ros.solvers.newton_dyad import LEAST_SINE
+from linkage_ros.solvers.solver import Choice, Solver
+from linkage_ros.solvers.table import TableClosure
+
+_LONGEST = 0.1
+"""Of the timing of one solver, in [s]."""
+
+_STATES = 32
+_ROUNDS = 25
+_FASTER = 0.9
+_NAMES = {'closed_form': 'closed form', 'newton': "Newton's method", 'table': 'table'}
+
+
+def choose(linkage: Linkage, accuracy: float) -> Closure:
+    """
+    Return the closure that takes the least time of those that prove an accuracy.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    accuracy
+        Of the published positions, in [rad] or [m].
+
+    """
+    closed = Solver(Closure(linkage))
+    able: dict[str, Solver] = {'closed_form': closed}
+    against = {}
+    for name, build in (('table', TableClosure), ('newton', _newton)):
+        found = _attempt(build, linkage, accuracy)
+        if isinstance(found, Solver):
+            able[name] = found
+        else:
+            against[name] = found
+    times = _times(closed, able)
+    fastest = min(times, key=lambda name: times[name])
+    if times[fastest] > _FASTER * times['closed_form']:
+        fastest = 'closed_form'
+    chosen = able[fastest]
+    why = [f'{_NAMES[fastest]}{_proven(chosen)}, {1e6 * times[fastest]:.2g} µs a state']
+    why += [
+        f'{_NAMES[name]} {1e6 * time:.2g} µs' for name, time in times.items() if name != fastest
+    ]
+    why += [f'{_NAMES[name]}: {reason}' for name, reason in against.items()]
+    parameters = {} if fastest == 'closed_form' else {'tolerance': accuracy}
+    chosen.choice = Choice(fastest, parameters, '; '.join(why))
+    return chosen
+
+
+def _attempt(
+    build: Callable[[Linkage, float], Solver], linkage: Linkage, accuracy: float
+) -> Solver | str:
+    """Return a solver that proves an accuracy, or why there is none."""
+    try:
+        return build(linkage, accuracy)
+    except DefinitionError as error:
+        return error.reason
+
+
+def only_closed_form(linkage: Linkage, why: str) -> Closure:
+    """Return the closed form where nothing else would do, with the reason."""
+    closed = Solver(Closure(linkage))
+    closed.choice = Choice('closed_form', {}, f'closed form: {why}')
+    return closed
+
+
+def _newton(linkage: Linkage, accuracy: float) -> NewtonClosure:
+    """Return Newton's method with a tolerance that proves an accuracy; refuse where none does."""
+    found = NewtonClosure(linkage, accuracy)
+    groups = [g for g in found.structure.groups if isinstance(g, Dyad | Iterated)]
+    if len(groups) > 1 or not isinstance(groups[0], Dyad) or groups[0].kind != 'RRR':
+        raise DefinitionError('accuracy', 'proven for one RRR dyad only', '')
+    dyad = groups[0]
+    if any(len(body) > 1 for body in dyad.bodies):
+        raise DefinitionError('accuracy', 'not proven for links that change their length', '')
+    lengths = []
+    for link, outer in zip((dyad.inner.link, dyad.inner.to), dyad.outer, strict=True):
+        points = found.structure.links[link]
+        lengths.append(abs(complex(*points[dyad.inner.name]) - complex(*points[outer.name])))
+    ratio = max(lengths) / min(lengths)
+    if 2.0 * (1.0 + ratio) * accuracy > LEAST_SINE:
+        raise DefinitionError('accuracy', 'not proven for so little of it', '')
+    return found
+
+
+def _proven(found: Solver) -> str:
+    if not isinstance(found, TableClosure):
+        return ''
+    return f' of {found.knots} knots, proven to {found.proven:.2g}'
+
+
+def _times(closed: Closure, able: dict[str, Solver]) -> dict[str, float]:
+    """Return the median time of a state, of each in [s], all in turn."""
+    states = _states(closed)
+    spent: dict[str, list[float]] = {name: [] for name in able}
+    for name, found in able.items():
+        _time(found.position, states)  # what is worked out once is not timed
+        spent[name].clear()
+    for _ in range(_ROUNDS):
+        for name, found in able.items():
+            if sum(spent[name]) * len(states) < _LONGEST:
+                spent[name].append(_time(found.position, states))
+    return {name: median(times) for name, times in spent.items()}
+
+
+def _time(position: Callable[..., Any], states: Sequence[tuple[float, ...]]) -> float:
+    begun = perf_counter()
+    for inputs in states:
+        position(*inputs)
+    return (perf_counter() - begun) / len(states)
+
+
+def _states(closed: Closure) -> list[tuple[float, ...]]:
+    """Return inputs to try: along the widest range, or about the pose of several inputs."""
+    if len(closed.linkage.inputs) > 1:
+        usual = usual_inputs(closed)
+        return [tuple(x + 1e-3 * k for x in usual) for k in range(_STATES)]
+    interval = Way(closed).widest_range
+    assert interval is not None, 'reading the file has proved that it closes somewhere'
+    low, high = interval.lowest, interval.highest
+    return [(low + (high - low) * (k + 0.5) / _STATES,) for k in range(_STATES)]

@@ -1,0 +1,36 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The closed form by its name, for a scene that says so; without a word it is the same."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Linkage
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedFormParameters:
+    """Each dyad in closed form: as accurate as doubles allow, toggles and change points too."""
+
+
+PARAMETERS = ClosedFormParameters
+
+
+def build(_parameters: ClosedFormParameters, linkage: Linkage) -> Closure:
+    """Build the closure."""
+    return Closure(linkage)

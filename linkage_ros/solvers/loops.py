@@ -1,0 +1,233 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The loop equations of a linkage, as polygons of vectors.
+
+A point of a link is walked to from the ground, or from a pin that is known, along arms and slides;
+two ways to one place are a loop. With the coordinates x of a closure every vector of it is::
+
+    c·e^{iφ}·s        φ = Σ ±x_j        s = 1, or the slide x_k
+
+and an equation says that the vectors of a loop come to 0. Each group of links, a dyad or links
+that are iterated, has as many of these as determine what it appends to the coordinates.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from linkage_ros.kinematics.groups import Driven, Dyad, Iterated, Joint, Structure
+from linkage_ros.kinematics.known_links import KnownLinks
+from linkage_ros.kinematics.layout import Angle
+from linkage_ros.kinematics.linkage import GROUND, Linkage
+
+Turns = tuple[tuple[int, float], ...]
+"""Coordinates and their signs, which add up to an angle."""
+
+
+class Vector(NamedTuple):
+    """
+    c·e^{iφ}·s.
+
+    Attributes
+    ----------
+    factor
+        c, in the unit of the closure's lengths.
+    turns
+        Of φ.
+    slide
+        Number of the coordinate s; −1 for 1.
+    pin
+        Number of a pin whose place stands for e^{iφ}·s; −1 for none.
+
+    """
+
+    factor: complex
+    turns: Turns = ()
+    slide: int = -1
+    pin: int = -1
+
+
+class Balance(NamedTuple):
+    """An angle that a group keeps: Σ ±x_j + constant = 0, but for whole turns if it turns."""
+
+    terms: Turns
+    constant: float
+    turning: bool = True
+
+
+class Loops(NamedTuple):
+    """
+    What a group of links is solved by.
+
+    Attributes
+    ----------
+    coordinates, pins
+        Numbers of what it appends.
+    equations
+        Each a sum of vectors that is 0.
+    balances
+        Angles and slides that it keeps; a dyad has none.
+
+    """
+
+    coordinates: tuple[int, ...]
+    pins: tuple[int, ...]
+    equations: tuple[tuple[Vector, ...], ...]
+    balances: tuple[Balance, ...] = ()
+
+
+class LoopFinder:
+    """
+    Finds the loops of a closure.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    structure
+        Its groups.
+    known
+        All its links, as a closure knows them.
+
+    """
+
+    def __init__(self, linkage: Linkage, structure: Structure, known: KnownLinks) -> None:
+        self._known = known
+        self._inputs = linkage.inputs
+        self._sliders = linkage.sliders
+        self._structure = structure
+        self._turned: dict[int, tuple[int, tuple[int, float]]] = {}
+        for group in structure.groups:
+            if isinstance(group, Driven) and group.joint.kind == 'R':
+                self._note_turned(group.joint, 1 + group.index)
+
+    def find(self) -> list[Loops]:
+        """Return the loops of every group but those that are driven, in the order of solution."""
+        return [
+            self._dyad(group) if isinstance(group, Dyad) else self._iterated(group)
+            for group in self._structure.groups
+            if not isinstance(group, Driven)
+        ]
+
+    def turns(self, coordinate: int) -> Turns:
+        """Return a coordinate as a sum of those that are inputs or belong to a group."""
+        if not coordinate:
+            return ()
+        if coordinate not in self._turned:
+            return ((coordinate, 1.0),)
+        arm, turn = self._turned[coordinate]
+        return (*self.turns(arm), turn)
+
+    def difference(self, one: int, other: int) -> Turns:
+        """Return one coordinate less another as `turns` does."""
+        return (*self.turns(one), *((k, -sign) for k, sign in self.turns(other)))
+
+    def _note_turned(self, joint: Joint, index: int) -> None:
+        coordinate = self._known.angles[joint.link].coordinate
+        if coordinate != index:
+            sign = 1.0 if self._inputs[index - 1].child == joint.link else -1.0
+            arm = self._known.angles[joint.to].coordinate
+            self._turned[coordinate] = (arm, (index, sign))
+
+    def _dyad(self, dyad: Dyad) -> Loops:
+        slides = [
+            self._known.slides[joint.name].coordinate
+            for joint in (dyad.inner, *dyad.outer)
+            if joint.kind == 'P'
+        ]
+        # Of RPR both links have one angle; of PRP and RPP they turn with what carries them.
+        angles = [self._known.angles[joint.link].coordinate for joint in dyad.outer]
+        angles = angles[: 2 - len(slides)]
+        return Loops(tuple(sorted(angles + slides)), (), (self._equation(dyad.inner),))
+
+    def _iterated(self, group: Iterated) -> Loops:
+        known = self._known
+        slides, equations, balances = [], [], []
+        for joint in self._structure.joints:
+            if joint.link in group.links or joint.to in group.links:
+                equations.append(self._equation(joint))
+                if joint.kind == 'P':
+                    slides.append(joint.name)
+                    angle = self._sliders[joint.name].angle
+                    ends = known.blocks[joint.name], self._sliders[joint.name].along
+                    balances.append(self._between(*ends, angle))
+        for index, given in enumerate(self._inputs, 1):
+            if given.slider in slides:
+                slide = known.slides[given.slider]
+                terms = ((slide.coordinate, slide.sign), (index, -1.0))
+                balances.append(Balance(terms, slide.constant, turning=False))
+            elif given.child in group.links or given.parent in group.links:
+                turned = self._between(given.child, given.parent, 0.0)
+                balances.append(Balance((*turned.terms, (index, -1.0)), turned.constant))
+        coordinates = [known.angles[link].coordinate for link in group.links]
+        coordinates += [known.slides[name].coordinate for name in slides]
+        pins = tuple(known.held[link].pin for link in group.links)
+        return Loops(tuple(coordinates), pins, tuple(equations), tuple(balances))
+
+    def _between(self, link: str, to: str, angle: float) -> Balance:
+        one, other = self._known.angles[link], self._known.angles[to]
+        terms = self.difference(one.coordinate, other.coordinate)
+        return Balance(terms, one.constant - other.constant - angle)
+
+    def _equation(self, joint: Joint) -> tuple[Vector, ...]:
+        """Return the loop that a joint closes."""
+        points = self._known.points
+        if joint.kind == 'R':
+            one = self._walk(joint.link, points[joint.link][joint.name])
+            other = self._walk(joint.to, points[joint.to][joint.name])
+            return _merged([*one, *_negative(other)])
+        slider, slide = self._sliders[joint.name], self._known.slides[joint.name]
+        direction = complex(*slider.direction)
+        direction /= abs(direction)
+        # The joint of a dyad may be told from either end.
+        block, rail = self._known.blocks[joint.name], slider.along
+        line = self._known.angles[rail]
+        start = points[rail][slider.through] + slide.constant * direction
+        point = self._walk(block, points[block][slider.point])
+        through = self._walk(rail, start)
+        way = self._arm(line, slide.sign * direction, slide.coordinate)
+        return _merged([*point, *_negative([*through, way])])
+
+    def _walk(self, link: str, point: complex) -> list[Vector]:
+        if link == GROUND:
+            return [Vector(point)]
+        held = self._known.held[link]
+        way = []
+        if held.point != point:
+            way.append(self._arm(self._known.angles[link], point - held.point))
+        if held.pin >= 0:
+            return [*way, Vector(1.0 + 0j, pin=held.pin)]
+        if held.slide is not None:
+            unit = held.slide.sign * held.direction
+            way.append(self._arm(self._known.angles[held.link], unit, held.slide.coordinate))
+        return [*way, *self._walk(held.link, held.at)]
+
+    def _arm(self, angle: Angle, vector: complex, slide: int = -1) -> Vector:
+        return Vector(angle.unit * vector, self.turns(angle.coordinate), slide)
+
+
+def _negative(vectors: list[Vector]) -> list[Vector]:
+    return [vector._replace(factor=-vector.factor) for vector in vectors]
+
+
+def _merged(vectors: list[Vector]) -> tuple[Vector, ...]:
+    """Add up what turns and slides alike."""
+    sums: dict[tuple[Turns, int, int], complex] = {}
+    for factor, turns, slide, pin in vectors:
+        key = (tuple(sorted(turns)), slide, pin)
+        sums[key] = sums.get(key, 0j) + factor
+    return tuple(Vector(factor, *key) for key, factor in sums.items() if factor)

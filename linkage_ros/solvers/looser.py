@@ -1,0 +1,84 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Links that no dyad covers, iterated to a tolerance from the nearest knot of `Iteration`."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from linkage_ros.kinematics.equations import along, equations
+from linkage_ros.kinematics.iteration import IteratedPose, Iteration
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import State, Step
+import numpy as np
+
+_STEPS = 8
+_SINGULAR = 1e-6
+"""Conditioning below which so loose an answer is none."""
+
+_FARTHEST = 0.5
+"""In [rad], or in lengths: what moves farther is left to the iteration in small steps."""
+
+
+class _Looser(Iteration):
+    __slots__ = ('_tolerance',)
+
+    def __init__(self, strict: Iteration, tolerance: float) -> None:
+        for name in Iteration.__slots__:
+            setattr(self, name, getattr(strict, name))
+        self._tolerance = tolerance
+
+    def close(self, known: State) -> IteratedPose:
+        """Append as `Iteration.close`; where the first steps do not contract, it does."""
+        end = 1 + len(self._inputs)
+        start, _ = self._nearest(known[0][1:end])
+        if start is None:
+            return super().close(known)
+        unknowns, last = start, _FARTHEST
+        for _ in range(_STEPS):
+            errors, jacobian = equations(self._constraints, unknowns, known)
+            try:
+                step = np.linalg.solve(jacobian, -errors)
+            except np.linalg.LinAlgError:
+                break
+            length = float(np.abs(step).max())
+            if not length < 0.7 * last:
+                break
+            unknowns, last = unknowns + step, length
+            if length <= self._tolerance:
+                pose = IteratedPose(Status.CLOSED, 0.0, unknowns, jacobian)
+                if self.conditioning(pose) <= _SINGULAR:
+                    break
+                self._append(known, unknowns)
+                for slide in self._slides:
+                    known[0].append(along(slide, known, unknowns).real)
+                return pose
+        return super().close(known)
+
+
+def looser(step: Step, tolerance: float) -> Step:
+    """
+    Return an iteration that ends where the last correction is below a tolerance.
+
+    Parameters
+    ----------
+    step
+        An `Iteration`, with which its knots are shared.
+    tolerance
+        In [rad], and in the unit of the lengths.
+
+    """
+    return _Looser(cast('Iteration', step), tolerance)

@@ -1,0 +1,130 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A linkage whose loops are closed by another way than the closed form, and all else by that.
+
+What a tick asks for, `position`, `velocity` and `acceleration`, comes from the other way; ranges,
+nearness, points and drawings from the closed form at the same inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import NamedTuple
+
+from linkage_ros.kinematics.closure import (
+    Acceleration,
+    Closure,
+    PointMotion,
+    Position,
+    Velocity,
+)
+from linkage_ros.kinematics.nearness import Nearness
+from linkage_ros.kinematics.ranges import InputRange
+
+
+class Choice(NamedTuple):
+    """
+    What was chosen where a scene asks for an accuracy.
+
+    Attributes
+    ----------
+    solver, parameters
+        As the scene could have said them.
+    why
+        In words.
+
+    """
+
+    solver: str
+    parameters: Mapping[str, float]
+    why: str
+
+
+class Solver(Closure):
+    """
+    A closure that may close its loops by another way; as it stands, by the closed form.
+
+    Parameters
+    ----------
+    closed
+        The same linkage in closed form.
+
+    Attributes
+    ----------
+    closed
+        As given.
+    choice
+        Why it is this one, where the scene has not said.
+
+    """
+
+    def __init__(self, closed: Closure) -> None:
+        # Not built once more: an iterated linkage is followed through a turn for it.
+        vars(self).update(vars(closed))
+        self.closed = closed
+        self.choice: Choice | None = None
+
+    def exact(self, position: Position) -> Position:
+        """Return what the closed form has at the inputs of a position."""
+        return self.closed.position(*self._given(position.state.coordinates))
+
+    def placed(self, position: Position) -> Position:
+        """Return a position that knows angles, slides and pins of all links."""
+        return self.exact(position)
+
+    def points(self, position: Position) -> dict[tuple[str, str], complex]:
+        """Return every point of every link, by link and name, in the ground's frame, in [m]."""
+        return super().points(self.placed(position))
+
+    def link_angles(self, position: Position) -> dict[str, float]:
+        """Return the angle of every link to the ground, in [rad], not wrapped."""
+        return super().link_angles(self.placed(position))
+
+    def slide_values(self, position: Position) -> dict[str, float]:
+        """Return the slide of every slider, in [m]."""
+        return super().slide_values(self.placed(position))
+
+    def point_motion(
+        self, position: Position, velocity: Velocity, acceleration: Acceleration
+    ) -> dict[tuple[str, str], PointMotion]:
+        """Return place, velocity and acceleration of every point of every link."""
+        exact = self.exact(position)
+        rates = self.closed.velocity(exact, *self._given(velocity.state.coordinates))
+        changes = self._given(acceleration.state.coordinates)
+        accelerations = self.closed.acceleration(exact, rates, *changes)
+        return self.closed.point_motion(exact, rates, accelerations)
+
+    @cached_property
+    def input_ranges(self) -> tuple[InputRange, ...]:
+        """Where the single input closes every loop, in [rad] or [m]; of several inputs, none."""
+        return self.closed.input_ranges
+
+    @cached_property
+    def critical_inputs(self) -> tuple[float, ...]:
+        """Values of a single input at which a toggle or a change point lies, in [rad] or [m]."""
+        return self.closed.critical_inputs
+
+    def nearness(self, position: Position) -> Nearness:
+        """Return how near trouble a closed position is."""
+        return self.closed.nearness(self.exact(position))
+
+    def _given(self, coordinates: list[float]) -> list[float]:
+        """Return the inputs among coordinates, or their rates, in [rad] or [m]."""
+        factors = self._factors or [1.0] * len(self.linkage.inputs)
+        given = zip(coordinates[1:], factors, strict=False)
+        return [value / factor for value, factor in given]

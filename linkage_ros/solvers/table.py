@@ -1,0 +1,371 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A table over the range of the single input, interpolated, in the place of the closed form.
+
+Between two knots that are h apart, a published joint f is taken for a polynomial in t =
+(x − x_k)/h from 0 to 1: with ``linear`` the chord, with ``hermite`` the cubic that has the closed
+form's values f and derivatives f' at both ends (G. Birkhoff and A. Priver, J. Math. and Phys. 46,
+1967)::
+
+    chord    |f − p| ≤ h²/8·max|f''|         |f' − p'| ≤ h/2·max|f''|
+    cubic    |f − p| ≤ h⁴/384·max|f''''|     |f' − p'| ≤ √3·h³/216·max|f''''|
+                                             |f'' − p''| ≤ h²/12·max|f''''|
+
+Rates and accelerations are the polynomial's own derivatives: a tolerance is one of the positions.
+`proof` bounds the derivatives over the whole range; so where a tolerance is given and no knots, it
+is met everywhere, or the table is refused. Beyond its range a table knows nothing: there, and at
+the ends, the states are those of the closed form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import fmod, inf, tau
+from struct import Struct
+from time import perf_counter
+from typing import Any, cast, Literal, NamedTuple, TYPE_CHECKING
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
+from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import State
+from linkage_ros.kinematics.survey import Way
+from linkage_ros.parameters import number, point
+from linkage_ros.solvers.solver import Solver
+from linkage_ros.tuples import new
+import numpy as np
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.batch.solve import Batch
+    from numpy.typing import ArrayLike, NDArray
+
+Order = Literal['linear', 'hermite']
+ORDERS: dict[Order, int] = {'linear': 1, 'hermite': 3}
+"""Degree of the polynomials."""
+
+_CLOSED = Status.CLOSED
+_TURN_ROUNDED = 2.4492935982947064e-16
+"""2π less the double `tau`."""
+
+_FARTHEST = 2.0**40
+"""In [rad]: what turns farther has lost the digits that matter here."""
+
+
+@dataclass(frozen=True, slots=True)
+class TableParameters:
+    """A table of one input's range, interpolated by cubics."""
+
+    tolerance: float = number(
+        'proven bound of the error of positions', unit='rad or m', least=1e-12, most=1e-2
+    )
+    span: tuple[float, float] | tuple[()] = point(
+        'from where to where of the input; [] for all that it can reach. Beyond it the closed '
+        'form goes on',
+        (),
+        unit='rad or m',
+        most=1e6,
+    )
+
+
+PARAMETERS = TableParameters
+
+
+def build(parameters: TableParameters, linkage: Linkage) -> TableClosure:
+    """Build the closure."""
+    return TableClosure(linkage, parameters.tolerance, span=parameters.span or None)
+
+
+class _Part(NamedTuple):
+    """An interval of the table: the number of its first cell, and cells by the unit of input."""
+
+    low: float
+    high: float
+    first: int
+    density: float
+
+
+class TableClosure(Solver):
+    """
+    A linkage whose joints stand in a table.
+
+    Parameters
+    ----------
+    linkage
+        A linkage of one input.
+    tolerance
+        What positions are off by at most, in [rad] or [m]: the knots are as many as prove it.
+    knots
+        Or how many cells there are to each range of the input.
+    order
+        What is between the knots.
+    span
+        The range that the table covers, in [rad] or [m]; all that the input can reach, if not
+        said.
+
+    Attributes
+    ----------
+    knots
+        How many cells there are to each range.
+    memory
+        Of the table, in [bytes].
+    build_time
+        How long it took, with the proof, in [s].
+    proven, proven_rate
+        Bounds of the error of positions, in [rad] or [m], and of their derivatives by the input;
+        infinite where knots were given.
+
+    Raises
+    ------
+    DefinitionError
+        Where there are several inputs; where the tolerance cannot be proven.
+
+    """
+
+    def __init__(
+        self,
+        linkage: Linkage,
+        tolerance: float | None = None,
+        *,
+        knots: int | None = None,
+        order: Order = 'hermite',
+        span: tuple[float, float] | None = None,
+    ) -> None:
+        begun = perf_counter()
+        super().__init__(Closure(linkage))
+        if len(linkage.inputs) > 1:
+            raise DefinitionError(
+                'solver.table',
+                f'is of one input, and there are {len(linkage.inputs)}',
+                'write solver: closed_form',
+            )
+        self._period, intervals = self._intervals(span)
+        self.proven = self.proven_rate = inf
+        if knots is None:
+            from linkage_ros.solvers.loops import LoopFinder  # local import: to prove only
+            from linkage_ros.solvers.proof import knots_for  # local import: to prove only
+            from linkage_ros.solvers.task import Task  # local import: to prove only
+
+            assert tolerance is not None
+            finder = LoopFinder(linkage, self.structure, self._known)
+            joints = [
+                (finder.difference(i, j), factor, constant)
+                for i, j, factor, constant in self._terms
+            ]
+            task = Task(self.closed, finder.find(), joints, tolerance, order)
+            knots, self.proven, self.proven_rate = knots_for(task, intervals)
+        self.knots = knots
+        self._degree = ORDERS[order]
+        self._parts = [
+            _Part(low, high, number * knots, knots / (high - low))
+            for number, (low, high) in enumerate(intervals)
+        ]
+        self._first = self._parts[0]
+        self._coefficients = np.concatenate(
+            [self._table(part.low, part.high) for part in self._parts]
+        )
+        self._data = self._coefficients.tobytes()
+        _, joints, width = self._coefficients.shape
+        self._stride = 8 * width * joints
+        self._cell = Struct(f'{width * joints}d').unpack_from
+        self._joint_places = tuple(range(0, width * joints, width))
+        self._no_pins: list[complex] = []
+        self.memory = len(self._data)
+        self.build_time = perf_counter() - begun
+
+    def position(self, *inputs: float) -> Position:
+        """
+        Close the loops.
+
+        Parameters
+        ----------
+        *inputs
+            Value of the driven joint, in [rad] or [m], finite.
+
+        """
+        (x,) = inputs
+        low, high, first, density = self._first
+        if not low <= x < high:
+            part, at = self._elsewhere(x)
+            if part is None:
+                return self.closed.position(x)
+            low, high, first, density = part
+        else:
+            at = x
+        t = (at - low) * density
+        k = min(int(t), self.knots - 1)
+        t -= k
+        c = self._cell(self._data, (first + k) * self._stride)
+        joints: tuple[float, ...] = ()
+        if self._degree == 3:
+            for i in self._joint_places:
+                joints += (c[i] + t * (c[i + 1] + t * (c[i + 2] + t * c[i + 3])),)
+        else:
+            for i in self._joint_places:
+                joints += (c[i] + t * c[i + 1],)
+        given = x if self._factors is None else x * self._factors[0]
+        state = new(State, ([0.0, given], self._no_pins))
+        return new(Position, (_CLOSED, 0.0, joints, state, [c, t, density]))
+
+    def residual(self, position: Position) -> float:
+        """
+        Return what is left open by a closed position, in [m].
+
+        A table knows joints and no links. So it is how far its joints are from those of the closed
+        form, for one that turns at the end of the longest link, and what that leaves open.
+        """
+        exact = self.exact(position)
+        joints = zip(position.joints, exact.joints, self.turning, strict=True)
+        off = max(abs(ours - true) * (self._arm if turns else 1.0) for ours, true, turns in joints)
+        return off + self.closed.residual(exact)
+
+    @cached_property
+    def _arm(self) -> float:
+        """Length of the longest link, in [m]."""
+        return max(
+            abs(complex(*one) - complex(*other))
+            for points in self.linkage.links.values()
+            for one in points.values()
+            for other in points.values()
+        )
+
+    def velocity(self, position: Position, *rates: float) -> Velocity:
+        """
+        Return the rates at a closed position; at a toggle there are none.
+
+        Parameters
+        ----------
+        position
+            A closed position.
+        *rates
+            Of the driven joint, in [rad/s] or [m/s].
+
+        """
+        _, _, _, state, poses = position
+        if state[1] is not self._no_pins:
+            return self.closed.velocity(position, *rates)
+        c, t, density = cast('list[Any]', poses)
+        (rate,) = rates
+        factor = rate * density
+        joints: tuple[float, ...] = ()
+        if self._degree == 3:
+            for i in self._joint_places:
+                joints += (factor * (c[i + 1] + t * (2.0 * c[i + 2] + t * (3.0 * c[i + 3]))),)
+        else:
+            for i in self._joint_places:
+                joints += (factor * c[i + 1],)
+        given = rate if self._factors is None else rate * self._factors[0]
+        return new(Velocity, (joints, new(State, ([0.0, given], self._no_pins)), [factor]))
+
+    def acceleration(
+        self, position: Position, velocity: Velocity, *accelerations: float
+    ) -> Acceleration:
+        """
+        Return the accelerations at a closed position.
+
+        Parameters
+        ----------
+        position, velocity
+            As this closure has found them.
+        *accelerations
+            Of the driven joint, in [rad/s²] or [m/s²].
+
+        """
+        _, _, _, state, poses = position
+        if state[1] is not self._no_pins:
+            return self.closed.acceleration(position, velocity, *accelerations)
+        c, t, density = cast('list[Any]', poses)
+        (factor,), (change,) = velocity[2], accelerations
+        square, pull = factor * factor, change * density
+        joints: tuple[float, ...] = ()
+        if self._degree == 3:
+            for i in self._joint_places:
+                slope = c[i + 1] + t * (2.0 * c[i + 2] + t * (3.0 * c[i + 3]))
+                joints += (square * (2.0 * c[i + 2] + t * (6.0 * c[i + 3])) + pull * slope,)
+        else:
+            for i in self._joint_places:
+                joints += (pull * c[i + 1],)
+        given = change if self._factors is None else change * self._factors[0]
+        return new(Acceleration, (joints, new(State, ([0.0, given], self._no_pins))))
+
+    def solve(
+        self,
+        *inputs: ArrayLike,
+        rates: Any = None,
+        accelerations: Any = None,
+        derivatives: int = 2,
+        out: Batch | None = None,
+    ) -> Batch:
+        """Solve many states, one after the other; as `Closure.solve` says."""
+        from linkage_ros.solvers.one_by_one import solve_one_by_one  # local import: no tick asks
+
+        return solve_one_by_one(self, inputs, rates, accelerations, derivatives, out)
+
+    def _elsewhere(self, x: float) -> tuple[_Part | None, float]:
+        """Return the part of the table in which an input lies, if one does, and where in it."""
+        if self._period and abs(x) < _FARTHEST:
+            # The true turn is longer than the double by what is taken off here.
+            at = fmod(x, self._period)
+            at -= (x - at) / tau * _TURN_ROUNDED
+            at += self._period if at < 0.0 else 0.0
+            return self._first, min(at, self._period)
+        for part in self._parts:
+            if part.low <= x < part.high:
+                return part, x
+        return None, x
+
+    def _intervals(
+        self, span: tuple[float, float] | None
+    ) -> tuple[float, list[tuple[float, float]]]:
+        """Return the period, if there is one, and the ranges of the input."""
+        if span is not None:
+            low, high = span
+            if not low < high:
+                raise DefinitionError(
+                    'solver.table.span', f'{low:g} to {high:g} is empty', 'write [low, high]'
+                )
+            return 0.0, [(low, high)]
+        ranges = Way(self.closed).ranges
+        whole = [one for one in ranges if one.whole]
+        period = whole[0].highest - whole[0].lowest if whole else 0.0
+        return period, [(one.lowest, one.highest) for one in ranges]
+
+    def _table(self, low: float, high: float) -> NDArray[np.float64]:
+        """Return the polynomials, of shape (cells, joints, degree + 1)."""
+        x = np.linspace(low, high, self.knots + 1)
+        found = self.closed.solve(x, rates=1.0, derivatives=1)
+        assert found.velocities is not None
+        h = (high - low) / self.knots
+        f, slopes = found.positions, h * found.velocities
+        step = np.diff(f, axis=1)
+        turning = np.array(self.turning)[:, None]
+        # The closed form knows an angle but for whole turns.
+        expected = np.nan_to_num(0.5 * (slopes[:, 1:] + slopes[:, :-1]))
+        step -= np.where(turning, tau * np.round((step - expected) / tau), 0.0)
+        table = np.empty((self.knots, len(f), self._degree + 1))
+        table[:, :, 0] = f[:, :-1].T
+        if self._degree == 1:
+            table[:, :, 1] = step.T
+            return table
+        # A toggle at an end has no slope: the chord's.
+        begin = np.where(np.isfinite(slopes[:, :-1]), slopes[:, :-1], step)
+        end = np.where(np.isfinite(slopes[:, 1:]), slopes[:, 1:], step)
+        table[:, :, 1] = begin.T
+        table[:, :, 2] = (3.0 * step - 2.0 * begin - end).T
+        table[:, :, 3] = (begin + end - 2.0 * step).T
+        return table

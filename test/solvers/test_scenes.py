@@ -1,0 +1,220 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Scenes that name a solver or an accuracy: read, built, run and replayed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reading.run_events import CHOSEN, run_account
+from linkage_ros.cli.violations import violations
+from linkage_ros.errors import FileError
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import replay
+from linkage_ros.scene.load import load_scene, parse_scene
+from linkage_ros.scene.scene_schema import scene_schema
+from linkage_ros.scene.yaml_file import parse_yaml
+from linkage_ros.solvers import choose as choosing
+from linkage_ros.solvers.newton import NewtonClosure
+from linkage_ros.solvers.solver import Solver
+from linkage_ros.solvers.table import TableClosure
+import pytest
+
+from .linkages import apart
+from ..bag.test_replay import Run, sample  # noqa: TID252
+
+FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
+LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
+FIVE_BAR = (LINKAGES / 'five_bar.yaml').read_bytes()
+SOLVERS = {
+    'closed_form': ('solver: closed_form', Closure),
+    'closed form as a mapping': ('solver: {closed_form: {}}', Closure),
+    'nothing said': ('', Closure),
+    'newton': ('solver: {newton: {tolerance: 1.0e-9}}', NewtonClosure),
+    'table': ('solver: {table: {tolerance: 1.0e-6}}', TableClosure),
+    'part of a table': ('solver: {table: {tolerance: 1.0e-6, span: [0.2, 2.5]}}', TableClosure),
+}
+BEGIN = 1_700_000_000_000_000_000
+
+
+def scene_of(text: str, linkage: bytes = FOUR_BAR):
+    """Return a scene of a linkage, without files."""
+    files = {'scene.yaml': f'linkage: l.yaml\n{text}\n'.encode(), 'linkage.yaml': linkage}
+    return parse_scene('s', 'here', files)
+
+
+@pytest.mark.parametrize('name', SOLVERS)
+def test_what_is_named_is_built(name: str) -> None:
+    text, kind = SOLVERS[name]
+    (line,) = Pipeline(scene_of(text)).lines
+    assert type(line.closure) is kind
+    assert line.choice is None
+
+
+@pytest.mark.parametrize('name', SOLVERS)
+def test_a_scene_runs_with_it(name: str) -> None:
+    effects = 'drive: {constant_rate: {rate: 3.0}}\neffects: {acceleration: {}}\n'
+    plain = Pipeline(scene_of(effects))
+    pipeline = Pipeline(scene_of(effects + SOLVERS[name][0]))
+    closure = plain.lines[0].closure
+    for number in range(3000):
+        now = BEGIN + number * 1_000_000
+        (look,), message, extras = pipeline.tick(now)
+        (expected,), _, _ = plain.tick(now)
+        assert message
+        assert all(extras)
+        assert apart(closure, look.reading.joints, expected.reading.joints) <= 1e-6
+        assert look.reading.rates == pytest.approx(expected.reading.rates, abs=1e-3)
+        assert look.reading.accelerations == pytest.approx(expected.reading.accelerations, abs=0.1)
+
+
+@pytest.mark.parametrize('name', SOLVERS)
+def test_ticks_that_are_not_in_the_bag_change_nothing(name: str) -> None:
+    scene = scene_of(f'{SOLVERS[name][0]}\neffects: {{velocity: {{}}}}\nangles: wrapped')
+    crank = JointStateWriter(['crank_joint']).write
+    whole, part = Pipeline(scene), Pipeline(scene)
+    for number in range(500):
+        now = BEGIN + number * 1_000_000
+        for pipeline in (whole, part):
+            pipeline.offer(crank(now, (0.004 * number,), (4.0,), ()), now)
+        message = whole.tick(now).message
+        if number % 3 == 0:
+            assert part.tick(now).message == message
+
+
+@pytest.mark.parametrize('name', SOLVERS)
+def test_a_bag_replays_to_the_same_bytes(tmp_path: Path, name: str) -> None:
+    run = Run(tmp_path / 'bag', f'{SOLVERS[name][0]}\neffects: {{velocity: {{}}}}')
+    for number in range(400):
+        now = BEGIN + number * 1_000_000
+        if number % 2 == 0:
+            run.offer(now, sample(now, 0.007 * number, 3.5))
+        run.tick(now, now)
+    run.recorder.stop()
+    ticks = list(replay(read_bag(tmp_path / 'bag'), run.scene))
+    assert len(ticks) == 400
+    assert all(tick.recorded == tick.tick.message for tick in ticks)
+
+
+def test_a_reset_builds_no_table_again() -> None:
+    scene = scene_of('accuracy: 1.0e-6')
+    first = Pipeline(scene)
+    again = Pipeline(scene, first.closures)
+    assert again.lines[0].closure is first.lines[0].closure
+    assert again.lines[0].choice == first.lines[0].choice is not None
+
+
+def test_linkages_may_differ(tmp_path: Path) -> None:
+    (tmp_path / 'l.yaml').write_bytes(FOUR_BAR)
+    (tmp_path / 's.yaml').write_text("""
+solver: {table: {tolerance: 1.0e-4}}
+linkages:
+  - {name: one, linkage: l.yaml}
+  - {name: two, linkage: l.yaml, solver: {newton: {tolerance: 1.0e-6}}}
+  - {name: three, linkage: l.yaml, accuracy: 1.0e-3}
+  - {name: four, linkage: l.yaml, solver: closed_form}
+""")
+    lines = Pipeline(load_scene(tmp_path / 's.yaml')).lines
+    assert [type(line.closure) for line in lines[:2]] == [TableClosure, NewtonClosure]
+    assert [line.choice is not None for line in lines] == [False, False, True, False]
+    assert type(lines[3].closure) is Closure
+
+
+def test_several_inputs_take_newton() -> None:
+    (line,) = Pipeline(scene_of('solver: {newton: {tolerance: 1.0e-9}}', FIVE_BAR)).lines
+    assert line.closure.position(0.5, 1.5).joints
+
+
+def test_a_replay_does_not_choose_again(monkeypatch) -> None:
+    def never(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(choosing, 'choose', never)
+    files = {
+        'scene.yaml': b'linkage: l.yaml\naccuracy: 1.0e-6\n',
+        'linkage.yaml': FOUR_BAR,
+    }
+    for chosen, kind in (
+        ({'table': {'tolerance': 1e-6}}, TableClosure),
+        ({'newton': {'tolerance': 1e-6}}, NewtonClosure),
+        ({'closed_form': {}}, Closure),
+    ):
+        (line,) = Pipeline(parse_scene('s', 'here', files, '', {'': chosen})).lines
+        assert type(line.closure) is kind
+
+
+def test_the_bag_s_account_tells_what_was_chosen(tmp_path: Path) -> None:
+    said = f'"{CHOSEN}": {{"": {{"table": {{"tolerance": 1e-6}}}}}}'
+    account = '{"scene": "s", "crank_topic": "/crank", "joint_states_topic": "/joint_states"}'
+    run = Run(tmp_path / 'bag', 'accuracy: 1.0e-6', f'{account[:-1]}, {said}}}'.encode())
+    run.recorder.stop()
+    assert run_account(read_bag(tmp_path / 'bag')).solvers == {'': {'table': {'tolerance': 1e-6}}}
+
+
+def test_forces_leave_the_closed_form_alone() -> None:
+    heavy = (LINKAGES / 'four_bar.yaml').read_bytes()
+    (line,) = Pipeline(scene_of('accuracy: 1.0e-6\ndrive: {torque: {}}', heavy)).lines
+    assert type(line.closure) is Solver
+    assert line.choice.why == 'closed form: forces start from it'
+
+
+REFUSED = {
+    'solver: closed_from': "solver: there is no 'closed_from'; did you mean 'closed_form'?",
+    'solver: {tabel: {tolerance: 1.0e-6}}': "solver.tabel: unknown key; did you mean 'table'?",
+    'solver: newton': 'solver: newton has no tolerance; write solver: {newton: {tolerance: …}}',
+    'solver: {newton: {}}': "solver.newton: the key 'tolerance' is missing",
+    'solver: {newton: {tolerance: 0}}': 'solver.newton.tolerance: 0 is out of bounds',
+    'solver: {table: {tolerance: 1.0}}': 'solver.table.tolerance: 1.0 is out of bounds',
+    'solver: {table: {tolerance: 1.0e-3, knots: 4}}': 'solver.table.knots: unknown key',
+    'solver: {table: {tolerance: 1.0e-3, span: [1]}}': 'solver.table.span: [1] is not a point',
+    'solver: {table: {tolerance: 1.0e-3}, newton: {}}': 'solver.newton: is a second solver',
+    'solver: {}': 'solver: names none; write one of closed_form, newton, table',
+    'solver: 5': 'solver: 5 is not a mapping',
+    'accuracy: 1.0e-6\nsolver: closed_form': 'accuracy: stands beside solver',
+    'accuracy: fine': "accuracy: 'fine' is not a number",
+    'accuracy: 1.0e-15': 'accuracy: 1e-15 is out of bounds',
+}
+
+
+@pytest.mark.parametrize('text', REFUSED)
+def test_refused(text: str) -> None:
+    with pytest.raises(FileError) as caught:
+        scene_of(text)
+    assert REFUSED[text] in str(caught.value)
+    assert violations(parse_yaml(f'linkage: l.yaml\n{text}'.encode(), 'f'), scene_schema())
+
+
+BUILT = {
+    'solver: {table: {tolerance: 1.0e-6}}\neffects: {effort: {}}': 'table finds no forces',
+    'solver: {newton: {tolerance: 1.0e-6}}\ndrive: {torque: {}}': 'newton finds no forces',
+    'solver: {table: {tolerance: 1.0e-6, span: [2, 1]}}': 'solver.table.span: 2 to 1 is empty',
+    'solver: {table: {tolerance: 1.0e-6, span: [0, 1.0e6]}}': 'solver.table: tolerance',
+}
+
+
+@pytest.mark.parametrize('text', BUILT)
+def test_refused_when_it_is_built(text: str) -> None:
+    with pytest.raises(FileError, match=BUILT[text]):
+        Pipeline(scene_of(text))
+
+
+def test_what_is_read_the_schema_takes() -> None:
+    for text, _ in SOLVERS.values():
+        content = parse_yaml(f'linkage: l.yaml\n{text}'.encode(), 'f')
+        assert not violations(content, scene_schema())
