@@ -19,7 +19,7 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test bench accuracy synthesis round_trips gallery schema cost effects lint format
+.PHONY: help demo test bench accuracy synthesis round_trips gallery schema cost effects docs lint format
 .PHONY: clean damage kills endurance disk
 
 help:
@@ -37,6 +37,7 @@ help:
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
 	@echo 'make cost      measure what every effect costs, into docs/cost.md'
 	@echo 'make effects   draw what drives, effects and faults do, for docs/effects.md'
+	@echo 'make docs      build the documentation site into build/docs'
 	@echo 'make lint      ruff and mypy'
 	@echo 'make format    let ruff put right what it can'
 	@echo 'make clean     remove what make and colcon have built; recorded runs stay'
@@ -106,6 +107,10 @@ cost: $(STAMP)
 
 effects: $(STAMP)
 	@$(BIN)/python -m docs.make_effects
+
+docs: $(STAMP)
+	@$(BIN)/python -m sphinx -q -W --keep-going -d build/docs_read docs build/docs
+	@echo 'build/docs/index.html'
 
 lint: $(STAMP)
 	$(BIN)/ruff check

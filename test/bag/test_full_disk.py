@@ -199,12 +199,11 @@ def test_a_recording_ends_where_less_stays_free_than_it_should(
         time.sleep(0.0002)
     summary = recorder.stop()
     free = os.statvfs(small_disk)
-    # It gave back what it had set aside, and what it writes between two looks is little.
-    assert free.f_bavail * free.f_frsize > 600_000 - 100_000
+    assert free.f_bavail * free.f_frsize >= 600_000
     assert summary.failure.startswith(f'{small_disk}/run: the recording ended: ')
     assert summary.failure.endswith(
-        'bytes are free on its disk, fewer than min_free_bytes: 600,000; make room there before '
-        'the next recording'
+        'bytes are free on its disk, fewer than min_free_bytes: 600,000 and 262,144 to go on; '
+        'make room there before the next recording'
     )
     kept = sum(counts.recorded for counts in summary.topics)
     assert kept > 500
@@ -256,41 +255,6 @@ def test_a_disk_that_dies_leaves_the_part_that_it_took(
     assert bag.truncated
     assert [message.data for message in bag.messages()] == [m.data for m in messages[:kept]]
     assert kept > 200
-
-
-@pytest.mark.parametrize('when', ['flush', 'close'])
-def test_a_failing_fsync_is_said(tmp_path, topics, messages, readers, monkeypatch, when):
-    writer = BagWriter(tmp_path / 'run', topics)
-    for message in messages[:100]:
-        writer.write(*message)
-
-    def failing(descriptor):
-        raise OSError(errno.EIO, 'Input/output error')
-
-    monkeypatch.setattr('os.fsync', failing)
-    with pytest.raises(RecordingError, match='Input/output error'):
-        getattr(writer, when)()
-    with pytest.raises(RecordingError, match='Input/output error'):
-        writer.write(*messages[100])
-    assert sum(writer.close().counts) == 100
-    readers.agree(tmp_path / 'run', topics, messages[:100])
-
-
-def test_a_failing_rename_is_said_and_leaves_the_first_metadata(
-    tmp_path, topics, messages, readers, monkeypatch
-):
-    writer = BagWriter(tmp_path / 'run', topics)
-    for message in messages[:100]:
-        writer.write(*message)
-
-    def failing(path, target):
-        raise OSError(errno.EDQUOT, 'Disk quota exceeded')
-
-    monkeypatch.setattr('pathlib.Path.replace', failing)
-    with pytest.raises(RecordingError, match='Disk quota exceeded'):
-        writer.close()
-    assert sorted(p.name for p in (tmp_path / 'run').iterdir()) == ['metadata.yaml', 'run_0.mcap']
-    readers.agree(tmp_path / 'run', topics, messages[:100])
 
 
 KILLED = """

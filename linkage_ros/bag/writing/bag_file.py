@@ -80,6 +80,7 @@ class BagFile:
         self.finished = False
         self._start, self._end = NO_START, 0
         self._flushes, self._flushed = 0, 0
+        self._safe = (tuple(self.counts), self._start, self._end)
         with ExitStack() as undo:
             self._file = RecordFile(path)
             undo.callback(path.unlink)
@@ -93,6 +94,11 @@ class BagFile:
     def error(self) -> OSError | None:
         """Return what the disk said first; from then on records wait in memory."""
         return self._file.error
+
+    @property
+    def in_doubt(self) -> bool:
+        """Return whether the disk has ever failed to keep what it had taken."""
+        return self._file.in_doubt
 
     @property
     def size(self) -> int:
@@ -130,6 +136,8 @@ class BagFile:
         if self._file.error:
             raise self._file.error
         self._file.sync()
+        if hasattr(self._mcap, 'flush'):
+            self._safe = (tuple(self.counts), self._start, self._end)
         # The index at the end grows by about this much with each chunk.
         self._reserve.grow(FIRST_RESERVE + chunks * (90 + 10 * len(self.counts)))
         return True
@@ -137,6 +145,8 @@ class BagFile:
     def finish(self, records: Mapping[str, Mapping[str, str]]) -> OSError | None:
         """
         End the file as well as the disk allows; return what went wrong, now or before.
+
+        What the disk does not keep in the end is counted no longer, although it may be there.
 
         Parameters
         ----------
@@ -160,6 +170,10 @@ class BagFile:
             self._file.sync()
         except OSError as worse:
             error = error or worse
+            try:
+                self._file.sync()
+            except OSError:
+                self._count_safe()
         try:
             self._file.close()
         except OSError as worse:
@@ -222,3 +236,9 @@ class BagFile:
             self._start, self._end = kept.message_start_time, kept.message_end_time
         else:
             self._start, self._end = NO_START, 0
+
+    def _count_safe(self) -> None:
+        """Forget the messages that came after the last flush that succeeded."""
+        if sum(self._safe[0]) < sum(self.counts):
+            counts, self._start, self._end = self._safe
+            self.counts = list(counts)

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+import errno
 from io import BytesIO
 from operator import itemgetter
 import os
@@ -50,6 +51,10 @@ from mcap.writer import MCAP0_MAGIC
 # for 64 KiB of joint states; mcap's default of 1 MiB would hold it, and a tick, for 10 ms.
 CHUNK_SIZE = 64 * 1024
 FIRST_RESERVE = 512 * 1024
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""What a system says where it would take more if there were room."""
+# What is kept in memory until the disk has it, lest a failing fsync lose it [bytes].
+_MOST_UNSYNCED = 16 * 1024 * 1024
 
 
 class RecordFile:
@@ -64,6 +69,9 @@ class RecordFile:
         self.position = 0  # where the next record goes once the waiting ones are on the disk
         self.size = 0  # the end of the last record that the system took as a whole [bytes]
         self.error: OSError | None = None
+        self.in_doubt = False  # whether the system has ever failed to bring it to the disk
+        self._unsynced: list[tuple[int, bytes]] = []  # since the last sync, with the offsets
+        self._unsynced_size = 0
         self._waiting: list[bytes] = []
         self._tail: list[bytes] | None = None
         self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
@@ -86,7 +94,22 @@ class RecordFile:
         """Do nothing: no buffer is between `write` and the system."""
 
     def sync(self) -> None:
-        os.fsync(self._descriptor)
+        """
+        Bring what was written to the disk.
+
+        After a failure the system may have let go of what it could not write, and yet succeed the
+        next time. So all since the last success is written again before it is asked again.
+        """
+        if self.in_doubt:
+            for offset, data in self._unsynced:
+                self._put(data, offset)
+        try:
+            os.fsync(self._descriptor)
+        except OSError:
+            self.in_doubt = True
+            raise
+        self._unsynced.clear()
+        self._unsynced_size = 0
 
     def close(self) -> None:
         os.close(self._descriptor)
@@ -99,41 +122,66 @@ class RecordFile:
         """Write the waiting records; raises OSError, and can be called again then."""
         while self._waiting:
             self._put(self._waiting[0], self.size)
-            self.size += len(self._waiting.pop(0))
+            self._unsynced.append((self.size, self._waiting.pop(0)))
+            self.size += len(self._unsynced[-1][1])
+            self._unsynced_size += len(self._unsynced[-1][1])
+            if self._unsynced_size > _MOST_UNSYNCED:
+                self.sync()
 
     def cut_back(self) -> Statistics:
         """
         End the file with as many chunks as leave room for an index; return what is then in it.
 
         The index overwrites the end of the file in place, which takes no new room on the disk.
-        Where not even that works the file stays without an end, but with whole records only.
+        Where not even that works the file stays without an end, but with whole records only; so it
+        does where there is no room for an index at all.
         """
         stream = BytesIO(b''.join(self._tail or []))
         records = list(StreamReader(stream, skip_magic=True, emit_chunks=True).records)
-        chunks = [r for r in records if isinstance(r, ChunkIndex) and _end_of(r) <= self.size]
+        whole = [
+            r
+            for r in records
+            if isinstance(r, ChunkIndex) and r.chunk_start_offset + r.chunk_length <= self.size
+        ]
+        # The last one may lack its message indexes; who reads without an end does not need them.
+        chunks = [chunk for chunk in whole if _end_of(chunk) <= self.size]
         while chunks:
             start = _end_of(chunks[-1])
             ending = _ending(records, chunks, start)
             if start + len(ending) <= self.size:
-                self.size = start
-                with suppress(OSError):
-                    try:
-                        self._put(ending, start)
-                    except OSError:
-                        # A file system that copies on write needs the room first.
-                        os.ftruncate(self._descriptor, start)
-                        self._put(ending, start)
-                    self.size = start + len(ending)
+                if not self._end_with(ending, start):
+                    chunks = whole
                 break
             chunks.pop()
         with suppress(OSError):
             os.ftruncate(self._descriptor, self.size)
-        return _statistics(records, chunks)
+        return _statistics(records, chunks or whole)
+
+    def _end_with(self, ending: bytes, start: int) -> bool:
+        """Write an ending over what is there; return False if all there is stays untouched."""
+        try:
+            count = os.pwrite(self._descriptor, ending, start)
+        except OSError as error:
+            if error.errno not in NO_ROOM:
+                return False
+            count = 0
+        self._unsynced = [(o, d[: start - o]) for o, d in self._unsynced if o < start]
+        self.size = start
+        with suppress(OSError):
+            if not count:
+                # A file system that copies on write needs the room first.
+                os.ftruncate(self._descriptor, start)
+            self._put(ending[count:], start + count)
+            self._unsynced.append((start, ending))
+            self.size = start + len(ending)
+        return True
 
     def _put(self, data: bytes, offset: int) -> None:
         view = memoryview(data)
         while view:
             count = os.pwrite(self._descriptor, view, offset)
+            if not count:
+                raise OSError(errno.EIO, 'the disk takes nothing')
             view, offset = view[count:], offset + count
 
 
@@ -160,7 +208,8 @@ class Reserve:
             self._size = size
 
     def release(self) -> None:
-        self._file.close()
+        with suppress(OSError):  # nothing is in it
+            self._file.close()
 
 
 def _end_of(chunk: ChunkIndex) -> int:

@@ -40,11 +40,13 @@ from linkage_ros.bag.account import (
 from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_metadata
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.bag_file import BagFile
+from linkage_ros.bag.writing.disk import NO_ROOM
 from linkage_ros.bag.writing.packing import compression_type
 from linkage_ros.bag.writing.storage import scarcity, Storage
 from linkage_ros.errors import RecordingError
 
 _MAKE_ROOM = 'make room there before the next recording'
+_CHECK_DISK = 'check the disk before the next recording'
 _TIME_END = 2**63  # rosbag2's times are signed
 _SEQUENCE_END = 2**32  # MCAP's sequence numbers; at 10 kHz they start again after five days
 _RENEWAL = 1.0  # [s]
@@ -99,7 +101,9 @@ class BagWriter:
         self._sequences = [0] * len(self.topics)
         self._refused = [0] * len(self.topics)
         self._ended: list[BagSummary] = []
+        self._gone: list[Path] = []  # files that made way, as far as they are still there
         self._due = 0.0
+        self._looked = 0  # size of the file when it was last looked how much is free [bytes]
         self._summary: BagSummary | None = None
         self._failure: RecordingError | None = None
         self._compression = compression_type(self.storage.compression, self.folder)
@@ -155,6 +159,8 @@ class BagWriter:
             return False
         if self._splits and self._is_full(log_time):
             self._split()
+        if self.storage.min_free_bytes and self._file.size != self._looked:
+            self._look()
         sequence = self._sequences[topic]
         self._file.add(topic, log_time, publish_time, data, sequence % _SEQUENCE_END)
         self._sequences[topic] = sequence + 1
@@ -168,7 +174,7 @@ class BagWriter:
             raise self._failure
         try:
             if self._file.flush() and time.monotonic() >= self._due:
-                self._renew(self._summarize())
+                self._try_to_renew(self._summarize())
             self._refuse_if_scarce('the recording ended')
         except (OSError, RecordingError) as error:
             self._end(error)
@@ -211,6 +217,14 @@ class BagWriter:
         # Where time jumps back, what comes after it is not put to what came before.
         return 0 < self._split_time <= abs(log_time - file.first)
 
+    def _look(self) -> None:
+        """End the recording where too little is free."""
+        self._looked = self._file.size
+        try:
+            self._refuse_if_scarce('the recording ended')
+        except (OSError, RecordingError) as error:
+            self._end(error)
+
     def _split(self) -> None:
         """End the file and begin the next; where they are too many, let the oldest go."""
         try:
@@ -231,10 +245,15 @@ class BagWriter:
         gone, kept = parts[:excess], parts[excess:]
         let_go = [self.let_go, *(part.counts for part in gone)]
         summary = together(kept, self._refused, tuple(map(sum, zip(*let_go, strict=True))))
-        self._renew(summary)
+        if not self._try_to_renew(summary):
+            return
         self._ended, self.let_go = kept[:-1], summary.let_go
-        for part in gone:
-            (self.folder / part.file).unlink(missing_ok=True)
+        self._gone += [self.folder / part.file for part in gone]
+        self._remove_gone()
+
+    def _remove_gone(self) -> None:
+        """Remove the files that made way; one that cannot be removed is tried again."""
+        self._gone = [file for file in self._gone if not _is_removed(file)]
 
     def _finish(self, custom: Mapping[str, str]) -> OSError | None:
         """Close the bag as well as the disk allows; return what went wrong, now or before."""
@@ -243,11 +262,28 @@ class BagWriter:
             summary = self._summarize()
             error = self._file.finish(last_records(custom, summary, self.account(summary)))
         self._summary = summary = self._summarize()
+        if error:
+            custom = {FAILURE: str(self._ended_by(error)), **custom}
+        self._remove_gone()
+        last = custom_data(custom, summary, self.account(summary))
         try:
-            write_metadata(summary, custom_data(custom, summary, self.account(summary)))
+            try:
+                write_metadata(summary, last)
+            except OSError:
+                # All of it once more: it is the bag's last word.
+                write_metadata(summary, last)
         except OSError as worse:
             error = error or worse
         return error
+
+    def _try_to_renew(self, summary: BagSummary) -> bool:
+        """Write the metadata anew, or leave the old ones: no message depends on them."""
+        try:
+            self._renew(summary)
+        except OSError:
+            self._due = time.monotonic() + _RENEWAL
+            return False
+        return True
 
     def _renew(self, summary: BagSummary) -> None:
         """Write into the metadata what is on the disk by now."""
@@ -273,10 +309,11 @@ class BagWriter:
         raise self._failure
 
     def _ended_by(self, error: OSError) -> RecordingError:
+        kept = 'what was flushed before' if self._file.in_doubt else 'what is on the disk'
         return RecordingError(
             self.folder,
             f'the recording ended early: {error.strerror or error}',
-            f'what is on the disk stays readable; {_MAKE_ROOM}',
+            f'{kept} stays readable; {_MAKE_ROOM if error.errno in NO_ROOM else _CHECK_DISK}',
         )
 
     def _give_up(self, error: OSError) -> NoReturn:
@@ -298,3 +335,11 @@ def _remove(folder: Path) -> None:
     for leftover in folder.iterdir():
         leftover.unlink()
     folder.rmdir()
+
+
+def _is_removed(file: Path) -> bool:
+    try:
+        file.unlink(missing_ok=True)
+    except OSError:
+        return False
+    return True

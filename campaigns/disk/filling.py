@@ -1,0 +1,223 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Recordings on a small disk that fills, by the recording itself or by another process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+import os
+from pathlib import Path
+import pickle
+import select
+import signal
+from tempfile import TemporaryDirectory
+from threading import Event, Thread
+from time import monotonic, sleep
+from typing import NamedTuple
+
+from campaigns.disk.judge import Expectation, judge, Outcome
+from campaigns.disk.small_disks import Disk, free_on, mounted
+from campaigns.disk.subject import expected_messages, offer_all, Recorded
+from linkage_ros.bag.writing.storage import Storage
+
+FLOOR = 1_500_000
+_PATIENCE = 120.0  # [s]
+_BLOCK = 4096
+
+STORAGES: Mapping[str, Storage] = {
+    'one file': Storage(flush_period=0.05),
+    'one file, a floor': Storage(flush_period=0.05, min_free_bytes=FLOOR),
+    'split': Storage(flush_period=0.05, split_bytes=300_000),
+    'split, zstd, a floor': Storage(
+        flush_period=0.05, split_bytes=300_000, compression='zstd', min_free_bytes=FLOOR
+    ),
+    'ring of 3': Storage(flush_period=0.05, split_bytes=300_000, keep_files=3),
+}
+
+
+class Filler(NamedTuple):
+    """
+    Who else writes to the disk.
+
+    Attributes
+    ----------
+    speed
+        How fast [bytes/s].
+    hungry
+        Whether it takes at once whatever becomes free, to the end.
+
+    """
+
+    speed: float
+    hungry: bool
+
+
+FILLERS: Mapping[str, Filler | None] = {
+    'the recording alone': None,
+    'another process too': Filler(2e6, hungry=False),
+    'another that takes whatever is freed': Filler(2e6, hungry=True),
+}
+
+
+class Filled(NamedTuple):
+    """
+    A recording, and what became of it.
+
+    Attributes
+    ----------
+    disk, storage, filler
+        Their names.
+    outcome
+        What became of it.
+    least_free, free
+        The least that was free while it was made, and what was at its end [bytes].
+    failure
+        What it said; '' for nothing.
+
+    """
+
+    disk: str
+    storage: str
+    filler: str
+    outcome: Outcome
+    least_free: int
+    free: int
+    failure: str
+
+
+def fill(disk: Disk, storage: str, filler: str, count: int) -> Filled:
+    """
+    Record to a small disk, and judge.
+
+    Parameters
+    ----------
+    disk
+        The disk.
+    storage, filler
+        Names of one of `STORAGES` and one of `FILLERS`.
+    count
+        Messages that are offered at most.
+
+    Raises
+    ------
+    NotPermittedError
+        The disk cannot be mounted here.
+
+    """
+    how = STORAGES[storage]
+    with (
+        TemporaryDirectory(prefix='linkage_ros_full_') as name,
+        mounted(disk, Path(name)) as folder,
+    ):
+        # The recording's user has to come through.
+        Path(name).chmod(0o755)
+        other = _Other(folder, FILLERS[filler])
+        done = _in_child(lambda: offer_all(folder / 'bag', how, count), disk.user, other.start)
+        other.stop()
+        free = free_on(folder)
+        outcome = Outcome(faults=['came to no end'])
+        if done is not None:
+            # For what is recovered from the bag, beside it.
+            other.make_room()
+            expectation = Expectation(expected_messages(done.offered))
+            outcome = judge(done, folder / 'bag', expectation, Path(name) / 'recovered')
+            if how.keep_files and filler == 'the recording alone' and done.failure:
+                outcome.faults.append('a ring that fits came to an end')
+        if how.min_free_bytes and FILLERS[filler] is None and other.least < how.min_free_bytes:
+            below = how.min_free_bytes - other.least
+            outcome.faults.append(f'{below:,} bytes below the floor')
+        said = (done.refused or done.failure or '') if done else ''
+        said = said.replace(f'{folder}/bag: ', '')
+        return Filled(disk.name, storage, filler, outcome, other.least, free, said)
+
+
+def cases(disks: Sequence[Disk]) -> Iterator[tuple[Disk, str, str]]:
+    """Yield all there are."""
+    for disk in disks:
+        for filler in FILLERS:
+            for storage in STORAGES:
+                yield disk, storage, filler
+
+
+class _Other:
+    """Another process to the recording: looks how much is free, and writes where it is to."""
+
+    def __init__(self, folder: Path, filler: Filler | None) -> None:
+        self._folder = folder
+        self._filler = filler
+        self._ended = Event()
+        self._thread = Thread(target=self._run)
+        self.least = free_on(folder)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._ended.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def make_room(self) -> None:
+        (self._folder / 'other').unlink(missing_ok=True)
+
+    def _run(self) -> None:
+        begin, written, full = monotonic(), 0, False
+        file = os.open(self._folder / 'other', os.O_WRONLY | os.O_CREAT) if self._filler else -1
+        try:
+            while not self._ended.is_set():
+                self.least = min(self.least, free_on(self._folder))
+                if self._filler is not None and not full:
+                    try:
+                        while written < self._filler.speed * (monotonic() - begin):
+                            written += os.write(file, bytes(_BLOCK))
+                    except OSError:
+                        full = not self._filler.hungry
+                sleep(0.0002)
+        finally:
+            if file >= 0:
+                os.close(file)
+
+
+def _in_child(
+    do: Callable[[], Recorded], user: int, started: Callable[[], None]
+) -> Recorded | None:
+    """Record in a process of its own, as a user; None where that came to no end."""
+    reads, writes = os.pipe()
+    process = os.fork()
+    if not process:
+        try:
+            os.close(reads)
+            if user != os.geteuid():
+                os.setuid(user)
+            answer = pickle.dumps(do())
+            with os.fdopen(writes, 'wb') as pipe:
+                pipe.write(answer)
+        finally:
+            os._exit(0)
+    os.close(writes)
+    # Threads only now: a fork would copy half of them.
+    started()
+    answer, until = b'', monotonic() + _PATIENCE
+    try:
+        while select.select([reads], [], [], max(0.0, until - monotonic()))[0]:
+            part = os.read(reads, 1 << 16)
+            if not part:
+                return pickle.loads(answer) if answer else None
+            answer += part
+        return None
+    finally:
+        os.close(reads)
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)

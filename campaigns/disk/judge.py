@@ -1,0 +1,276 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a recording has left and said, held against what it was given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from operator import attrgetter
+from pathlib import Path
+import shutil
+from typing import Any
+
+from campaigns.disk.subject import Recorded
+from campaigns.kills.plan import TOPICS
+from linkage_ros.bag.account import FAILURE, UNFINISHED
+from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
+from linkage_ros.bag.reading.reader import Bag, BagMessage, read_bag
+from linkage_ros.bag.recovering.recover import recover
+from linkage_ros.errors import BagError
+from rosbags.highlevel import AnyReader
+import yaml
+
+REFUSED = 'refused at the beginning, and said so'
+LEFT = 'refused, said so, what was begun could not be removed'
+WHOLE = 'went on to the end, whole'
+EARLY = 'ended early and said so; a bag'
+AT_RECOVERY = 'ended early and said so; all that was counted, by recover'
+
+
+@dataclass(slots=True)
+class Outcome:
+    """
+    What became of a recording.
+
+    Attributes
+    ----------
+    verdict
+        In words; '' where there is no more than faults.
+    faults
+        What must not be.
+    offered, recorded, let_go
+        Messages.
+
+    """
+
+    verdict: str = ''
+    faults: list[str] = field(default_factory=list)
+    offered: int = 0
+    recorded: int = 0
+    let_go: int = 0
+
+
+class Expectation:
+    """
+    What is expected of a recording.
+
+    Parameters
+    ----------
+    messages
+        What it was offered, in order.
+    keeps_all
+        Whether nothing may go wrong.
+    may_leave
+        Whether what is not wanted any more may lie there still: it could not be removed.
+    loses_pages
+        Whether what was not flushed may be gone from the files; then recover only is asked.
+    may_be_silent
+        Whether the metadata may say nothing of a failure: they had been written before it.
+
+    """
+
+    def __init__(
+        self,
+        messages: Sequence[BagMessage],
+        *,
+        keeps_all: bool = False,
+        may_leave: bool = False,
+        loses_pages: bool = False,
+        may_be_silent: bool = False,
+    ) -> None:
+        self.messages = messages
+        self.keeps_all = keeps_all
+        self.may_leave = may_leave
+        self.loses_pages = loses_pages
+        self.may_be_silent = may_be_silent
+        self._numbers = {message.log_time: at for at, message in enumerate(messages)}
+
+    def run_of(self, found: Sequence[BagMessage]) -> range | None:
+        """Return which these are, in a row and byte for byte; None where they are others."""
+        if not found:
+            return range(0)
+        first = self._numbers.get(found[0].log_time, 0)
+        end = first + len(found)
+        return range(first, end) if list(self.messages[first:end]) == list(found) else None
+
+
+def judge(
+    done: Recorded | None, folder: Path, expectation: Expectation, beside: Path | None = None
+) -> Outcome:
+    """
+    Judge a recording.
+
+    Parameters
+    ----------
+    done
+        How it went; None where it did not come to an end.
+    folder
+        The bag's.
+    expectation
+        What is expected.
+    beside
+        Where to recover to, to be removed again.
+
+    """
+    beside = beside or folder.with_name(f'{folder.name}_recovered')
+    if done is None:
+        return Outcome(faults=['came to no end'])
+    outcome = Outcome(offered=done.offered, recorded=done.recorded, let_go=done.let_go)
+    if done.escaped:
+        outcome.faults.append(f'escaped: {done.escaped}')
+        return outcome
+    said = done.refused or done.failure
+    if said and not _is_line(said, folder):
+        outcome.faults.append(f'said badly: {said}')
+    if said and expectation.keeps_all:
+        outcome.faults.append(f'ended by what is harmless: {said}')
+    if done.refused:
+        outcome.verdict = LEFT if folder.exists() else REFUSED
+        if folder.exists() and not expectation.may_leave:
+            outcome.faults.append('refused, and something left behind')
+        return outcome
+    outcome.faults += _account(done)
+    outcome.faults += _metadata(folder)
+    if done.failure is None:
+        outcome.verdict = WHOLE
+        outcome.faults += _whole(done, folder, expectation)
+    else:
+        outcome.verdict = EARLY
+        _ended_early(outcome, done, folder, expectation, beside)
+    if not expectation.may_leave:
+        outcome.faults += [
+            f'left behind: {path.name}'
+            for path in folder.iterdir()
+            if path.name != METADATA_FILE and path.suffix != '.mcap'
+        ]
+    return outcome
+
+
+def _is_line(said: str, folder: Path) -> bool:
+    """Return whether it says where, what, and what would help, on one line."""
+    where, _, rest = said.partition(': ')
+    reason, _, remedy = rest.partition('; ')
+    return (
+        where == str(folder)
+        and bool(reason and remedy)
+        and said.isprintable()
+        and ('please report' not in said)
+    )
+
+
+def _account(done: Recorded) -> list[str]:
+    """Return in what the counts do not add up, topic by topic."""
+    faults = []
+    for number, (received, recorded, dropped, let_go, waiting) in enumerate(done.counts):
+        offered = len(range(number, done.offered, len(TOPICS)))
+        if received != offered:
+            faults.append(f'{offered} offered, {received} received')
+        if received != recorded + dropped + let_go or waiting or min(recorded, dropped) < 0:
+            faults.append(f'the account is open: {done.counts[number]}')
+    return faults
+
+
+def _whole(done: Recorded, folder: Path, expectation: Expectation) -> list[str]:
+    """Return what a recording lacks that says nothing of a failure."""
+    lacks = []
+    try:
+        bag = read_bag(folder)
+        run = expectation.run_of(list(bag.messages()))
+    except BagError as error:
+        return [f'says nothing, and cannot be read: {error}']
+    if run is None:
+        return ['a false message']
+    if (run.start, run.stop) != (done.let_go, done.offered) or len(run) != done.recorded:
+        lacks.append(f'says nothing, and holds {run} of {done.offered}')
+    if UNFINISHED in bag.custom or FAILURE in bag.custom:
+        lacks.append('says nothing, but its metadata do')
+    return lacks + _rosbags(bag, folder)
+
+
+def _ended_early(
+    outcome: Outcome, done: Recorded, folder: Path, expectation: Expectation, beside: Path
+) -> None:
+    """Judge what is left of a recording that says why it ended."""
+    counted = range(done.let_go, done.let_go + done.recorded)
+    run: range | None = range(0)
+    try:
+        bag = read_bag(folder, allow_truncated=True)
+        run = expectation.run_of(list(bag.messages()))
+    except BagError:
+        bag = None
+    except Exception as error:  # noqa: BLE001
+        outcome.faults.append(f'reading: {type(error).__name__}: {error}')
+        bag = None
+    if run is None:
+        outcome.faults.append('a false message')
+        return
+    if bag is not None:
+        if FAILURE in bag.custom and bag.custom[FAILURE] != done.failure:
+            outcome.faults.append('another failure in the metadata')
+        silent = FAILURE not in bag.custom and UNFINISHED not in bag.custom
+        if silent and not expectation.may_be_silent:
+            outcome.faults.append('its metadata say nothing of a failure')
+        if not bag.truncated and not expectation.loses_pages:
+            outcome.faults += _rosbags(bag, folder)
+    if bag is None or not _holds(run, counted):
+        outcome.verdict = AT_RECOVERY
+    outcome.faults += _recovered(counted, folder, expectation, beside)
+
+
+def _recovered(counted: range, folder: Path, expectation: Expectation, target: Path) -> list[str]:
+    """Return what recover lost of what was counted."""
+    try:
+        recover(folder, target)
+        found = list(read_bag(target).messages())
+        if expectation.may_leave:
+            # A file that made way, and could not be removed, comes behind those that are named.
+            found.sort(key=attrgetter('log_time'))
+        run = expectation.run_of(found)
+    except BagError as error:
+        return [f'recover: {error}'] if counted else []
+    except Exception as error:  # noqa: BLE001
+        return [f'recover: {type(error).__name__}: {error}']
+    finally:
+        shutil.rmtree(target, ignore_errors=True)
+    if run is None:
+        return ['recover: a false message']
+    return [] if _holds(run, counted) else [f'counted {counted}, recovered {run}']
+
+
+def _holds(run: range, counted: range) -> bool:
+    return not counted or (run.start <= counted.start and counted.stop <= run.stop)
+
+
+def _metadata(folder: Path) -> list[str]:
+    """Return what is wrong with ``metadata.yaml``."""
+    try:
+        said: Any = yaml.safe_load((folder / METADATA_FILE).read_text(encoding='utf-8'))
+        named = said[ROOT_KEY]['relative_file_paths']
+    except Exception as error:  # noqa: BLE001
+        return [f'metadata: {type(error).__name__}']
+    missing = [name for name in named if not (folder / name).is_file()]
+    return [f'metadata name what is not there: {missing}'] if missing else []
+
+
+def _rosbags(bag: Bag, folder: Path) -> list[str]:
+    """Return in what rosbags disagrees with our reader."""
+    ours = sorted((m.topic, m.log_time, m.data) for m in bag.messages())
+    try:
+        with AnyReader([folder]) as reader:
+            theirs = sorted((c.topic, time, bytes(data)) for c, time, data in reader.messages())
+    except Exception as error:  # noqa: BLE001
+        return [f'rosbags: {type(error).__name__}: {error}']
+    return [] if ours == theirs else [f'rosbags reads {len(theirs)} messages, not {len(ours)}']

@@ -1,0 +1,317 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A node at work on a disk that stalls: what its ticks and its bag make of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+import fcntl
+from itertools import pairwise
+from math import inf
+import os
+from pathlib import Path
+import signal
+from tempfile import TemporaryDirectory
+from time import monotonic, sleep, time_ns
+from typing import NamedTuple
+
+from bench.processes import BenchError, Graph
+from campaigns.disk.small_disks import Disk, mounted
+from campaigns.endurance.account import Account, account_of
+from linkage_ros.bag.metadata import METADATA_FILE
+from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.errors import BagError
+
+_FREEZE, _THAW = 0xC0045877, 0xC0045878
+_DISK = Disk('ext4, 256 MiB', 'ext4', 256)
+_START = 20.0  # [s]
+_MOST_TO_END = 25.0
+"""How long a node may take to end where its disk does not answer [s]."""
+_SECOND = 1_000_000_000
+_GAP = 20_000_000
+"""From where on ticks are lost and not made up for [ns]."""
+_SCENE = """\
+linkage: {linkage}
+rate: {rate}
+drive: {{constant_rate: {{rate: 6.0}}}}
+effects: {{velocity: {{}}}}
+record: {{directory: {folder}, name: bag, flush_period: 0.5, queue: {queue}}}
+"""
+_LINKAGE = Path(__file__).parents[2] / 'config' / 'linkages' / 'four_bar.yaml'
+
+
+class Plan(NamedTuple):
+    """
+    One run of a node.
+
+    Attributes
+    ----------
+    name
+        What it is called in reports.
+    seconds
+        How long it is.
+    stall
+        How long the disk stalls, from the middle on [s]; 0 for never.
+    queue
+        Messages that may wait.
+    comes_back
+        Whether the disk answers again before the node is ended.
+    rate
+        Of the ticks [Hz].
+
+    """
+
+    name: str
+    seconds: float
+    stall: float
+    queue: int = 20_000
+    comes_back: bool = True
+    rate: int = 1000
+
+
+PLANS = (
+    Plan('none', 12.0, 0.0),
+    Plan('2 s', 12.0, 2.0),
+    Plan('4 s, a queue of 1 s', 12.0, 4.0, queue=1000),
+    Plan('for ever', 8.0, 2.0, comes_back=False),
+)
+
+
+@dataclass(slots=True)
+class Stalled:
+    """
+    How a run went.
+
+    Attributes
+    ----------
+    plan
+        What it was.
+    stalls_in
+        What stood still.
+    account
+        What the bag says of its messages.
+    ticks, during
+        Ticks in the bag, and of these while the disk stalled.
+    lateness, lateness_during
+        Of each tick in the bag that fell outside, and while it stalled [ns].
+    after
+        Ticks in the bag that came when the disk was back.
+    gaps
+        Ticks that are missing in the bag between its first and last.
+    ended
+        How long the node took to end, from the signal on [s].
+    said
+        Its last line about the recording.
+    faults
+        What must not be.
+
+    """
+
+    plan: Plan
+    stalls_in: str
+    account: Account = field(default_factory=dict)
+    ticks: int = 0
+    during: int = 0
+    after: int = 0
+    gaps: int = 0
+    lateness: list[int] = field(default_factory=list)
+    lateness_during: list[int] = field(default_factory=list)
+    ended: float = 0.0
+    said: str = ''
+    faults: list[str] = field(default_factory=list)
+
+    def total(self, word: str) -> int:
+        """Return how many messages the account has under a word."""
+        return sum(self.account.get(word, {}).values())
+
+
+def run(plan: Plan, *, frozen: bool) -> Stalled:
+    """
+    Run a node, and let its disk stall.
+
+    Parameters
+    ----------
+    plan
+        How.
+    frozen
+        Whether a file system of its own is frozen, which stalls it in the kernel; else the node's
+        own calls stand still.
+
+    Raises
+    ------
+    NotPermittedError
+        A file system cannot be mounted here.
+
+    """
+    with TemporaryDirectory(prefix='linkage_ros_stall_') as name:
+        if not frozen:
+            return _run(plan, Path(name), Path(name), Path(name) / 'stalls')
+        with mounted(_DISK, Path(name)) as folder:
+            return _run(plan, Path(name), folder, None)
+
+
+def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
+    done = Stalled(plan, 'the process' if file else 'the kernel')
+    scene = work / 'scene.yaml'
+    scene.write_text(
+        _SCENE.format(linkage=_LINKAGE, rate=plan.rate, folder=folder, queue=plan.queue)
+    )
+    # Below 102, so that the ports stay below those which the kernel hands out.
+    graph = Graph(2 + os.getpid() % 100, work, longest=round(plan.seconds) + 60)
+    arguments = ['--ros-args', '-p', f'scene:={scene}']
+    module = 'linkage_ros.ros.linkage_node'
+    if file:
+        module, arguments = 'campaigns.disk.slow_node', [str(file), *arguments]
+    log = work / f'{module.rsplit(".", 1)[-1]}.log'
+    try:
+        with graph.run(module, arguments) as node:
+            until = monotonic() + _START
+            while not (folder / 'bag' / METADATA_FILE).exists() and monotonic() < until:
+                node.check()
+                sleep(0.05)
+            sleep(0.5 * (plan.seconds - plan.stall))
+            begin = time_ns()
+            with _stalled(folder, file, plan):
+                sleep(plan.stall)
+                end = time_ns()
+                if not plan.comes_back:
+                    done.ended, done.said = _ended(node.pid, log)
+            sleep(0.5 * (plan.seconds - plan.stall) if plan.comes_back else 0.0)
+            node.end()
+            done.said = done.said or _said(log)
+        if plan.comes_back:
+            node.check_end()
+    except BenchError as error:
+        done.faults.append(str(error))
+        return done
+    _look(done, folder / 'bag', begin, end)
+    return done
+
+
+def _drops(plan: Plan) -> bool:
+    """Return whether more comes in a stall than the queue takes."""
+    return plan.stall * plan.rate > plan.queue
+
+
+@contextmanager
+def _stalled(folder: Path, file: Path | None, plan: Plan) -> Iterator[None]:
+    """Let the disk of a folder stall, or a process that looks for a file."""
+    if not plan.stall:
+        yield
+    elif file:
+        file.touch()
+        try:
+            yield
+        finally:
+            file.unlink()
+    else:
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.ioctl(descriptor, _FREEZE, 0)
+            try:
+                yield
+            finally:
+                fcntl.ioctl(descriptor, _THAW, 0)
+        finally:
+            os.close(descriptor)
+
+
+def _ended(pid: int, log: Path) -> tuple[float, str]:
+    """End a node whose disk does not answer; return how long it took, and its last word."""
+    begin = monotonic()
+    os.kill(pid, signal.SIGINT)
+    while monotonic() < begin + _MOST_TO_END:
+        # A thread in the kernel cannot be ended before the disk answers: the process is a zombie
+        # until then, but all that it runs has ended.
+        if _state(pid) in 'Z ':
+            return monotonic() - begin, _said(log)
+        sleep(0.02)
+    return inf, _said(log)
+
+
+def _state(pid: int) -> str:
+    """Return the state of a process' first thread; ' ' where it is gone."""
+    try:
+        return Path(f'/proc/{pid}/stat').read_text().rpartition(') ')[2][0]
+    except OSError:
+        return ' '
+
+
+def _said(log: Path) -> str:
+    """Return the last line of a log about the recording, from its folder on."""
+    lines = [line for line in log.read_text(errors='replace').splitlines() if '/bag: ' in line]
+    return lines[-1].partition('/bag: ')[2] if lines else ''
+
+
+def _look(done: Stalled, folder: Path, begin: int, end: int) -> None:
+    """Look at the bag: its account, and when its ticks came; stall in [ns]."""
+    plan = done.plan
+    try:
+        bag = read_bag(folder, allow_truncated=not plan.comes_back)
+        times = [m.log_time for m in bag.messages() if m.topic == '/joint_states']
+        done.account = account_of(folder) if plan.comes_back else {}
+    except BagError as error:
+        done.faults.append(str(error))
+        return
+    period = round(1e9 / plan.rate)
+    late = _lateness(times, period)
+    inside = [begin <= time < end for time in times]
+    done.ticks, done.during = len(times), sum(inside)
+    done.after = sum(time >= end for time in times)
+    done.lateness = [late for late, stalls in zip(late, inside, strict=True) if not stalls]
+    done.lateness_during = [late for late, stalls in zip(late, inside, strict=True) if stalls]
+    done.gaps = sum(round((b - a) / period) - 1 for a, b in pairwise(times) if b - a > _GAP)
+    if not plan.comes_back:
+        if 'has not answered' not in done.said or done.ended == inf:
+            done.faults.append(f'does not say that the disk has not answered: {done.said!r}')
+        return
+    if not done.account:
+        done.faults.append('the bag has no account')
+    for topic, received in done.account.get('received', {}).items():
+        recorded, dropped = (done.account[word][topic] for word in ('recorded', 'dropped'))
+        if received != recorded + dropped:
+            done.faults.append(f'{topic}: the account does not close')
+        if dropped and not _drops(plan):
+            done.faults.append(f'{topic}: {dropped} dropped')
+    if done.account and done.account['recorded']['/joint_states'] != done.ticks:
+        done.faults.append(f'{done.ticks} ticks in the bag, others in its account')
+    if _drops(plan) and not done.total('dropped'):
+        done.faults.append('more than the queue takes, and nothing dropped')
+    if not done.after:
+        done.faults.append('nothing recorded after the stall')
+
+
+def _lateness(times: Sequence[int], period: int) -> list[int]:
+    """
+    Return by how much each tick was late [ns].
+
+    Ticks are due a period apart; which are due when is told by the most punctual one of a second,
+    or of what lies between two gaps.
+    """
+    found: list[int] = []
+    stretch: list[int] = []
+    for number, time in enumerate(times):
+        if stretch and (time - times[number - 1] > _GAP or time - stretch[0] > _SECOND):
+            found += _behind(stretch, period)
+            stretch = []
+        stretch.append(time)
+    return found + _behind(stretch, period)
+
+
+def _behind(times: Sequence[int], period: int) -> list[int]:
+    offsets = [time - number * period for number, time in enumerate(times)]
+    return [offset - min(offsets) for offset in offsets]
