@@ -14,7 +14,7 @@
 
 
 """
-Start linkage_node, and robot_state_publisher beside it where a URDF is given.
+Start linkage_node, and robot_state_publisher beside it where that is asked for.
 
 ``ros2 launch linkage_ros linkage.launch.py scene:=/path/to/scene.yaml``
 
@@ -28,6 +28,9 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from linkage_ros.cli.model_file import model_of
+from linkage_ros.errors import LinkageError
+from linkage_ros.models.urdf import urdf as write_urdf
 
 SHARE = Path(get_package_share_directory('linkage_ros'))
 
@@ -41,6 +44,10 @@ ARGUMENTS = {
         'Topic that brings the crank; joint_states where joint_state_broadcaster publishes it.',
     ),
     'robot_description_file': ('', "URDF for robot_state_publisher; '' does not start it."),
+    'robot_state_publisher': (
+        'false',
+        'Start it without a file too, on the model that the scene makes; Jazzy reads no topic.',
+    ),
 }
 
 
@@ -59,8 +66,14 @@ def nodes(context):
         remappings=[('crank_states', value['crank_states'])],
         output='screen',
     )
+    urdf = ''
     if value['robot_description_file']:
         urdf = Path(value['robot_description_file']).read_text(encoding='utf-8')
+    elif value['robot_state_publisher'].lower() in ('true', '1'):
+        if not value['scene']:
+            raise LinkageError('robot_state_publisher', 'has no scene', 'name scene:=FILE too')
+        urdf = model_of(value['scene'], write_urdf).decode()
+    if urdf:
         yield Node(
             package='robot_state_publisher',
             executable='robot_state_publisher',

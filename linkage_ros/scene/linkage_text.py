@@ -24,17 +24,14 @@ take them for something else.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 import json
-import os
 from pathlib import Path
 import re
-from secrets import token_hex
 from textwrap import wrap
 
-from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.whole_file import write_whole
 from linkage_ros.scene.yaml_file import parse_yaml
 
 _WIDTH = 99
@@ -88,16 +85,7 @@ def write_linkage(linkage: Linkage, file: str | Path, comment: Sequence[str] = (
     """
     data = linkage_text(linkage, comment).encode()
     read_linkage(parse_yaml(data, str(file)))
-    try:
-        target = Path(file).resolve()
-        if target.exists() and not target.is_file():
-            raise LinkageError(file, 'is there already and is no file', 'name another file')
-        if target.exists() and not os.access(target, os.W_OK):
-            raise PermissionError(0, 'Permission denied')
-        _replace(target, data)
-    except (OSError, ValueError, RuntimeError) as error:  # the last for links in a circle
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise LinkageError(file, f'cannot be written ({reason})', 'name another file') from None
+    write_whole(file, data)
 
 
 def number_text(value: float) -> str:
@@ -109,20 +97,6 @@ def number_text(value: float) -> str:
     mantissa, e, exponent = written.partition('e')
     # YAML 1.1 takes no number for one that has an exponent and no decimal point.
     return f'{mantissa}.0e{exponent}' if e and '.' not in mantissa else written
-
-
-def _replace(target: Path, data: bytes) -> None:
-    temporary = target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'
-    try:
-        with temporary.open('xb') as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(target)
-    except OSError:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
-        raise
 
 
 _IN_ROWS = ('links', 'sliders', 'joints', 'masses')

@@ -1,0 +1,98 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Make a linkage file of a URDF and the pins that close its loops.
+
+Frames that are called PIN_on_LINK, as ``linkage urdf`` writes them, close by themselves.
+"""
+
+from __future__ import annotations
+
+import argparse
+from math import isfinite
+from pathlib import Path
+import sys
+from threading import Event
+
+from linkage_ros.cli.model_file import add_output, put
+from linkage_ros.errors import LinkageError
+from linkage_ros.models.imported import imported
+from linkage_ros.models.urdf_file import read_urdf
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_text import linkage_text
+from linkage_ros.scene.yaml_file import parse_yaml
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('file', type=Path, help='the URDF; of xacro, what xacro makes of it')
+    parser.add_argument(
+        '--close',
+        action='append',
+        type=_pair,
+        default=[],
+        metavar='FRAME=FRAME',
+        help='links of the URDF whose origins meet in a pin; once for each pin',
+    )
+    parser.add_argument(
+        '--input', action='append', default=[], metavar='JOINT', help='joint that is driven'
+    )
+    parser.add_argument(
+        '--at',
+        action='append',
+        type=_value,
+        default=[],
+        metavar='JOINT=VALUE',
+        help='value of a joint in a pose in which the loops close, in radians or metres (here 0)',
+    )
+    add_output(parser, 'linkage file')
+
+
+def run(arguments: argparse.Namespace, _stop: Event) -> int:
+    """Write the linkage file; tell what is not in it."""
+    file = arguments.file
+    try:
+        data = file.read_bytes()
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise LinkageError(file, f'cannot be read ({reason})', 'name a URDF file') from None
+    made = imported(
+        read_urdf(data, str(file)), arguments.close, arguments.input, dict(arguments.at)
+    )
+    text = linkage_text(made.linkage, [f'Imported from {file.name} by linkage import.'])
+    read_linkage(parse_yaml(text.encode(), f'{file}, as a linkage'))
+    for part in made.left_out:
+        print(f'left out: {part}, which belongs to no loop', file=sys.stderr)
+    put(text.encode(), arguments.output)
+    return 0
+
+
+def _pair(text: str) -> tuple[str, str]:
+    one, equal, other = text.partition('=')
+    if not (one and equal and other):
+        raise argparse.ArgumentTypeError(f'{text!r} is no pair; write FRAME=FRAME')
+    return one, other
+
+
+def _value(text: str) -> tuple[str, float]:
+    joint, equal, value = text.rpartition('=')
+    try:
+        number = float(value)
+    except ValueError:
+        number = float('nan')
+    if not (joint and equal and isfinite(number)):
+        raise argparse.ArgumentTypeError(f'{text!r} is no value; write JOINT=0.5')
+    return joint, number

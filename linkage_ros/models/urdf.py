@@ -1,0 +1,223 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A linkage as URDF: the tree of its published joints, and frames where pins close its loops.
+
+Root is the ground; where several linkages stand in one model, a frame without a body that holds
+their grounds, since a scene does not say where they stand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+from xml.etree import ElementTree as ET
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.linkage import GROUND, Mass
+from linkage_ros.kinematics.survey import usual_inputs
+from linkage_ros.models.bodies import bodies, Body
+from linkage_ros.models.cuts import add_frames, Cut
+from linkage_ros.models.names import prefixed, PrefixedNames
+from linkage_ros.models.orientation import named_joints
+from linkage_ros.models.part import Part, PartError
+from linkage_ros.models.spans import Span, spans
+from linkage_ros.models.tree import grow, Tree, TreeJoint
+from linkage_ros.models.xml import comment, document, number, numbers, rough
+
+EFFORT, VELOCITY = 1000.0, 100.0
+"""Limits that URDF asks for and nobody knows, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
+
+_ROOT = 'world'
+
+
+class _Model(NamedTuple):
+    """A linkage, ready to be written."""
+
+    part: Part
+    names: PrefixedNames
+    tree: Tree
+    cuts: Sequence[Cut]
+    spans: Mapping[str, Span]
+    bodies: Mapping[str, Body]
+
+
+def urdf(name: str, parts: Sequence[Part]) -> bytes:
+    """
+    Return a robot model.
+
+    Parameters
+    ----------
+    name
+        Of the robot.
+    parts
+        Its linkages.
+
+    Raises
+    ------
+    PartError
+        Where the published joints of one do not tell where all its links are.
+
+    """
+    names, own = prefixed([(part.prefix, part.closure.linkage) for part in parts])
+    models = []
+    layers = 0
+    for count, (part, its) in enumerate(zip(parts, own, strict=True)):
+        try:
+            tree = grow(part.closure.linkage, its)
+        except DefinitionError as error:
+            raise PartError(count, error.where, error.reason, error.remedy) from None
+        cuts = add_frames(tree, its)
+        found = spans(part.closure)
+        models.append(_Model(part, its, tree, cuts, found, bodies(part.closure, found, layers)))
+        layers += len(part.closure.linkage.links)
+    robot = ET.Element('robot', name=name)
+    robot.append(comment(list(_head(models))))
+    if len(models) > 1:
+        root = names.frame(_ROOT)
+        ET.SubElement(robot, 'link', name=root)
+        for model in models:
+            mount = TreeJoint(
+                model.names.joint('mount'), 'fixed', root, model.names.own(GROUND), 0j
+            )
+            _joint(robot, mount, None)
+    for model in models:
+        _write(robot, model)
+    return document(robot)
+
+
+def _head(models: Sequence[_Model]) -> Iterator[str]:
+    yield from _HEAD.splitlines()
+    if len(models) > 1:
+        yield 'A scene does not say where its linkages stand: change the origin of NAME_mount.'
+    if any(joint.mimics for model in models for joint in model.tree.joints):
+        yield 'Frames without a body between joints at one pin turn with joints that they mimic,'
+        yield 'so that a published joint starts from the link that it is measured from.'
+    for model in models:
+        yield ''
+        if not model.cuts:
+            yield 'Nothing is cut.'
+        for cut in model.cuts:
+            first, *others = cut.frames
+            met = ' and '.join(others)
+            what = 'pin' if cut.kind == 'pin' else 'slider'
+            line = f'{met} is on the x axis of {first}'
+            how = line if cut.kind == 'line' else f'{first} meets {met}'
+            yield f'cut {what} {cut.name}: {how}'
+        if spare := ', '.join(map(model.names.own, model.tree.spare)):
+            yield f'joints that no link hangs by: {spare}'
+
+
+_HEAD = f"""\
+A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are those of
+the published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
+Links are bars in layers, of no particular shape; those with a mass are thin plates: ixx = iyy =
+izz/2.
+limit: what the joint comes to over the range of the input that the linkage starts in, and 0.001
+rad, or of the reach, on either side; with several inputs none for angles, the reach for slides.
+effort and velocity are not known: {EFFORT:g} and {VELOCITY:g}."""
+
+
+def _write(robot: ET.Element, model: _Model) -> None:
+    names, linkage = model.names, model.part.closure.linkage
+    for link in linkage.links:
+        element = ET.SubElement(robot, 'link', name=names.own(link))
+        origin = model.tree.origins[link]
+        if link in linkage.masses and link != GROUND:
+            _inertial(element, linkage.masses[link], origin)
+        _visuals(element, names.own(link), model.bodies[link], origin)
+    links = {names.own(link) for link in linkage.links}
+    for joint in model.tree.joints:
+        if joint.child not in links:
+            ET.SubElement(robot, 'link', name=joint.child)
+    found = {names.own(name): span for name, span in model.spans.items()}
+    for joint in model.tree.joints:
+        _joint(robot, joint, found.get(joint.mimics or joint.name))
+    _start(robot, model)
+
+
+def _inertial(link: ET.Element, mass: Mass, origin: complex) -> None:
+    inertial = ET.SubElement(link, 'inertial')
+    _origin(inertial, complex(*mass.center) - origin)
+    ET.SubElement(inertial, 'mass', value=number(mass.mass))
+    flat, about = number(0.5 * mass.inertia), number(mass.inertia)
+    ET.SubElement(inertial, 'inertia', ixx=flat, ixy='0', ixz='0', iyy=flat, iyz='0', izz=about)
+
+
+def _visuals(link: ET.Element, name: str, body: Body, origin: complex) -> None:
+    for count, solid in enumerate(body.solids):
+        visual = ET.SubElement(link, 'visual')
+        if solid.name and solid.kind in ('disc', 'block'):
+            visual.set('name', solid.name)
+        centre = solid.centre - origin
+        seen = {'xyz': rough(centre.real, centre.imag, solid.z), 'rpy': rough(0, 0, solid.angle)}
+        ET.SubElement(visual, 'origin', seen)
+        geometry = ET.SubElement(visual, 'geometry')
+        if solid.kind == 'disc':
+            radius = rough(0.5 * solid.width)
+            ET.SubElement(geometry, 'cylinder', radius=radius, length=rough(solid.height))
+        else:
+            size = rough(solid.length, solid.width, solid.height)
+            ET.SubElement(geometry, 'box', size=size)
+        material = ET.SubElement(visual, 'material', name=f'colour of {name}')
+        if not count:
+            ET.SubElement(material, 'color', rgba=numbers(*body.colour))
+
+
+def _joint(robot: ET.Element, joint: TreeJoint, span: Span | None) -> None:
+    kind: str = joint.kind
+    if kind == 'revolute' and span is not None and not span.limited:
+        kind = 'continuous'
+    element = ET.SubElement(robot, 'joint', name=joint.name, type=kind)
+    _origin(element, joint.place, joint.turn)
+    ET.SubElement(element, 'parent', link=joint.parent)
+    ET.SubElement(element, 'child', link=joint.child)
+    if joint.kind == 'fixed':
+        return
+    assert span is not None, 'all that moves is published'
+    if joint.kind == 'revolute':
+        axis = numbers(0.0, 0.0, joint.axis.real)
+    else:
+        axis = numbers(joint.axis.real, joint.axis.imag, 0.0)
+    ET.SubElement(element, 'axis', xyz=axis)
+    limit = {'effort': number(EFFORT), 'velocity': number(VELOCITY)}
+    if kind != 'continuous':
+        limit = {'lower': number(span.lowest), 'upper': number(span.highest), **limit}
+    ET.SubElement(element, 'limit', limit)
+    if joint.mimics:
+        ET.SubElement(element, 'mimic', joint=joint.mimics, multiplier='1', offset='0')
+
+
+def _origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:
+    xyz, rpy = numbers(place.real, place.imag, 0.0), numbers(0.0, 0.0, turn)
+    ET.SubElement(element, 'origin', xyz=xyz, rpy=rpy)
+
+
+def _start(robot: ET.Element, model: _Model) -> None:
+    """
+    Say what URDF has no words for: the inputs, and a pose in which the loops close.
+
+    Readers of URDF pass over elements that they do not know; ``linkage import`` knows it.
+    """
+    closure, names = model.part.closure, model.names
+    inputs = usual_inputs(closure)
+    given = zip(closure.linkage.inputs, inputs, strict=True)
+    values = {driven.joint: value for driven, value in given}
+    values |= dict(zip(closure.linkage.joints, closure.position(*inputs).joints, strict=True))
+    element = ET.SubElement(robot, 'linkage_start')
+    for name in named_joints(closure.linkage):
+        kind = 'input' if name in [each.joint for each in closure.linkage.inputs] else 'joint'
+        ET.SubElement(element, kind, name=names.own(name), value=number(values[name]))

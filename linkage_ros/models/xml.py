@@ -1,0 +1,53 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""XML as robot models have it: numbers that read as the same floats, comments of any text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+from xml.etree import ElementTree as ET
+
+
+def number(value: float) -> str:
+    """Return the shortest text that reads as the same float; never a negative zero."""
+    value = float(value) + 0.0
+    return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+
+
+def numbers(*values: float) -> str:
+    """Return numbers with blanks between them."""
+    return ' '.join(map(number, values))
+
+
+def rough(*values: float) -> str:
+    """Return numbers to six digits: sizes of what is only looked at."""
+    return ' '.join(f'{value:.6g}' for value in values)
+
+
+def comment(lines: Sequence[str]) -> Any:
+    """Return a comment; XML does not let two hyphens stand together in one."""
+    text = '\n'.join(f'  {line}'.rstrip() for line in lines)
+    while '--' in text:
+        text = text.replace('--', '- -')
+    return ET.Comment(f'\n{text}\n')
+
+
+def document(root: ET.Element) -> bytes:
+    """Return a whole file, the same bytes for the same content."""
+    ET.indent(root)
+    text: str = ET.tostring(root, 'unicode')
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n'.encode()

@@ -1,0 +1,58 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The linkages of a scene as a robot model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.models.part import Part, PartError
+from linkage_ros.scene.scene import Scene
+
+Write = Callable[[str, Sequence[Part]], bytes]
+"""Writes a model of a name and its linkages."""
+
+
+def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> bytes:
+    """
+    Return the model of a scene, with its joints named as in its messages.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    closures
+        Its linkages as they are solved, deviations of their parts included.
+    write
+        `urdf` or `mjcf`.
+
+    Raises
+    ------
+    FileError
+        Where a linkage does not make a model, with what would help.
+
+    """
+    parts = [
+        Part(closure, member.prefix, member.loads)
+        for member, closure in zip(scene.members, closures, strict=True)
+    ]
+    try:
+        return write(scene.name, parts)
+    except PartError as error:
+        member = scene.members[error.number]
+        content = member.linkage_content if error.of_linkage else member.content
+        raise content.error(error.where, error.reason, error.remedy) from None

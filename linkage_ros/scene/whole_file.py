@@ -1,0 +1,68 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A file written so that at every instant a whole one is there, the old or the new."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+import os
+from pathlib import Path
+from secrets import token_hex
+
+from linkage_ros.errors import LinkageError
+
+
+def write_whole(file: str | Path, data: bytes) -> None:
+    """
+    Write a file, in the place of one that is there: beside its place, and moved there.
+
+    Parameters
+    ----------
+    file
+        Where to; a symbolic link is followed.
+    data
+        What it is to hold.
+
+    Raises
+    ------
+    LinkageError
+        Where the file cannot be written.
+
+    """
+    try:
+        target = Path(file).resolve()
+        if target.exists() and not target.is_file():
+            raise LinkageError(file, 'is there already and is no file', 'name another file')
+        if target.exists() and not os.access(target, os.W_OK):
+            raise PermissionError(0, 'Permission denied')
+        _replace(target, data)
+    except (OSError, ValueError, RuntimeError) as error:  # the last for links in a circle
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise LinkageError(file, f'cannot be written ({reason})', 'name another file') from None
+
+
+def _replace(target: Path, data: bytes) -> None:
+    temporary = target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'
+    try:
+        with temporary.open('xb') as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(target)
+    except OSError:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,209 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The URDF of a linkage: valid, the same every time, with limits that its joints keep."""
+
+from __future__ import annotations
+
+from collections import Counter
+from math import pi
+from xml.etree import ElementTree as ET
+
+from linkage_ros.cli.linkage_file import open_linkage
+from linkage_ros.cli.model_file import model_of
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.models.part import Part, PartError
+from linkage_ros.models.urdf import urdf
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.yaml_file import parse_yaml
+import pytest
+
+from .gallery import GALLERY, LINKAGES, size_of
+from .odd import closure_of, ODD, UNTOLD
+from .walked import moving, moving_text, said, Walked
+
+SCENES = LINKAGES.parent / 'scenes'
+CASES = [*GALLERY, 'five_bar', *ODD]
+URDF_KINDS = {'revolute', 'continuous', 'prismatic', 'fixed'}
+
+
+def closure(name):
+    return closure_of(name) if name in ODD else open_linkage(str(LINKAGES / f'{name}.yaml'))
+
+
+def numbers(element, key):
+    return [float(part) for part in element.get(key).split()]
+
+
+@pytest.mark.parametrize('name', CASES)
+def test_it_is_what_urdf_asks_for(name):
+    """As check_urdf has it, and what robot_state_publisher warns of."""
+    robot = ET.fromstring(urdf('it', [Part(closure(name))]))
+    links = [link.get('name') for link in robot.findall('link')]
+    joints = robot.findall('joint')
+    names = [joint.get('name') for joint in joints]
+    assert max(Counter(links).values()) == max(Counter(names).values()) == 1
+    children = [joint.find('child').get('link') for joint in joints]
+    assert max(Counter(children).values()) == 1, 'a link with two parents'
+    assert set(links) - set(children) == {'ground'}, 'not one root'
+    above = {j.find('child').get('link'): j.find('parent').get('link') for j in joints}
+    for link in children:
+        seen = [link]
+        while seen[-1] != 'ground':
+            seen.append(above[seen[-1]])
+            assert len(seen) <= len(links), 'a ring'
+    own = {j.get('name') for j in joints if j.find('mimic') is None}
+    for joint in joints:
+        kind, limit = joint.get('type'), joint.find('limit')
+        assert kind in URDF_KINDS
+        if kind == 'fixed':
+            continue
+        assert sum(x * x for x in numbers(joint.find('axis'), 'xyz')) == pytest.approx(1.0)
+        assert float(limit.get('effort')) > 0.0 < float(limit.get('velocity'))
+        if kind != 'continuous':
+            assert float(limit.get('lower')) < float(limit.get('upper'))
+        if (mimic := joint.find('mimic')) is not None:
+            assert mimic.get('joint') in own
+    assert robot.find("link[@name='ground']/inertial") is None
+    for inertia in robot.iter('inertia'):
+        ixx, iyy, izz = (float(inertia.get(key)) for key in ('ixx', 'iyy', 'izz'))
+        assert ixx == iyy == izz / 2
+    colours = Counter(material.get('name') for material in robot.iter('material') if len(material))
+    assert set(colours.values()) == {1}, 'a colour is said twice'
+
+
+@pytest.mark.parametrize('name', CASES[::7])
+def test_the_same_linkage_gives_the_same_bytes(name):
+    assert urdf('it', [Part(closure(name))]) == urdf('it', [Part(closure(name))])
+
+
+def limits_of(data):
+    return {
+        joint.get('name'): (joint.get('type'), joint.find('limit'))
+        for joint in ET.fromstring(data).findall('joint')
+        if joint.get('type') != 'fixed'
+    }
+
+
+@pytest.mark.parametrize('name', [*GALLERY, *ODD])
+def test_joints_keep_their_limits_and_come_near_them(name):
+    """A node that starts where the linkage starts publishes nothing beyond the limits."""
+    file = LINKAGES / f'{name}.yaml'
+    pipeline = moving_text(ODD[name]) if name in ODD else moving(file)
+    limits = limits_of(urdf('it', [Part(pipeline.closures[0])]))
+    size = size_of(pipeline.closures[0])
+    seen = {}
+    for names, positions in said(pipeline, every=25_000_000, count=280):
+        for joint, value in zip(names, positions, strict=True):
+            seen.setdefault(joint, []).append(value)
+    for joint, values in seen.items():
+        kind, limit = limits[joint]
+        if kind == 'continuous':
+            assert max(values) - min(values) > 2.0 * pi - 0.1
+            continue
+        lower, upper = float(limit.get('lower')), float(limit.get('upper'))
+        assert lower <= min(values)
+        assert max(values) <= upper
+        # A sine over 96 % of a range leaves out much where joints go as the root of it.
+        slack = 0.35 * (upper - lower) + 0.01 * (size if kind == 'prismatic' else 1.0)
+        assert min(values) - lower < slack
+        assert upper - max(values) < slack
+
+
+def test_limits_by_hand():
+    """The rocker of a crank-rocker turns back where crank and coupler are in line."""
+    limits = limits_of(urdf('it', [Part(closure('four_bar'))]))
+    # Of the triangles 0.16, 0.1, 0.08 and 0.08, 0.1, 0.08: the angle at O4, from the ground's x.
+    expected = (0.9569, 2.2460)
+    kind, limit = limits['rocker_joint']
+    assert kind == 'revolute'
+    assert float(limit.get('lower')) == pytest.approx(expected[0], abs=2e-3)
+    assert float(limit.get('upper')) == pytest.approx(expected[1], abs=2e-3)
+    assert limits['crank_joint'][0] == limits['coupler_joint'][0] == 'continuous'
+    assert limits['crank_joint'][1].get('lower') is None
+    # The piston between its dead centres: sqrt((0.14 ± 0.04)² − 0.01²).
+    _, limit = limits_of(urdf('it', [Part(closure('slider_crank'))]))['piston_slide']
+    assert float(limit.get('lower')) == pytest.approx((0.10**2 - 0.01**2) ** 0.5, abs=4e-4)
+    assert float(limit.get('upper')) == pytest.approx((0.18**2 - 0.01**2) ** 0.5, abs=4e-4)
+    assert limits_of(urdf('it', [Part(closure('five_bar'))]))['left_elbow'][0] == 'continuous'
+
+
+@pytest.mark.parametrize('name', UNTOLD)
+def test_joints_that_do_not_tell_all(name):
+    text, remedy = UNTOLD[name]
+    linkage = read_linkage(parse_yaml(text.encode(), 'it'))
+    with pytest.raises(PartError) as caught:
+        urdf('it', [Part(Closure(linkage))])
+    assert str(caught.value) == f'joints: the published ones do not tell where {remedy}'
+    # What the remedy says is one.
+    added = str(caught.value).partition('add to joints: ')[2]
+    whole = text.replace('joints: {', f'joints: {{{added}, ')
+    urdf('it', [Part(Closure(read_linkage(parse_yaml(whole.encode(), 'it'))))])
+
+
+def test_a_scene_of_two_has_prefixes_and_one_root():
+    data = model_of(str(SCENES / 'two_fingers.yaml'), urdf)
+    model = Walked(data)
+    pipeline = Pipeline(load_scene(SCENES / 'two_fingers.yaml'))
+    count = 0
+    for names, positions in said(pipeline, every=20_000_000, count=100):
+        model.pose(names, positions)
+        for side in ('left', 'right'):
+            one, other = (f'{side}_B_on_{side}_{link}' for link in ('coupler', 'rocker'))
+            assert abs(model.place(one) - model.place(other)) < 1e-12 * 0.12
+        count += 1
+    assert count == 100
+    assert model.model.base_link == 'world'
+
+
+def test_parts_that_deviate_are_in_the_model():
+    """A scene with tolerances publishes the joints of the linkage as it was made."""
+    file = SCENES / 'worn_press.yaml'
+    scene = load_scene(file)
+    model, made = model_of(str(file), urdf), Pipeline(scene).closures[0].linkage
+    assert made.links != scene.members[0].linkage.links
+    (place,) = (
+        joint.find('origin')
+        for joint in ET.fromstring(model).iter('joint')
+        if joint.get('type') and joint.get('name') == 'rod_joint'
+    )
+    (x0, _), (x1, _) = made.links['crank']['O2'], made.links['crank']['A']
+    assert numbers(place, 'xyz')[0] == x1 - x0
+
+
+def test_names_that_two_linkages_come_to(tmp_path):
+    four_bar = LINKAGES / 'four_bar.yaml'
+    other = tmp_path / 'other.yaml'
+    other.write_text(four_bar.read_text().replace('crank_joint', 'b_crank_joint'))
+    scene = tmp_path / 'scene.yaml'
+    scene.write_text(
+        'linkages:\n'
+        f'  - {{name: a, linkage: {other}, drive: {{constant_rate: {{rate: 1}}}}}}\n'
+        f'  - {{name: a_b, linkage: {four_bar}, drive: {{constant_rate: {{rate: 1}}}}}}\n'
+    )
+    with pytest.raises(LinkageError, match="a second linkage has a joint 'a_b_crank_joint'"):
+        model_of(str(scene), urdf)
+
+
+@pytest.mark.parametrize('name', GALLERY)
+def test_pinocchio_reads_it_too(name):
+    """A reader that uses urdfdom, as robot_state_publisher does."""
+    pinocchio = pytest.importorskip('pinocchio')
+    data = urdf('it', [Part(closure(name))])
+    model = pinocchio.buildModelFromXML(data.decode())
+    assert set(model.names) - {'universe'} == set(limits_of(data))

@@ -1,0 +1,112 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+robot_description over DDS: a model for whoever comes late, which the joint states make move.
+
+What robot_state_publisher does with both is done by yourdfpy here.
+"""
+
+from __future__ import annotations
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from .graph import wait_for
+from ..models.walked import Walked  # noqa: TID252
+
+TOPIC = '/robot_description'
+AS_RVIZ = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+TURNING = 'rate: 200\ndrive: {constant_rate: {rate: 3.0}}\n'
+
+
+def late(graph):
+    """Return what one hears who comes when the node has long been there."""
+    heard = []
+    graph.node.create_subscription(String, TOPIC, heard.append, AS_RVIZ)
+    return heard
+
+
+def test_a_late_comer_sees_a_linkage_that_moves(graph, write_scene, start):
+    start(write_scene('described', TURNING + 'robot_description: true'))
+    states = graph.listen(JointState, '/joint_states')
+    wait_for(lambda: len(states) > 100, 'joint states')
+    for _ in range(2):
+        heard = late(graph)
+        wait_for(lambda heard=heard: heard, 'a robot model')
+        assert len(heard) == 1
+    model = Walked(heard[0].data.encode())
+    for state in states[::5]:
+        model.pose(list(state.name), list(state.position))
+        ends = [model.place(f'B_on_{link}') for link in ('coupler', 'rocker')]
+        assert abs(ends[0] - ends[1]) < 1e-12 * 0.12
+
+
+def test_several_linkages_are_one_model(graph, folder, start, request):
+    scene = request.config.rootpath / 'config' / 'scenes' / 'two_fingers.yaml'
+    text = scene.read_text().replace('../linkages', str(scene.parents[1] / 'linkages'))
+    (folder / 'two.yaml').write_text(text + '\nrobot_description: true\n')
+    start(folder / 'two.yaml')
+    heard = late(graph)
+    states = graph.listen(JointState, '/joint_states')
+    wait_for(lambda: heard and states, 'a robot model and a joint state')
+    model = Walked(heard[0].data.encode())
+    model.pose(list(states[-1].name), list(states[-1].position))
+    assert model.joints == set(states[-1].name)
+
+
+def test_it_goes_with_the_scene(graph, write_scene, start):
+    start(write_scene('gone', TURNING + 'robot_description: true'))
+    wait_for(lambda: graph.node.count_publishers(TOPIC) == 1, 'a publisher')
+    for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
+        request = ChangeState.Request(transition=Transition(id=transition))
+        assert graph.call(ChangeState, '/linkage_node/change_state', request).success
+    wait_for(lambda: graph.node.count_publishers(TOPIC) == 0, 'no publisher')
+    for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+        request = ChangeState.Request(transition=Transition(id=transition))
+        assert graph.call(ChangeState, '/linkage_node/change_state', request).success
+    heard = late(graph)
+    wait_for(lambda: heard, 'a robot model')
+
+
+def test_without_the_key_there_is_none(graph, write_scene, start):
+    start(write_scene('bare', TURNING))
+    states = graph.listen(JointState, '/joint_states')
+    wait_for(lambda: states, 'a joint state')
+    assert graph.node.count_publishers(TOPIC) == 0
+
+
+def test_joints_that_do_not_tell_all_are_said_in_a_line(write_scene, start):
+    linkage = (
+        'links:\n'
+        '  ground: {O2: [0, 0], O4: [0.1, 0]}\n'
+        '  crank: {O2: [0, 0], A: [0.04, 0]}\n'
+        '  coupler: {A: [0, 0], B: [0.12, 0]}\n'
+        '  rocker: {O4: [0, 0], B: [0.08, 0]}\n'
+        'input: {joint: crank_joint, parent: ground, child: crank}\n'
+        'assembly: {B: left}\n'
+        'joints: {rocker_joint: {parent: ground, child: rocker}}\n'
+    )
+    scene = write_scene('untold', TURNING + 'robot_description: true', linkage)
+    node = start(scene, ready='do not tell')
+    assert node.process.wait(20) == 2
+    line = next(line for line in node.log.splitlines() if 'do not tell' in line)
+    assert line.endswith(
+        "untold_linkage.yaml:8: joints: the published ones do not tell where link 'coupler' "
+        'stands; add to joints: coupler_joint: {parent: crank, child: coupler}'
+    )
