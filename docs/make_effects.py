@@ -52,6 +52,8 @@ _STANDS = {
     'drive_stage': 'the crank, before the loops are closed',
     'stage': 'the mechanism, once its loops are closed',
     'sensor': 'what is read',
+    'begin': 'the mechanism, once its loops are closed',
+    'writer': 'nothing: it draws what the mechanism does',
     'friction': 'whatever works with forces; no part of the tick of its own',
     'clock': 'the time by which a tick goes',
     'message': 'the messages of the crank',
@@ -98,9 +100,10 @@ def main() -> int:
 
 def _draw(page: str) -> Iterator[Path]:
     # The page can be checked where matplotlib is missing.
-    from .pictures import drives, faults, mechanism, paper, sensors
+    from .pictures import drives, faults, markers, mechanism, paper, sensors
 
-    draw = {**drives.PICTURES, **mechanism.PICTURES, **sensors.PICTURES, **faults.PICTURES}
+    rooms = (drives, mechanism, sensors, markers, faults)
+    draw = {name: picture for room in rooms for name, picture in room.PICTURES.items()}
     for section in sections(page):
         if section.scene:
             name = section.name.lower()

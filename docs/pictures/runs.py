@@ -163,6 +163,15 @@ def run(scene: Scene, seconds: float, samples: Sequence[Sample] = ()) -> Run:
     return Run(pipeline, np.array(times) * 1e-9, looks)
 
 
+def extra_messages(scene: Scene, message_type: str, seconds: float) -> list[bytes]:
+    """Return the messages of an extra's type in some seconds of a scene that drives itself."""
+    with TemporaryDirectory() as folder:
+        pipeline, _ = _built(Path(folder), scene, ())
+    place = next(n for n, extra in enumerate(pipeline.extras) if extra.message == message_type)
+    made = [pipeline.tick(START + time).extras for time in ticks(scene, seconds)]
+    return [extras[place] for extras in made if extras and extras[place]]
+
+
 def ticks(scene: Scene, seconds: float) -> list[int]:
     """Return the times of the ticks, in [ns] since the first."""
     rate = scene.get('rate', 1000)

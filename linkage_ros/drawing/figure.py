@@ -146,7 +146,7 @@ def _pose_text(closure: Closure, inputs: tuple[float, ...]) -> str:
     )
 
 
-def _places(shown: View) -> list[complex]:
+def all_places(shown: View) -> list[complex]:
     """Return all places through which something goes, in [m]."""
     places = [place for path in shown.sweep.paths.values() for place in path]
     for position in (shown.position, *shown.ghosts):
@@ -157,7 +157,7 @@ def _places(shown: View) -> list[complex]:
 
 def symbol_size(shown: View) -> float:
     """Return half the width of a bar, in [m]: what suits the picture and its shortest link."""
-    low, high = corners(_places(shown))
+    low, high = corners(all_places(shown))
     picture = abs(high - low)
     points = shown.closure.points(shown.position)
     bars = [
@@ -187,7 +187,7 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
 
     size = symbol_size(shown)
     drawn = shapes(shown.closure, shown.position, size, shown.sweep.travels)
-    low, high = corners([*_places(shown), *(p for shape in drawn for p in outline(shape))])
+    low, high = corners([*all_places(shown), *(p for shape in drawn for p in outline(shape))])
     margin = complex(3.0, 3.0) * size
     width, height = (high - low + 2.0 * margin).real, (high - low + 2.0 * margin).imag
     wide = min(max(4.9 * width / height, 3.0), 6.4)

@@ -42,7 +42,7 @@ NAME_INK = '#35608a'
 GHOST = '#cfcfcf'
 LAYERS = {'ghost': 1, 'path': 2, 'shape': 3, 'label': 6}
 
-_FACES = {
+FACES = {
     'link': '#c3d3e2',
     'plate': '#d3e0ecc0',
     'input': '#f0a07a',
@@ -129,7 +129,7 @@ def paint(axes: Any, drawn: Sequence[Shape]) -> None:
             patch = patches.Polygon(
                 corners,
                 closed=True,
-                facecolor=_FACES[shape.role],
+                facecolor=FACES[shape.role],
                 edgecolor=INK,
                 linewidth=0.9,
                 joinstyle='round',

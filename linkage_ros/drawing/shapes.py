@@ -99,6 +99,13 @@ def shapes(closure: Closure, position: Position, size: float, travels: Travels) 
         How far rails have to go.
 
     """
+    return [shape for _, shape in carried_shapes(closure, position, size, travels)]
+
+
+def carried_shapes(
+    closure: Closure, position: Position, size: float, travels: Travels
+) -> list[tuple[str, Shape]]:
+    """Draw a linkage as `shapes` does; return with each shape the link that carries it."""
     pose = _Pose(
         closure,
         closure.points(position),
@@ -109,31 +116,31 @@ def shapes(closure: Closure, position: Position, size: float, travels: Travels) 
     )
     linkage, structure = closure.linkage, closure.structure
     cylinders = [name for name in linkage.sliders if _is_cylinder(pose, name)]
-    drawn: list[Shape] = []
+    ground: list[Shape] = []
     for name, slider in linkage.sliders.items():
         if slider.along == GROUND:
-            drawn += _ground_rail(pose, name, slider)
+            ground += _ground_rail(pose, name, slider)
     for place in _supports(pose):
-        drawn += _support(place, size)
+        ground += _support(place, size)
+    drawn = [(GROUND, shape) for shape in ground]
     driven = driven_links(closure)
     links = [
-        _link(pose, link, 'input' if link in driven else 'link', cylinders)
+        (link, _link(pose, link, 'input' if link in driven else 'link', cylinders))
         for link in linkage.links
         if link != GROUND
     ]
     # Plates hide least below the bars, and what is driven is to be seen.
-    for parts in sorted(links, key=_layer):
-        drawn += parts
+    for link, parts in sorted(links, key=lambda found: _layer(found[1])):
+        drawn += [(link, part) for part in parts]
     for name, slider in linkage.sliders.items():
         if name not in cylinders:
-            drawn.append(_block(pose, name, slider))
+            drawn.append((structure.blocks[name], _block(pose, name, slider)))
     pins = {
-        point: place
-        for (_, point), place in pose.points.items()
+        point: (link, Circle('pin', point, place, 0.55 * size))
+        for (link, point), place in pose.points.items()
         if sum(point in points for points in structure.links.values()) > 1
     }
-    drawn += [Circle('pin', point, place, 0.55 * size) for point, place in pins.items()]
-    return drawn
+    return [*drawn, *pins.values()]
 
 
 def skeleton(closure: Closure, position: Position) -> list[Segment]:

@@ -24,9 +24,9 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Mapping
-import json
 
-from linkage_ros.bag.reading.reader import Bag, RUN_FILE
+from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.reading.run_events import run_said
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import BagError
 from linkage_ros.joint_state import JointStateReader, Rejection
@@ -153,7 +153,5 @@ def _why(found: Mapping[str, Samples]) -> str:
 
 def _crank_topic_of_run(bag: Bag) -> str:
     """Return the crank topic of a bag of ours; '' where it does not say."""
-    try:
-        return str(json.loads(bag.attachments[RUN_FILE])['crank_topic'])
-    except (KeyError, TypeError, ValueError):
-        return ''
+    said = run_said(bag).get('crank_topic')
+    return said if isinstance(said, str) else ''

@@ -117,6 +117,8 @@ class Context:
         In its joints; nothing where the scene names none.
     prefix
         What the joints' names have before their own in messages; '' for nothing.
+    effects
+        Names of the effects that the scene names.
 
     """
 
@@ -127,6 +129,7 @@ class Context:
     loads: Loads | None
     friction: Friction | None
     prefix: str = ''
+    effects: frozenset[str] = frozenset()
 
     @property
     def joints(self) -> tuple[str, ...]:

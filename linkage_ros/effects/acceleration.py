@@ -60,7 +60,7 @@ def stage(_parameters: AccelerationParameters, context: Context) -> Stage:
     return acceleration
 
 
-def writer(context: Context) -> Writer:
+def writer(_parameters: AccelerationParameters, context: Context) -> Writer:
     """Build what writes the message: what is read, as a trajectory of one point."""
     from linkage_ros.joint_trajectory import JointTrajectoryWriter  # local import: if published
 

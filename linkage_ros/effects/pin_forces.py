@@ -61,7 +61,7 @@ def stage(_parameters: PinForcesParameters, context: Context) -> Stage:
     return pin_forces
 
 
-def writer(context: Context) -> Writer:
+def writer(_parameters: PinForcesParameters, context: Context) -> Writer:
     """Build what writes the message; nothing where there are no forces."""
     from linkage_ros.multi_dof_joint_state import PlanarWrenchWriter  # local import: if published
 

@@ -38,15 +38,20 @@ An effect that publishes a message of its own has also
 
 ``TOPIC``, ``MESSAGE``
     The topic, and the type of the message: package/msg/Type.
-``writer(context) -> Callable[[int, Motion, Reading], bytes]``
+``writer(parameters, context) -> Callable[[int, Motion, Reading], bytes]``
     Build what writes the message, given the time of the tick, in [ns]; b'' where there is nothing
-    to publish. It is asked only where there is a reading.
+    to publish. It is asked only where there is a reading. Where it has a method
+    ``no_pose(now, position) -> bytes`` that is asked where the loop has no pose.
+
+A scene may also name a module of one's own, by its dotted name: see `linkage_ros.effects.own`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Collection
+from importlib import import_module
 from operator import add
+from types import ModuleType
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import CrankState
@@ -78,6 +83,8 @@ EFFECTS = {
     'rate_limit': 'linkage_ros.effects.rate_limit',
     'dropout': 'linkage_ros.effects.dropout',
     'delay': 'linkage_ros.effects.delay',
+    # What is drawn of the mechanism.
+    'markers': 'linkage_ros.effects.markers',
 }
 """Name of each effect, and the module that holds it."""
 
@@ -97,14 +104,42 @@ LOADED = ('effort', 'pin_forces', 'compliance', 'clearance')
 """Effects to which masses, loads and friction matter."""
 
 
+def module_of(effect: str) -> ModuleType:
+    """Import an effect: one of this package, or a module of one's own by its dotted name."""
+    if '.' not in effect:
+        return import_module(EFFECTS[effect])
+    from linkage_ros.effects.own import own_module  # local import: only where a scene has one
+
+    return own_module(effect)
+
+
+def in_order(named: Collection[str]) -> tuple[str, ...]:
+    """Return effects in the order in which they act."""
+    if not any('.' in name for name in named):
+        return tuple(name for name in EFFECTS if name in named)
+    from linkage_ros.effects.own import with_own  # local import: as above
+
+    return with_own(named)
+
+
+def needs(effect: str) -> tuple[str, ...]:
+    """Return what an effect starts from."""
+    if '.' not in effect:
+        return NEEDS.get(effect, ())
+    from linkage_ros.effects.own import own_needs  # local import: as above
+
+    return own_needs(effect)
+
+
 def brings(effect: str) -> tuple[str, ...]:
     """Return what an effect brings in."""
-    return *NEEDS.get(effect, ()), *PUBLISHED_WITH.get(effect, ())
+    return *needs(effect), *PUBLISHED_WITH.get(effect, ())
 
 
-def bringing(name: str, named: Container[str]) -> tuple[str, ...]:
+def bringing(name: str, named: Collection[str]) -> tuple[str, ...]:
     """Return the effects, of those named, that bring another in."""
-    return tuple(other for other in EFFECTS if other in named and name in brings(other))
+    own = [other for other in named if '.' in other or other in EFFECTS]
+    return tuple(other for other in in_order(own) if name in brings(other))
 
 
 class Motion(NamedTuple):
@@ -182,3 +217,4 @@ Begin = Callable[[CrankState, Position], Motion]
 Stage = Callable[[Motion], Motion]
 Sensor = Callable[[int, Reading], Reading | None]
 Writer = Callable[[int, Motion, Reading], bytes]
+OpenWriter = Callable[[int, Position], bytes]

@@ -41,23 +41,32 @@ class Nearness(NamedTuple):
     toggle_distance
         How far the input is from the next toggle or change point, in [rad] or [m]; infinite where
         there is none, and where there are several inputs.
+    group
+        Number of the group whose conditioning that is; −1 where there is no dyad and none that is
+        iterated.
 
     """
 
     transmission_angle: float
     conditioning: float
     toggle_distance: float
+    group: int = -1
 
 
 def nearness(closure: Closure, position: Position) -> Nearness:
     """Return how near trouble a closed position is."""
-    angle, conditioning = 0.5 * pi, 1.0
-    for step, pose in zip(closure.steps, position.poses, strict=True):
+    angle, conditioning, weakest = 0.5 * pi, 1.0, -1
+    groups = closure.step_groups
+    for step, pose, group in zip(closure.steps, position.poses, groups, strict=True):
         if hasattr(step, 'transmission_angle'):
-            angle = min(angle, step.transmission_angle(pose))
+            angle = min(angle, of_dyad := step.transmission_angle(pose))
+            found = sqrt(2.0) * sin(0.5 * of_dyad)
         elif hasattr(step, 'conditioning'):
-            conditioning = min(conditioning, step.conditioning(pose))
-    conditioning = min(conditioning, sqrt(2.0) * sin(0.5 * angle))
+            found = step.conditioning(pose)
+        else:
+            continue
+        if weakest < 0 or found < conditioning:
+            conditioning, weakest = min(found, 1.0), group
     distance = inf
     if len(closure.linkage.inputs) == 1:
         sliding = bool(closure.linkage.inputs[0].slider)
@@ -66,7 +75,7 @@ def nearness(closure: Closure, position: Position) -> Nearness:
         for critical in closure.critical_inputs:
             away = value - critical
             distance = min(distance, abs(away if sliding else remainder(away, tau)))
-    return Nearness(angle, conditioning, distance)
+    return Nearness(angle, conditioning, distance, weakest)
 
 
 def critical_inputs(closure: Closure) -> tuple[float, ...]:

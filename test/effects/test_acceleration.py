@@ -119,7 +119,7 @@ def test_the_message_is_the_motion_at_one_point():
     # Turns added, and whatever else sensors do: what is written is what is read.
     reading = Reading(3_000_000_004, (7.0, 8.0), rates, accelerations, ())
     context = Context(FOUR_BAR, 1000.0, True, 'seed', None, None, prefix='left_')
-    data = acceleration.writer(context)(9, motion, reading)
+    data = acceleration.writer(acceleration.PARAMETERS(), context)(9, motion, reading)
     message = STORE.deserialize_cdr(data, 'trajectory_msgs/msg/JointTrajectory')
     assert (message.header.stamp.sec, message.header.stamp.nanosec) == (3, 4)
     assert message.joint_names == ['left_coupler_joint', 'left_rocker_joint']

@@ -79,7 +79,7 @@ def test_at_a_toggle_there_are_none_and_no_message():
     assert motion.position.status is Status.TOGGLE
     assert motion.reactions == ()
     reading = Reading(7, motion.position.joints, (), (), ())
-    assert pin_forces.writer(within)(9, motion, reading) == b''
+    assert pin_forces.writer(pin_forces.PARAMETERS(), within)(9, motion, reading) == b''
 
 
 def test_where_the_balance_has_no_solution_there_are_none():

@@ -1,0 +1,243 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Markers: the linkage as RViz and Foxglove draw it, on a topic of its own, at a rate of its own.
+
+They show the mechanism as the tick has solved it, not what a sensor makes of it. With the time t
+of the tick and the rate f of the markers, the message comes with the first tick of which::
+
+    ⌊t·f⌋ ≠ ⌊t′·f⌋
+
+t′ being the time of the last message: nothing but the ticks' times decides, so that a replay gives
+the same messages. What does not move comes with the first of each second. A marker goes by itself
+after its lifetime, so that what is silent is not seen standing.
+
+Forces are arrows; see `linkage_ros.effects.marker_arrows`.
+
+Links are red while the conditioning of the group that they belong to (see
+`linkage_ros.kinematics.nearness`) is below √2·sin(μ/2), μ being the threshold: of a dyad, while
+its transmission angle is smaller than μ. Where a loop does not close there is no pose, and none is
+invented: what moves is deleted, and a text says by how much it does not close.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from math import pi, radians, sin, sqrt
+
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.marker_arrows import Arrows
+from linkage_ros.effects.marker_shapes import ALARM, Key, marker_shapes
+from linkage_ros.effects.stage import Motion, Reading, Writer
+from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.kinematics.closure import Position
+from linkage_ros.kinematics.groups import Driven, Dyad, Group
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.survey import usual_inputs
+from linkage_ros.marker_array import DELETE, MarkerArrayWriter
+from linkage_ros.parameters import number, text
+
+TOPIC = '~/markers'
+MESSAGE = 'visualization_msgs/msg/MarkerArray'
+
+_LONGEST_TRAIL = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class MarkersParameters:
+    """The linkage drawn for RViz and Foxglove, on ~/markers."""
+
+    rate: float = number('messages a second, at most', 30.0, unit='Hz', least=0.01, most=1000.0)
+    frame: str = text("frame of the markers, in the place of the ground's", '')
+    thickness: float = number(
+        'width of a bar, as a share of all that the linkage reaches; 0: what suits it',
+        0.0,
+        least=0.0,
+        most=0.5,
+    )
+    trace: float = number(
+        'how long a traced point leaves its way behind; 0: its whole curve, with one input',
+        0.0,
+        unit='s',
+        least=0.0,
+        most=60.0,
+    )
+    force_scale: float = number(
+        'length of an arrow for a force; 0: by its logarithm', 0.0, unit='m/N', least=0.0, most=1e6
+    )
+    near_toggle: float = number(
+        'transmission angle below which links are red',
+        radians(10.0),
+        unit='rad',
+        least=0.0,
+        most=0.5 * pi,
+    )
+
+
+PARAMETERS = MarkersParameters
+
+
+def writer(parameters: MarkersParameters, context: Context) -> Writer:
+    """Build what writes the message."""
+    return Markers(parameters, context)
+
+
+class Markers:
+    """
+    The markers of a linkage, at their own rate.
+
+    Parameters
+    ----------
+    use
+        How they look.
+    context
+        What they show.
+
+    """
+
+    __slots__ = (
+        '_arrows', '_closure', '_frame', '_full', '_groups', '_inputs', '_moving', '_near', '_per',
+        '_second', '_shapes', '_slot', '_trails', '_unit',
+    )  # fmt: skip
+
+    def __init__(self, use: MarkersParameters, context: Context) -> None:
+        self._closure = closure = context.closure
+        self._unit, denominator = use.rate.as_integer_ratio()
+        self._per = NANOSECONDS * denominator
+        self._slot = self._second = -1
+        self._frame = use.frame or context.prefix + GROUND
+        named = context.effects
+        self._inputs = closure.linkage.inputs if 'effort' in named else ()
+        reactions = context.reactions.joints if 'pin_forces' in named else ()
+        joints = [
+            Key(joint.link, closure.linkage.sliders[joint.name].point)
+            if joint.kind == 'P'
+            else Key(joint.link, joint.name)
+            for joint in reactions
+        ]
+        trail = min(round(use.trace * use.rate) + 1, _LONGEST_TRAIL) if use.trace else 0
+        self._shapes = shapes = marker_shapes(
+            closure, use.thickness, trail, len(joints), len(self._inputs), _lifetimes(use, context)
+        )
+        self._arrows = Arrows(use.force_scale, closure, shapes, joints)
+        self._moving = MarkerArrayWriter(self._frame, shapes.moving)
+        self._full = MarkerArrayWriter(self._frame, (*shapes.moving, *shapes.still))
+        self._trails: list[deque[complex]] = [deque(maxlen=trail) for _ in shapes.trails]
+        self._near = sqrt(2.0) * sin(0.5 * use.near_toggle)
+        self._groups = tuple(frozenset(_links(group)) for group in closure.structure.groups)
+        # What is searched for once is searched for here, and not in a tick.
+        closure.nearness(closure.position(*usual_inputs(closure)))
+
+    def __call__(self, now: int, motion: Motion, _reading: Reading) -> bytes:
+        """Return a message, b'' between two of them."""
+        slot = now * self._unit // self._per
+        if slot == self._slot:
+            return b''
+        self._slot = slot
+        _, position, _, _, efforts, reactions, _ = motion
+        full = self._due(now)
+        write, shapes = self._full if full else self._moving, self._shapes
+        closure = self._closure
+        points, angles = closure.points(position), closure.link_angles(position)
+        red = self._red(position)
+        for marker, at, colour, filled in shapes.bodies:
+            write.place(marker, points[at], angles[at.link])
+            write.paint(marker, ALARM if filled and at.link in red else colour)
+        pins = [points[at] for at in shapes.pin_places]
+        for marker in shapes.pins:
+            write.draw(marker, pins)
+        for marker, at, trail in zip(
+            shapes.trails, shapes.trail_places, self._trails, strict=True
+        ):
+            place = points[at]
+            trail.append(place)
+            # A line has as many places from the start on.
+            write.draw(marker, [*trail, *(place,) * (trail.maxlen or 0)][: trail.maxlen])
+        for marker, drawn in zip(
+            shapes.forces, self._arrows.forces(points, reactions), strict=True
+        ):
+            _show(write, marker, drawn)
+        for marker, drawn in zip(
+            shapes.efforts,
+            self._arrows.efforts(self._inputs, points, angles, efforts),
+            strict=True,
+        ):
+            _show(write, marker, drawn)
+        write.show(shapes.status, False)
+        return write.message(now)
+
+    def no_pose(self, now: int, position: Position) -> bytes:
+        """Return a message that there is no pose, b'' between two of them."""
+        slot = now * self._unit // self._per
+        if slot == self._slot:
+            return b''
+        self._slot = slot
+        for trail in self._trails:
+            trail.clear()
+        said = f'{position.status.value}: no pose'
+        if position.status is Status.OPEN:
+            said = f'open: the links miss each other by {position.gap:.3g} m'
+        shapes = self._shapes
+        markers = [
+            marker._replace(text=said)
+            if number == shapes.status
+            else marker._replace(points=(), action=DELETE)
+            for number, marker in enumerate(shapes.moving)
+        ]
+        if self._due(now):
+            markers += shapes.still
+        return MarkerArrayWriter(self._frame, markers).message(now)
+
+    def _due(self, now: int) -> bool:
+        """Return whether what does not move is due."""
+        before, self._second = self._second, now // NANOSECONDS
+        return before != self._second
+
+    def _red(self, position: Position) -> frozenset[str]:
+        """Return the links that are near a toggle."""
+        nearness = self._closure.nearness(position)
+        near = nearness.conditioning < self._near and nearness.group >= 0
+        return self._groups[nearness.group] if near else frozenset()
+
+
+def _show(write: MarkerArrayWriter, marker: int, drawn: list[complex]) -> None:
+    write.show(marker, bool(drawn))
+    write.draw(marker, drawn)
+
+
+def _lifetimes(use: MarkersParameters, context: Context) -> tuple[int, int]:
+    """
+    Return how long what moves stays, and what does not, in [ns].
+
+    For three messages, but a second at least; and for ever where ticks come with samples alone,
+    since nobody knows when the next one does.
+    """
+    if not context.rate:
+        return 0, 0
+    period = 1.0 / min(use.rate, context.rate)
+    moves = max(1.0, 3.0 * period)
+    return round(moves * NANOSECONDS), round(max(3.0, moves) * NANOSECONDS)
+
+
+def _links(group: Group) -> tuple[str, ...]:
+    """Return the links of a group."""
+    if isinstance(group, Driven):
+        return (group.joint.link,)
+    if isinstance(group, Dyad):
+        return tuple(link for body in group.bodies for link in body)
+    return group.links

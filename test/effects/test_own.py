@@ -1,0 +1,417 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Effects that a scene names by the module that holds them, outside of this package."""
+
+from __future__ import annotations
+
+from hashlib import sha256
+from itertools import count
+import json
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from linkage_ros.bag.reading.reader import RUN_FILE
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.cdr import time_message
+from linkage_ros.cli.violations import violations
+from linkage_ros.effects.own import FUNCTIONS
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.errors import FileError
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import own_effects_here
+from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.scene_schema import scene_schema
+from linkage_ros.scene.yaml_file import read_yaml
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SECOND = 10**9
+RATE = 3.0
+
+HEAD = """
+from dataclasses import dataclass
+
+from linkage_ros.parameters import number
+
+
+@dataclass(frozen=True, slots=True)
+class MineParameters:
+    'What is mine.'
+
+    by: float = number('how much', 1.0, unit='rad', least=-10.0, most=10.0)
+
+
+PARAMETERS = MineParameters
+"""
+ADD = """
+AFTER = 'bias'
+
+
+def sensor(parameters, context):
+    def mine(now, reading):
+        return reading._replace(joints=tuple(joint + parameters.by for joint in reading.joints))
+
+    return mine
+"""
+DOUBLE = ADD.replace('joint + parameters.by', 'joint * 2.0')
+YIELD = """
+from linkage_ros.effects.stage import yielding
+
+NEEDS = ('pin_forces',)
+AFTER = 'pin_forces'
+
+
+def stage(parameters, context):
+    def mine(motion):
+        force = motion.reactions[0].fx
+        return yielding(motion, (parameters.by * force,) * len(context.joints))
+
+    return mine
+"""
+LATE_CRANK = """
+AFTER = 'backlash'
+
+
+def drive_stage(parameters, context):
+    def mine(crank):
+        return crank._replace(angles=tuple(angle - parameters.by for angle in crank.angles))
+
+    return mine
+"""
+LONGER = """
+from dataclasses import replace
+
+AFTER = 'tolerance'
+
+
+def alter(parameters, linkage, random):
+    crank = {**linkage.links['crank'], 'A': (0.04 + parameters.by, 0.0)}
+    return replace(linkage, links={**linkage.links, 'crank': crank})
+"""
+TELL = """
+from linkage_ros.cdr import time_message
+
+AFTER = 'delay'
+TOPIC, MESSAGE = '~/mine', 'builtin_interfaces/msg/Time'
+
+
+def writer(parameters, context):
+    def mine(now, motion, reading):
+        return time_message(reading.stamp)
+
+    return mine
+"""
+
+_numbers = count()
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Return a function that writes modules into a package that nobody has imported before."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def write(**modules):
+        name = f'mine_{next(_numbers)}'
+        (tmp_path / name).mkdir()
+        for module, code in modules.items():
+            (tmp_path / name / f'{module}.py').write_text(code)
+        return name
+
+    return write
+
+
+def scene_file(folder, effects):
+    linkage = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
+    (folder / 'linkage.yaml').write_text(linkage.read_text())
+    file = folder / 'scene.yaml'
+    lines = [
+        'linkage: linkage.yaml',
+        f'drive: {{constant_rate: {{rate: {RATE}}}}}',
+        'effects:',
+        *(f'  {line}' for line in effects or ['{}']),
+    ]
+    file.write_text('\n'.join(lines))
+    return file
+
+
+def joints(file, second=0):
+    pipeline = Pipeline(load_scene(file))
+    for now in range(second + 1):
+        (look,) = pipeline.tick(now * SECOND).looks
+    return look.reading.joints
+
+
+def refusal(file):
+    with pytest.raises(FileError) as caught:
+        Pipeline(load_scene(file))
+    return str(caught.value)
+
+
+def test_a_module_of_ones_own_is_an_effect(tmp_path, package):
+    ideal = joints(scene_file(tmp_path, ['velocity: {}']))
+    mine = package(add=HEAD + ADD)
+    file = scene_file(tmp_path, [f'{mine}.add: {{by: 0.25}}'])
+    assert joints(file) == tuple(joint + 0.25 for joint in ideal)
+
+
+@pytest.mark.parametrize(
+    ('behind', 'expected'),
+    [
+        # (x + 0.5 + 1)·2: the bias first; of two behind it the first of the alphabet.
+        ({'a': ADD, 'b': DOUBLE}, lambda x: (x + 1.5) * 2.0),
+        ({'c': ADD, 'b': DOUBLE}, lambda x: (x + 0.5) * 2.0 + 1.0),
+        # It stands where its file says, whether a scene names what stands there or not.
+        ({'a': ADD, 'b': DOUBLE.replace('bias', 'tolerance')}, lambda x: x * 2.0 + 1.5),
+    ],
+)
+def test_it_acts_behind_the_effect_that_it_says(tmp_path, package, behind, expected):
+    mine = package(**{name: HEAD + code for name, code in behind.items()})
+    ideal = joints(scene_file(tmp_path, ['velocity: {}']))
+    own = [f'{mine}.{name}: {{}}' for name in behind]
+    file = scene_file(tmp_path, ['bias: {joints: {rocker_joint: 0.5}}', *own])
+    assert joints(file)[2] == pytest.approx(expected(ideal[2]), rel=1e-15)
+
+
+def test_the_order_in_the_file_does_not_matter(tmp_path, package):
+    mine = package(add=HEAD + ADD, double=HEAD + DOUBLE)
+    lines = [f'{mine}.add: {{}}', f'{mine}.double: {{}}', 'velocity: {}']
+    stages = [
+        Pipeline(load_scene(scene_file(tmp_path, order))).lines[0].stages
+        for order in (lines, lines[::-1])
+    ]
+    assert stages == [('velocity', f'{mine}.add', f'{mine}.double')] * 2
+
+
+def test_it_may_stand_between_motor_and_crank(tmp_path, package):
+    mine = package(late=HEAD + LATE_CRANK)
+    file = scene_file(tmp_path, [f'{mine}.late: {{by: 0.5}}'])
+    assert joints(file, 2)[0] == pytest.approx(2 * RATE - 0.5, rel=1e-15)
+
+
+def test_it_may_alter_the_linkage(tmp_path, package):
+    mine = package(longer=HEAD + LONGER)
+    file = scene_file(tmp_path, [f'{mine}.longer: {{by: 0.02}}'])
+    altered = Pipeline(load_scene(file)).closures[0].linkage
+    assert altered.links['crank']['A'] == (0.06, 0.0)
+
+
+def test_what_it_starts_from_is_computed_and_not_published(tmp_path, package):
+    mine = package(soft=HEAD + YIELD)
+    rigid = joints(scene_file(tmp_path, ['velocity: {}']))
+    pipeline = Pipeline(load_scene(scene_file(tmp_path, [f'{mine}.soft: {{}}'])))
+    (line,) = pipeline.lines
+    assert line.stages == ('velocity', 'acceleration', 'pin_forces', f'{mine}.soft')
+    (look,) = pipeline.tick(0).looks
+    assert look.reading.rates == ()
+    assert pipeline.extras == []
+    force = look.motion.reactions[0].fx
+    assert force != 0.0
+    assert look.reading.joints == pytest.approx([joint + force for joint in rigid], rel=1e-12)
+
+
+def test_it_may_publish_a_message_of_its_own(tmp_path, package):
+    mine = package(tell=HEAD + TELL)
+    pipeline = Pipeline(load_scene(scene_file(tmp_path, [f'{mine}.tell: {{}}'])))
+    assert [extra.topic for extra in pipeline.extras] == ['~/mine']
+    assert pipeline.tick(3 * SECOND + 7).extras == (time_message(3 * SECOND + 7),)
+
+
+NO_TOPIC = TELL.replace("TOPIC, MESSAGE = '~/mine', 'builtin_interfaces/msg/Time'", '')
+REFUSED = {
+    'syntax': ('def', 'cannot be imported: SyntaxError: '),
+    'what it imports is not there': (
+        'import no_such_thing_at_all',
+        (
+            'cannot be imported: ModuleNotFoundError: "No module named '
+            '\'no_such_thing_at_all\'"; put it right; `python3 -c "import MINE.effect"` says where'
+        ),
+    ),
+    'it ends the interpreter': ('raise SystemExit(3)', "cannot be imported: SystemExit: '3'"),
+    'no parameters': (ADD, 'has no PARAMETERS; name a frozen dataclass whose fields'),
+    'parameters of another kind': (
+        'from dataclasses import dataclass\n@dataclass\nclass PARAMETERS:\n    by: float = 1.0\n'
+        + ADD,
+        'has no PARAMETERS',
+    ),
+    'no function': (
+        HEAD + "AFTER = 'bias'\n",
+        f'does nothing; define one of {", ".join(FUNCTIONS)}',
+    ),
+    'the beginning': (HEAD + ADD + 'begin = sensor\n', 'has begin, and only velocity can'),
+    'a place that is none': (
+        HEAD + ADD.replace("'bias'", "'bais'"),
+        "AFTER is 'bais': that is no effect; did you mean 'bias'?",
+    ),
+    'no place': (HEAD + ADD.replace('AFTER', 'BEHIND'), 'does not say AFTER which'),
+    'behind the last': (
+        HEAD + ADD.replace("'bias'", "'delay'"),
+        "AFTER is 'delay', and delay is the last that reads; set AFTER = 'dropout'",
+    ),
+    'before what it starts from': (
+        HEAD + YIELD.replace("AFTER = 'pin_forces'", "AFTER = 'velocity'"),
+        "starts from pin_forces and acts before it; set AFTER = 'pin_forces'",
+    ),
+    'a need that is none': (
+        HEAD + YIELD.replace("('pin_forces',)", "('noise',)"),
+        "NEEDS 'noise'; of quantities there are velocity, acceleration, effort, pin_forces",
+    ),
+    'a message without a topic': (
+        HEAD + NO_TOPIC,
+        'has writer alone; TOPIC, MESSAGE and writer(parameters, context) go together',
+    ),
+    'a topic that is not its own': (
+        HEAD + TELL.replace('~/mine', '/joint_states'),
+        "has the TOPIC '/joint_states'; write one of the node's own: '~/name'",
+    ),
+}
+
+
+@pytest.mark.parametrize('case', REFUSED)
+def test_what_is_no_effect_is_refused_in_a_line(tmp_path, package, case):
+    code, said = REFUSED[case]
+    mine = package(effect=code)
+    file = scene_file(tmp_path, ['velocity: {}', f'{mine}.effect: {{}}'])
+    text = refusal(file)
+    assert text.startswith(f'{file}:5: effects.{mine}.effect: {said.replace("MINE", mine)}')
+    assert text.isprintable()
+    assert '; ' in text
+
+
+@pytest.mark.parametrize(
+    ('line', 'said'),
+    [
+        (
+            'nobody_has_this.effect: {}',
+            (
+                'effects.nobody_has_this.effect: there is no module nobody_has_this; put the '
+                'folder that it lies in on PYTHONPATH, or source its workspace'
+            ),
+        ),
+        (
+            'linkage_ros.no_effect: {}',
+            'effects.linkage_ros.no_effect: there is no module linkage_ros.no_effect; put',
+        ),
+        ('.effect: {}', 'effects..effect: is no dotted name of a module; write package.module'),
+        ('MINE.add: {buy: 1}', "effects.MINE.add.buy: unknown key; did you mean 'by'?"),
+        ('MINE.add: {by: 11}', 'effects.MINE.add.by: 11 is out of bounds; write a finite number'),
+        ('MINE.add: 3', 'effects.MINE.add: 3 is not a mapping; write MINE.add: {…}'),
+        ('biass: {}', "effects.biass: unknown key; did you mean 'bias'?"),
+    ],
+)
+def test_a_scene_that_names_it_wrongly_is_refused_in_a_line(tmp_path, package, line, said):
+    mine = package(add=HEAD + ADD)
+    file = scene_file(tmp_path, ['velocity: {}', line.replace('MINE', mine)])
+    assert refusal(file).startswith(f'{file}:5: {said.replace("MINE", mine)}')
+
+
+def test_the_schema_takes_it_and_still_refuses_what_is_misspelt(tmp_path, package):
+    mine = package(add=HEAD + ADD)
+    file = scene_file(tmp_path, [f'{mine}.add: {{by: 0.25}}', 'biass: {}', f'{mine}.other: 3'])
+    wrong = violations(read_yaml(file)[0], scene_schema())
+    assert [error.key for error in wrong] == ['effects.biass', f'effects.{mine}.other']
+
+
+def test_a_scene_without_one_does_not_import_what_looks_for_them():
+    code = (
+        'import sys\nfrom linkage_ros.pipeline import Pipeline\n'
+        'from linkage_ros.scene.load import load_scene\n'
+        "Pipeline(load_scene('config/scenes/worn_press.yaml'))\n"
+        "assert 'linkage_ros.effects.own' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, '-c', code], cwd=ROOT, check=True)
+
+
+@pytest.mark.parametrize(
+    ('where', 'line', 'expected'),
+    [
+        ('', '', 'sha256 {}'),
+        ('effect', '__version__ = "2.1"\n', '2.1, sha256 {}'),
+        ('__init__', '__version__ = "3.2"\n', '3.2, sha256 {}'),
+    ],
+)
+def test_a_run_says_which_module_it_was(tmp_path, package, where, line, expected):
+    code = {'effect': HEAD + ADD, '__init__': ''}
+    mine = package(**{name: text + line * (name == where) for name, text in code.items()})
+    file = scene_file(tmp_path, [f'{mine}.effect: {{}}', 'bias: {joints: {rocker_joint: 1}}'])
+    digest = sha256((tmp_path / mine / 'effect.py').read_bytes()).hexdigest()[:16]
+    assert own_effects_here(load_scene(file)) == {f'{mine}.effect': expected.format(digest)}
+    assert own_effects_here(load_scene(scene_file(tmp_path, list(EFFECTS)[:0]))) == {}
+
+
+def linkage(folder, *typed, path=''):
+    return subprocess.run(
+        [sys.executable, '-m', 'linkage_ros.cli.main', *typed],
+        cwd=folder,
+        env=os.environ | {'PYTHONPATH': os.pathsep.join(filter(None, [str(ROOT), path]))},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def crank_bag(folder):
+    """Record a crank that turns."""
+    topic = Topic('/crank_states', 'sensor_msgs/msg/JointState', '', '')
+    bag = BagWriter(folder, [topic], {})
+    write = JointStateWriter(['crank_joint']).write
+    for number in range(20):
+        stamp = SECOND + number * 1_000_000
+        bag.write(0, stamp, stamp, write(stamp, (0.1 * number,), (100.0,)))
+    bag.close({})
+
+
+def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
+    mine, folder = package(add=HEAD + ADD), tmp_path / 'elsewhere'
+    folder.mkdir()
+    scene_file(folder, []).write_text(f'linkage: linkage.yaml\neffects: {{{mine}.add: {{}}}}\n')
+    crank_bag(folder / 'crank')
+    typed = ('replay', 'crank', '--scene', 'scene.yaml', '-o', 'bag')
+    assert linkage(folder, *typed, path=str(tmp_path)).returncode == 0
+    file = tmp_path / mine / 'add.py'
+    then = sha256(file.read_bytes()).hexdigest()[:16]
+
+    same = linkage(folder, 'replay', 'bag', path=str(tmp_path))
+    assert (same.returncode, same.stderr) == (0, '')
+    assert f', {mine}.add (sha256 {then})\n' in same.stdout
+
+    gone = linkage(folder, 'replay', 'bag')
+    assert gone.returncode == 2
+    assert gone.stderr == (
+        f'linkage replay: bag: scene.yaml:2: effects.{mine}.add: there is no module {mine}; '
+        'put the folder that it lies in on PYTHONPATH, or source its workspace\n'
+    )
+
+    file.write_text(file.read_text().replace('+ parameters', '- parameters'))
+    now = sha256(file.read_bytes()).hexdigest()[:16]
+    changed = linkage(folder, 'replay', 'bag', '--json', path=str(tmp_path))
+    account = json.loads(changed.stdout)
+    assert (changed.returncode, account['verdict']) == (3, 'different')
+    versions = account['versions']
+    assert versions['bag'][f'{mine}.add'] == f'sha256 {then}'
+    assert versions['here'][f'{mine}.add'] == f'sha256 {now}'
+
+
+def test_the_node_writes_it_into_its_bag(tmp_path, package):
+    run_recording = pytest.importorskip('linkage_ros.ros.run_recording', reason='needs rclpy')
+    mine = package(add=HEAD + ADD)
+    scene = load_scene(scene_file(tmp_path, [f'{mine}.add: {{}}']))
+    files = run_recording._attachments(scene, [], 'with the run', Pipeline(scene).lines)
+    assert json.loads(files[RUN_FILE][1])['effects'] == own_effects_here(scene)
