@@ -1,0 +1,95 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The documentation site: Sphinx, pages in MyST's Markdown, the theme Furo.
+
+``make docs`` builds it into build/docs. All pages are read as they are on a forge, too; what a
+page of reference says between ``made`` comments is put in while the site is built.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+import sys
+from typing import Any
+
+# Sphinx is started anywhere.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from linkage_ros import __version__
+
+from docs.website.made import put_in
+from docs.website.tutorial import PercentParser
+
+project = 'linkage_ros'
+author = 'The linkage_ros authors'
+copyright = f'2026, {author}'  # noqa: A001 (Sphinx wants this name)
+version = release = __version__
+
+extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon']
+exclude_patterns = [
+    '**/__pycache__',
+    'conf.py',
+    'make_*.py',
+    'pictures',
+    'synthesis_page',
+    'website',
+]
+nitpicky = True
+# Two hyphens before an option are two hyphens.
+smartquotes = False
+
+myst_enable_extensions = ['colon_fence', 'deflist']
+myst_heading_anchors = 4
+
+autodoc_member_order = 'bysource'
+autodoc_typehints = 'signature'
+add_module_names = False
+maximum_signature_line_length = 88
+python_use_unqualified_type_names = True
+# In docstrings a name in backticks is one of the code.
+default_role = 'py:obj'
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+
+html_theme = 'furo'
+html_title = f'linkage_ros {__version__}'
+html_copy_source = False
+html_show_sphinx = False
+html_static_path = ['website/static']
+html_css_files = ['site.css']
+
+
+def setup(app: Any) -> dict[str, Any]:
+    """Connect what this site adds to Sphinx."""
+    app.add_source_suffix('.py', 'percent')
+    app.add_source_parser(PercentParser)
+    app.connect('source-read', lambda _app, docname, source: put_in(docname, source))
+    app.connect('missing-reference', _unlinked)
+    app.connect('autodoc-process-signature', _readable)
+    return {'parallel_read_safe': True, 'parallel_write_safe': True}
+
+
+def _readable(*told: Any) -> tuple[str | None, str | None]:
+    """Return a signature that Sphinx can read: a dataclass's factory is no Python."""
+    *_, signature, returns = told
+    return signature and signature.replace('<factory>', '...'), returns
+
+
+def _unlinked(_app: Any, _env: Any, node: Any, shown: Any) -> Any:
+    """Let names of the code that have no page of their own stand as they are."""
+    return shown if node.get('refdomain') == 'py' else None

@@ -1,0 +1,200 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The documentation site: built without a warning, whole, and without a dead link."""
+
+from __future__ import annotations
+
+from html.parser import HTMLParser
+from pathlib import Path
+import subprocess
+import sys
+from urllib.parse import unquote, urlsplit
+
+from linkage_ros.cli.main import COMMANDS
+from linkage_ros.cli.parameter_tables import REGISTRIES
+from linkage_ros.scene.linkage_schema import linkage_schema
+from linkage_ros.scene.scene_schema import scene_schema
+import pytest
+
+from .blocks import ROOT
+from ..browser.chromium import browser as chromium  # noqa: TID252
+from ..browser.opened import opened  # noqa: TID252
+
+for needed in ('sphinx', 'myst_parser', 'furo', 'matplotlib'):
+    pytest.importorskip(needed, reason="pip install '.[docs]'")
+
+DOCS = ROOT / 'docs'
+NOT_PAGES = ('website', 'pictures', 'synthesis_page')
+
+
+class Page(HTMLParser):
+    """What a page of the site has: addresses, places that can be addressed, headings, and text."""
+
+    def __init__(self, file: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.brought: list[str] = []
+        self.ids: set[str] = set()
+        self.headings: list[str] = []
+        self.words: list[str] = []
+        self._heading = False
+        self.feed(file.read_text('utf-8'))
+
+    def handle_starttag(self, tag, attrs):
+        given = dict(attrs)
+        if 'id' in given:
+            self.ids.add(given['id'])
+        if tag == 'a' and 'href' in given:
+            self.links.append(given['href'])
+        elif tag in ('script', 'img') and 'src' in given:
+            self.brought.append(given['src'])
+        elif tag == 'link' and given.get('rel') in ('stylesheet', 'icon'):
+            self.brought.append(given['href'])
+        if tag in ('h1', 'h2', 'h3', 'h4'):
+            self._heading = True
+            self.headings.append('')
+
+    def handle_endtag(self, tag):
+        if tag in ('h1', 'h2', 'h3', 'h4'):
+            self._heading = False
+
+    def handle_data(self, data):
+        self.words.append(data)
+        if self._heading:
+            self.headings[-1] += data
+
+    @property
+    def text(self) -> str:
+        return ' '.join(' '.join(self.words).split())
+
+
+@pytest.fixture(scope='module')
+def site(tmp_path_factory) -> Path:
+    """Build the site as `make docs` does."""
+    folder = tmp_path_factory.mktemp('site')
+    done = subprocess.run(
+        [
+            *(sys.executable, '-m', 'sphinx', '-q', '-W', '--keep-going'),
+            *('-d', str(folder / 'read'), str(DOCS), str(folder / 'html')),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ''
+    return folder / 'html'
+
+
+@pytest.fixture(scope='module')
+def pages(site) -> dict[str, Page]:
+    own = [file for file in site.rglob('*.html') if '_static' not in file.parts]
+    return {file.relative_to(site).as_posix(): Page(file) for file in own}
+
+
+def headings(page: Page) -> list[str]:
+    return [heading.rstrip('¶').strip() for heading in page.headings]
+
+
+def test_every_page_of_the_sources_is_in_it(pages):
+    sources = [
+        file.relative_to(DOCS).with_suffix('.html').as_posix()
+        for file in DOCS.rglob('*.md')
+        if not {*file.relative_to(DOCS).parts} & {*NOT_PAGES}
+    ]
+    assert {*sources, 'tutorial.html'} <= {*pages}
+
+
+def test_no_link_is_dead(site, pages):
+    dead = []
+    for name, page in pages.items():
+        for link in (*page.links, *page.brought):
+            parts = urlsplit(link)
+            if parts.scheme:
+                continue
+            there = (site / name).parent / unquote(parts.path) if parts.path else site / name
+            where = there.resolve()
+            where = where / 'index.html' if where.is_dir() else where
+            key = where.relative_to(site.resolve()).as_posix()
+            if not where.is_file() or (
+                parts.fragment and key in pages and unquote(parts.fragment) not in pages[key].ids
+            ):
+                dead.append(f'{name}: {link}')
+    assert not dead
+
+
+def test_it_brings_all_that_it_shows(pages):
+    foreign = {link for page in pages.values() for link in page.brought if urlsplit(link).netloc}
+    assert not foreign
+
+
+def test_every_command_is_in_its_reference(pages):
+    found = headings(pages['reference/commands.html'])
+    assert [heading for heading in found if heading.startswith('linkage ')] == [
+        f'linkage {command}' for command in COMMANDS
+    ]
+
+
+@pytest.mark.parametrize(
+    ('page', 'said'),
+    [
+        ('reference/commands.html', '-o NEWBAG'),
+        ('reference/commands.html', '--schema scene|linkage'),
+        ('reference/commands.html', 'so often a second; without a number 40'),
+        ('reference/parameters.html', 'counts in a turn, or in a metre of a slide'),
+        ('reference/files.html', 'a whole number from 0 to 9007199254740992'),
+        ('reference/files.html', 'masses.NAME.inertia'),
+        ('reference/node.html', 'trajectory_msgs/JointTrajectory'),
+        ('reference/node.html', 'warn.transmission_angle'),
+        ('reference/python.html', 'A planar linkage, as a linkage file says it.'),
+        ('how_to/see_it.html', 'joint_state_topic_hardware_interface'),
+        ('changelog.html', 'Forthcoming'),
+        ('tutorial.html', 'crank 50°: rocker misses by'),
+    ],
+)
+def test_what_is_made_of_the_code_says_what_the_code_says(pages, page, said):
+    assert said in pages[page].text
+
+
+def test_every_drive_effect_fault_and_solver_is_in_its_reference(pages):
+    found = headings(pages['reference/parameters.html'])[1:]
+    kinds = {'Drives': 'drive', 'Effects': 'effect', 'Faults': 'fault', 'Solvers': 'solver'}
+    expected = [word for kind, what in kinds.items() for word in (kind, *REGISTRIES[what])]
+    assert found == expected
+
+
+@pytest.mark.parametrize('schema', [scene_schema(), linkage_schema()], ids=['scene', 'linkage'])
+def test_every_key_of_a_file_is_in_its_reference(pages, schema):
+    words = {word.strip() for word in pages['reference/files.html'].words}
+    assert {*schema['properties']} <= words
+
+
+def test_the_tutorial_shows_its_pictures(site):
+    assert (site / 'tutorial.html').read_text('utf-8').count('<svg') >= 2
+
+
+@pytest.mark.parametrize(
+    ('width', 'scheme'),
+    [(1600, 'light'), (400, 'dark')],
+    ids=['wide and light', 'narrow and dark'],
+)
+def test_in_a_browser_it_asks_nobody_and_fits_its_window(site, pages, width, scheme):
+    with chromium() as browser:
+        for name in ('index', 'start', 'tutorial', 'effects', 'reference/node', 'reference/files'):
+            with opened(browser, site / f'{name}.html', width=width, color_scheme=scheme) as page:
+                assert page.said == [], name
+                assert [asked for asked in page.asked if not asked.startswith('file:')] == []
+                assert not page.is_wider_than_its_window(), name
