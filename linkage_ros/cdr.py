@@ -69,6 +69,10 @@ def head_of_joints(names: Sequence[str], *counts: int) -> bytes:
 _TIME = Struct('<4siI')
 
 
+TIME_END = 2**31 * 1_000_000_000
+"""No stamp of a message is as late as this, in [ns]."""
+
+
 def time_message(time: int) -> bytes:
     """Return a ``builtin_interfaces/msg/Time``, of a time in [ns]."""
     return _TIME.pack(ENCAPSULATION, *divmod(time, 1_000_000_000))

@@ -27,15 +27,26 @@ from types import ModuleType
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, Drive, DRIVES
-from linkage_ros.effects.stage import EFFECTS, LOADED, NEEDS, PUBLISHED_WITH, Sensor, Writer
+from linkage_ros.effects.stage import (
+    in_order,
+    LOADED,
+    module_of,
+    needs,
+    OpenWriter,
+    PUBLISHED_WITH,
+    Sensor,
+    Writer,
+)
 from linkage_ros.errors import DefinitionError
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.look import at_rest, delayed, full_look, Look, observer, plain_look, sensing
 from linkage_ros.scene.scene import Member, Scene
+from linkage_ros.solvers.registry import SOLVERS
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Injection
+    from linkage_ros.solvers.solver import Choice
 
 
 class Extra(NamedTuple):
@@ -50,6 +61,8 @@ class Extra(NamedTuple):
         Its topic and its type: package/msg/Type.
     write
         Writes it.
+    write_open
+        Writes it where the loop has no pose; nothing where it has nothing to say then.
 
     """
 
@@ -57,6 +70,7 @@ class Extra(NamedTuple):
     topic: str
     message: str
     write: Writer
+    write_open: OpenWriter | None
 
 
 class Line:
@@ -98,17 +112,18 @@ class Line:
         drive_module = import_module(DRIVES[drive])
         named = set(member.effects)
         named |= {also for effect in named for also in PUBLISHED_WITH.get(effect, ())}
-        computed = named | {need for effect in named for need in NEEDS.get(effect, ())}
-        modules = {name: import_module(EFFECTS[name]) for name in EFFECTS if name in computed}
+        computed = named | {need for effect in named for need in needs(effect)}
+        modules = {name: module_of(name) for name in in_order(computed)}
         forced = drive == 'torque' or not computed.isdisjoint(LOADED)
         _refuse_idle(member, forced)
+        _refuse_solver(member, forced)
 
         seed = f'{scene.seed}/{member.name}'
         parameters = {
             name: member.effects.get(name) or module.PARAMETERS()
             for name, module in modules.items()
         }
-        self.closure = closure or _closure(member, modules, parameters, seed)
+        self.closure = closure or _closure(member, modules, parameters, seed, forced)
         friction = modules.get('friction')
         self.context = Context(
             closure=self.closure,
@@ -118,6 +133,7 @@ class Line:
             loads=member.loads,
             friction=friction.friction(parameters['friction']) if friction else None,
             prefix=member.prefix,
+            effects=frozenset(member.effects),
         )
         self.topic: str = getattr(drive_module, 'TOPIC', '')
         """Topic that the drive listens to; '' for none."""
@@ -153,7 +169,12 @@ class Line:
         state, close = self.drive.state, self.closure.position
         self.look: Callable[[int], Look]
         """Returns what the linkage comes to at a time, in [ns]."""
-        if begin is not at_rest or drive_stages or mechanism:
+        publishing = {
+            name: module
+            for name, module in modules.items()
+            if name in named and hasattr(module, 'TOPIC')
+        }
+        if begin is not at_rest or drive_stages or mechanism or publishing:
             observe = observer(named, len(self.closure.linkage.joints))
             self.look = full_look(
                 state, drive_stages, close, mechanism, begin, stages, observe, sense
@@ -161,17 +182,17 @@ class Line:
         else:
             self.look = plain_look(state, close, sense)
         self.extras = [
-            Extra(
-                name,
-                f'~/{member.name}/{module.TOPIC[2:]}' if member.name else module.TOPIC,
-                module.MESSAGE,
-                module.writer(self.context),
-            )
-            for name, module in modules.items()
-            if name in named and hasattr(module, 'TOPIC')
+            _extra(name, module, module.writer(parameters[name], self.context), member.name)
+            for name, module in publishing.items()
         ]
         self.stages = tuple(modules)
         """Names of the effects that are computed, in physical order."""
+
+    @property
+    def choice(self) -> Choice | None:
+        """Return what closes the loops and why, where an accuracy is asked for; else nothing."""
+        found: Choice | None = getattr(self.closure, 'choice', None)
+        return found
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """Take a message of the drive's topic, serialized, at a time in [ns], or say why not."""
@@ -184,6 +205,11 @@ class Line:
             return sample
         rejection: Rejection | None = self.drive.offer(sample, now)  # type: ignore[attr-defined]
         return rejection
+
+
+def _extra(name: str, module: ModuleType, write: Writer, member: str) -> Extra:
+    topic: str = f'~/{member}/{module.TOPIC[2:]}' if member else module.TOPIC
+    return Extra(name, topic, module.MESSAGE, write, getattr(write, 'no_pose', None))
 
 
 def _refuse_idle(member: Member, forced: bool) -> None:
@@ -202,11 +228,35 @@ def _refuse_idle(member: Member, forced: bool) -> None:
             )
 
 
+def _refuse_solver(member: Member, forced: bool) -> None:
+    """Refuse what has no poses of dyads where forces start from these."""
+    if forced and member.solver is not None and member.solver[0] != 'closed_form':
+        raise DefinitionError(
+            'solver',
+            f'{member.solver[0]} finds no forces, and an effect or the drive asks for them',
+            f'write closed_form, or leave {", ".join(LOADED)} and torque out',
+        )
+
+
 def _closure(
-    member: Member, modules: dict[str, ModuleType], parameters: dict[str, Any], seed: str
+    member: Member,
+    modules: dict[str, ModuleType],
+    parameters: dict[str, Any],
+    seed: str,
+    forced: bool,
 ) -> Closure:
     linkage = member.linkage
     for name, module in modules.items():
         if hasattr(module, 'alter'):
             linkage = module.alter(parameters[name], linkage, Context.generator(seed, name))
+    if member.accuracy is not None:
+        from linkage_ros.solvers import choose  # local import: only where an accuracy is asked for
+
+        if forced:
+            return choose.only_closed_form(linkage, 'forces start from it')
+        return choose.choose(linkage, member.accuracy)
+    if member.solver is not None:
+        name, solving = member.solver
+        closure: Closure = import_module(SOLVERS[name]).build(solving, linkage)
+        return closure
     return Closure(linkage)

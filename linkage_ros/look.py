@@ -153,6 +153,9 @@ def at_rest(crank: CrankState, position: Position) -> Motion:
 
 def observer(named: set[str], joints: int) -> Callable[[int, Motion], Reading]:
     """Return what makes the reading of an ideal sensor: what is named, and no more."""
+    if any('.' in name for name in named):
+        # What is not of this package may let the mechanism yield.
+        return _Observer(named, joints).observe
     if named.isdisjoint(_OBSERVED):
         return _positions
     if named & _OBSERVED == {'velocity'}:

@@ -27,7 +27,7 @@ from typing import NamedTuple, TYPE_CHECKING
 from linkage_ros.effects.stage import Reading
 from linkage_ros.joint_state import JointStateWriter, Rejection
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.line import Line
+from linkage_ros.line import Extra, Line
 from linkage_ros.look import Look
 from linkage_ros.routes import Routes
 from linkage_ros.scene.scene import Scene
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 
 _WITHHOLDING = {'rate_limit', 'dropout', 'delay'}
 """Effects that may leave a tick without a message."""
+
+_GOING_ON = {'backlash'}
+"""Effects that go on where a linkage is open."""
 
 
 class Tick(NamedTuple):
@@ -52,7 +55,7 @@ class Tick(NamedTuple):
         The JointState, serialized; empty where nothing is published.
     extras
         For each of the pipeline's further topics its message, serialized; empty where nothing is
-        published on it.
+        published on it. Empty as a whole where nothing is on any.
 
     """
 
@@ -106,10 +109,17 @@ class Pipeline:
             )
         self.topic = topics[0] if topics else ''
         """The topic that the drives listen to; '' for none."""
-        self.withholds = injection is not None or any(
-            not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines
+        # Of the drives only that from a topic remembers nothing of the ticks.
+        self._goes_on = any(
+            line.member.drive[0] != 'topic' or not _GOING_ON.isdisjoint(line.stages)
+            for line in self.lines
         )
-        """Whether there may be ticks with a pose and without a message."""
+        self.withholds = (
+            self._goes_on
+            or injection is not None
+            or any(not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines)
+        )
+        """Whether there may be ticks without a message of which a replay has to know."""
         if len(self.lines) == 1:
             (line,) = self.lines
             self.tick = _ticking_one(line)
@@ -136,22 +146,29 @@ class Pipeline:
         rejections = [line.offer(message, now) for line in self._routes.find(message)]
         return None if None in rejections else next(iter(rejections), Rejection.MISSING)
 
+    def remembers(self, tick: Tick) -> bool:
+        """Return whether a tick without a message changes what comes after it."""
+        return any(
+            position is not None and bool(position[2] or self._goes_on)
+            for _, position, _, _ in tick.looks
+        )
+
     def _tick_many(self, now: int) -> Tick:
         """Return all linkages at a time, in [ns], those joints left out that have no reading."""
         looks = tuple([line.look(now) for line in self.lines])
         read = [look[3] for look in looks]
         present = tuple([reading is not None for reading in read])
+        extras = tuple(
+            _written(extra, now, look)
+            for line, look in zip(self.lines, looks, strict=True)
+            for extra in line.extras
+        )
         readings = [reading for reading in read if reading is not None]
         if not readings:
-            return Tick(looks, b'', ())
+            return Tick(looks, b'', extras if any(extras) else ())
         writer = self._writers.get(present) or self._writer(present)
         stamp = max(reading.stamp for reading in readings)
         message = writer.write(stamp, *_joined(readings))
-        extras = tuple(
-            b'' if motion is None or reading is None else extra.write(now, motion, reading)
-            for line, (_, _, motion, reading) in zip(self.lines, looks, strict=True)
-            for extra in line.extras
-        )
         return Tick(looks, message, extras)
 
     def _writer(self, present: tuple[bool, ...]) -> JointStateWriter:
@@ -184,11 +201,15 @@ def _ticking_one(line: Line) -> Callable[[int], Tick]:
     """Return what ticks where there is one linkage; a method takes longer, in every tick."""
     look_at, write = line.look, JointStateWriter(line.member.joints).write
     extras = tuple(extra.write for extra in line.extras)
+    tells_open = any(extra.write_open for extra in line.extras)
 
     def tick(now: int) -> Tick:
         look = look_at(now)
         _, _, motion, reading = look
         if reading is None:
+            if tells_open and motion is None:
+                opened = tuple([_written(extra, now, look) for extra in line.extras])
+                return new(Tick, ((look,), b'', opened if any(opened) else ()))
             return new(Tick, ((look,), b'', ()))
         stamp, joints, rates, _, efforts = reading
         message = write(stamp, joints, rates, efforts)
@@ -198,6 +219,16 @@ def _ticking_one(line: Line) -> Callable[[int], Tick]:
         return new(Tick, ((look,), message, written))
 
     return tick
+
+
+def _written(extra: Extra, now: int, look: Look) -> bytes:
+    """Return an extra of a linkage at a time, in [ns]; b'' for none."""
+    _, position, motion, reading = look
+    if motion is not None:
+        return b'' if reading is None else extra.write(now, motion, reading)
+    if position is None or extra.write_open is None:
+        return b''
+    return extra.write_open(now, position)
 
 
 def _joined(

@@ -19,7 +19,8 @@ A run once more, from its bag: the same pipeline over the same samples in the sa
 The bag holds the messages in the order in which the tick took and published them. The log time is
 that by which the tick judged a sample, the publish time of what it published that for which it
 solved. So the pipeline, built from the scene in the bag, comes to the same states. Faults begin
-and end where the bag says so, not by the scene's timeline: somebody may have asked for one.
+and end where the bag says so, not by the scene's timeline: somebody may have asked for one. So
+with a reset.
 """
 
 from __future__ import annotations
@@ -31,8 +32,15 @@ from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros import __version__
 from linkage_ros.bag.reading.reader import Bag, BagMessage, RUN_FILE
-from linkage_ros.bag.reading.run_events import Made, recorded_events, run_account, Taken, VERSIONS
-from linkage_ros.cdr import text_of
+from linkage_ros.bag.reading.run_events import (
+    Made,
+    recorded_events,
+    Reset,
+    run_account,
+    Taken,
+    VERSIONS,
+)
+from linkage_ros.cdr import text_of, TIME_END
 from linkage_ros.errors import BagError
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline, Tick
@@ -91,7 +99,7 @@ def recorded_scene(bag: Bag) -> Scene:
         raise BagError(
             bag.path, f'carries no {LINKAGE_FILE}', 'name a bag that linkage_ros has recorded'
         )
-    return parse_scene(run.scene, str(bag.path), files, run.scene_folder)
+    return parse_scene(run.scene, str(bag.path), files, run.scene_folder, run.solvers)
 
 
 def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
@@ -122,7 +130,15 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
         if event.log_time < last:
             pipeline = Pipeline(scene, closures, injection)
         last = event.log_time
-        if isinstance(event, Made):
+        if isinstance(event, Reset):
+            pipeline = Pipeline(scene, closures, injection)
+        elif isinstance(event, Made):
+            if event.time >= TIME_END:
+                raise BagError(
+                    bag.path,
+                    f'holds what was made at {event.time} ns, beyond the times of messages',
+                    'name another bag',
+                )
             joint_states, *extras = event.messages
             tick = pipeline.tick(event.time)
             yield ReplayedTick(event.time, joint_states, tuple(extras), tick)
@@ -143,16 +159,30 @@ def change_text(change: Change, kind: str) -> str:
 
 
 def read_change(message: bytes) -> tuple[str, bool]:
-    """Return what a message of the faults' topic says: of which fault, and whether it began."""
-    said = json.loads(text_of(message))
-    return str(said['fault']), bool(said['injected'])
+    """
+    Return what a message of the faults' topic says: of which fault, and whether it began.
+
+    Raises
+    ------
+    ValueError
+        Where it does not say that.
+
+    """
+    try:
+        said = json.loads(text_of(message))
+    except RecursionError:
+        raise ValueError('too deep') from None
+    name, on = (said.get('fault'), said.get('injected')) if isinstance(said, dict) else (0, 0)
+    if not isinstance(name, str) or not isinstance(on, bool):
+        raise ValueError('not a change')
+    return name, on
 
 
 def turn(bag: Bag, injection: Injection, message: bytes) -> None:
     """Turn a fault on or off, as a message of a bag says; raise `BagError` where it cannot be."""
     try:
         injection.turn(*read_change(message))
-    except (ValueError, LookupError, TypeError, RecursionError):
+    except (ValueError, KeyError):
         raise BagError(
             bag.path, 'a message on its faults topic names no fault of its scene', 'name another'
         ) from None
@@ -162,3 +192,13 @@ def versions_here() -> dict[str, str]:
     """Return the versions of what runs here, as a run's account has them."""
     found = (__version__, platform.python_version(), platform.machine())
     return dict(zip(VERSIONS, found, strict=True))
+
+
+def own_effects_here(scene: Scene) -> dict[str, str]:
+    """Return which modules the effects of a scene are that are not of this package."""
+    names = {name for member in scene.members for name in member.effects if '.' in name}
+    if not names:
+        return {}
+    from linkage_ros.effects.own import identity  # local import: only where a scene names one
+
+    return {name: identity(name) for name in sorted(names)}

@@ -26,6 +26,11 @@ import atexit
 import signal
 from threading import Event
 
+
+class StoppedError(Exception):
+    """A signal has asked for an end where nothing was done yet that is worth telling."""
+
+
 _SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 

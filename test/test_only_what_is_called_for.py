@@ -39,6 +39,16 @@ BARE = 'drive: {constant_rate: {rate: 2.0}}\n'
 KINEMATICS = {'effects.velocity', 'effects.acceleration'}
 FORCES = {*KINEMATICS, 'dynamics.mechanics', 'dynamics.reactions', 'effects.pin_forces'}
 PINS = {'multi_dof_joint_state'}
+DRAWN = {
+    'effects.marker_arrows',
+    'effects.marker_shapes',
+    'marker_array',
+    'drawing.curves',
+    'drawing.figure',
+    'drawing.labels',
+    'drawing.painting',
+    'drawing.shapes',
+}
 
 # Name: (scene, modules that are there beside those of the empty scene).
 SCENES = {
@@ -64,6 +74,7 @@ SCENES = {
     'rate_limit': ('effects: {rate_limit: {rate: 100}}', set()),
     'dropout': ('effects: {dropout: {probability: 0.1}}', set()),
     'delay': ('effects: {delay: {seconds: 0.002}}', {'effects.history'}),
+    'markers': ('effects: {markers: {}}', DRAWN),
 }
 SILENT = {'not_a_number': 'drive: {topic: {}}\n'}
 FAULT_SCENES = {
@@ -84,6 +95,27 @@ DRIVE_SCENES = {
         set(),
     ),
     'torque': ('torque: {}', set()),
+}
+
+SOLVER_SCENES = {
+    'solver: closed_form': {'solvers.closed_form'},
+    'solver: {newton: {tolerance: 1.0e-9}}': {
+        'solvers.newton',
+        'solvers.newton_dyad',
+        'solvers.knots',
+        'solvers.loops',
+        'solvers.solver',
+    },
+    'solver: {table: {tolerance: 1.0e-3}}': {
+        'solvers.table',
+        'solvers.proof',
+        'solvers.range_proof',
+        'solvers.task',
+        'solvers.cells',
+        'solvers.discs',
+        'solvers.loops',
+        'solvers.solver',
+    },
 }
 
 # Run in a process of its own: builds the scene, says what was imported, and which files the tick
@@ -133,7 +165,15 @@ OPTIONAL = {
     name.removeprefix('linkage_ros.')
     for registry in (EFFECTS, DRIVES, FAULTS)
     for name in registry.values()
-} | {*FORCES, *PINS, 'effects.history', 'joint_trajectory', 'faults.injection', 'joint_effort'}
+} | {
+    *FORCES,
+    *PINS,
+    *DRAWN,
+    'effects.history',
+    'joint_trajectory',
+    'faults.injection',
+    'joint_effort',
+}
 """Modules that a scene may or may not have; the rest is always there."""
 
 
@@ -147,6 +187,8 @@ def test_an_empty_scene_has_nothing(tmp_path):
     modules, passed, stages, everything = look(tmp_path, BARE)
     assert modules & OPTIONAL == {'drives.constant_rate'}
     assert passed & OPTIONAL == {'drives.constant_rate'}
+    assert solvers_of(modules) == {'solvers.registry'}
+    assert not solvers_of(passed)
     assert stages == set()
     assert not everything & {'numpy', 'rclpy'}
 
@@ -161,6 +203,23 @@ def test_a_scene_with_one_effect_has_no_other(tmp_path, effect):
     assert f'effects.{effect}' in passed or effect in ('tolerance', 'friction')
     assert stages == {name.split('.')[1] for name in allowed if name in EFFECT_MODULES}
     assert ('numpy' in everything) == ('dynamics.reactions' in beside)
+
+
+def solvers_of(modules):
+    """Return those modules that are of the solvers' room."""
+    return {name for name in modules if name.startswith('solvers.')}
+
+
+@pytest.mark.parametrize('scene', SOLVER_SCENES)
+def test_a_scene_with_one_solver_has_no_other(tmp_path, scene):
+    modules, passed, _, everything = look(tmp_path, BARE + scene)
+    allowed = SOLVER_SCENES[scene]
+    assert solvers_of(modules) == {'solvers.registry', *allowed}
+    # What proves a table, or knows the closed form, has no part in a tick.
+    assert solvers_of(passed) <= {'solvers.newton', 'solvers.newton_dyad', 'solvers.knots'} | (
+        {'solvers.table'} & allowed
+    )
+    assert ('numpy' in everything) == ('solvers.table' in allowed)
 
 
 EFFECT_MODULES = {name.removeprefix('linkage_ros.') for name in EFFECTS.values()}
@@ -184,3 +243,22 @@ def test_a_scene_with_one_fault_has_no_other(tmp_path, fault):
     faults = {name for name in OPTIONAL if name.startswith('faults.')}
     assert modules & faults == {f'faults.{fault}', 'faults.injection'}
     assert passed & faults <= {f'faults.{fault}', 'faults.injection'}
+
+
+def test_a_robot_model_is_made_where_it_is_asked_for_alone(tmp_path):
+    """Neither building a scene nor the node's own modules bring it: configuring the node does."""
+    for scene in ('', 'robot_description: true\n'):
+        modules, passed, _, _ = look(tmp_path, BARE + scene)
+        assert not {name for name in modules | passed if name.startswith('models')}
+    pytest.importorskip('rclpy')
+    done = subprocess.run(
+        [sys.executable, '-c', 'import sys, linkage_ros.ros.node; print(*sys.modules)'],
+        cwd=ROOT,
+        env=os.environ | {'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    loaded = done.stdout.split()
+    assert 'linkage_ros.ros.scene_topics' in loaded
+    assert not [name for name in loaded if name.startswith('linkage_ros.models')]

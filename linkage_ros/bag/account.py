@@ -102,5 +102,25 @@ def last_records(
     return records
 
 
+def counts_in(custom: Mapping[str, str], word: str) -> dict[str, int]:
+    """
+    Return what a bag's ``custom_data`` counts by topic; nothing where it does not, or is damaged.
+
+    Parameters
+    ----------
+    custom
+        The ``custom_data``.
+    word
+        What is counted: 'received', 'dropped' or 'let_go'.
+
+    """
+    try:
+        said = json.loads(custom[f'{_PREFIX}{word}'])
+    except (KeyError, ValueError, RecursionError):
+        return {}
+    entries = said.items() if isinstance(said, dict) else ()
+    return {topic: count for topic, count in entries if type(count) is int and count >= 0}
+
+
 def _by_topic(counts: Sequence[int], summary: BagSummary) -> str:
     return json.dumps({t.name: n for t, n in zip(summary.topics, counts, strict=True)})

@@ -19,14 +19,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import datetime
-import json
 from math import isfinite
 from typing import Any
 
+from linkage_ros.bag.account import counts_in, FAILURE
+from linkage_ros.bag.reading.beginning import lost_beginning
 from linkage_ros.bag.reading.contents import Contents
-from linkage_ros.bag.reading.folder import custom_of, information_of
+from linkage_ros.bag.reading.folder import information_of
 from linkage_ros.bag.reading.layout import Layout
-from linkage_ros.bag.reading.reader import Bag, RUN_FILE
+from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.reading.run_events import run_said
+from linkage_ros.cli.bag_reading import run_or_blank, unfinished_text
 from linkage_ros.cli.worst_states import Examined, WorstStates
 from linkage_ros.kinematics.four_bars import four_bars
 from linkage_ros.scene.scene import Member, Scene
@@ -37,9 +40,10 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
     begin, end = contents.begin, contents.end
     said: Mapping[str, Any] = information_of(bag.path) if bag.path.is_dir() else {}
     said = said or next((layout.rosbag2 for layout in layouts if layout.rosbag2), {})
-    custom = custom_of(said)
-    dropped = _parsed(custom.get('linkage_ros.dropped'))
-    run = _parsed(bag.attachments.get(RUN_FILE))
+    run = run_said(bag)
+    # What is let go of is only told where there is some.
+    let_go = counts_in(bag.custom, 'let_go')
+    counted = {word: counts_in(bag.custom, word) for word in ('received', 'dropped')}
     return {
         'bag': str(bag.path),
         'duration_ns': None if begin is None or end is None else end - begin,
@@ -51,9 +55,11 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
         'files': [{'name': file.name, 'size_bytes': file.stat().st_size} for file in bag.files],
         'compressions': _compressions(layouts),
         'truncated': bag.truncated,
+        'unfinished': unfinished_text(bag) if bag.truncated else None,
+        'beginning_missing': lost_beginning(bag, run_or_blank(bag)) or None,
         'damage': contents.damage or None,
         'stopped': contents.stopped,
-        'recording_failure': _text(custom.get('linkage_ros.failure')),
+        'recording_failure': bag.custom.get(FAILURE),
         'messages': sum(topic.messages for topic in contents.topics),
         'topics': [
             {
@@ -64,7 +70,9 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
                 'size_bytes': size,
                 'reliability': topic.qos.reliability,
                 'durability': topic.qos.durability,
-                'dropped': _whole(dropped.get(topic.name)),
+                'received': counted['received'].get(topic.name),
+                'dropped': counted['dropped'].get(topic.name),
+                'let_go': let_go.get(topic.name, 0) if let_go or counted['received'] else None,
             }
             for each in contents.topics
             for topic, messages, size, _, _ in [each]
@@ -160,15 +168,6 @@ def _compressions(layouts: list[Layout]) -> list[dict[str, Any]]:
         {'name': name, 'stored_bytes': stored, 'content_bytes': content}
         for name, (stored, content) in sums.items()
     ]
-
-
-def _parsed(text: Any) -> Mapping[str, Any]:
-    """Return a mapping that is written as JSON; an empty one where it is none."""
-    try:
-        mapping = json.loads(text)
-    except (TypeError, ValueError, RecursionError):
-        return {}
-    return mapping if isinstance(mapping, dict) else {}
 
 
 def _text(value: Any) -> str | None:

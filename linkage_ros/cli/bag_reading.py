@@ -20,16 +20,71 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
+from pathlib import Path
 from threading import Event
 
+from linkage_ros.bag.account import counts_in
 from linkage_ros.bag.reading.contents import TOLD_EVERY
 from linkage_ros.bag.reading.layout import layout_of
-from linkage_ros.bag.reading.reader import Bag, BagMessage
+from linkage_ros.bag.reading.reader import Bag, BagMessage, read_bag
+from linkage_ros.bag.reading.run_events import run_account, run_said, RunAccount
+from linkage_ros.bag.recovering.recovery import NOTHING_LOST, RECOVERED
 from linkage_ros.cli.progress import progress
 from linkage_ros.errors import BagError
+from linkage_ros.stop import StoppedError
 
 _MIB = 2**20
 _BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its own
+
+
+def opened(path: Path, stop: Event) -> Bag:
+    """
+    Open a bag for reading, as far as it goes.
+
+    Raises
+    ------
+    BagError
+        As `read_bag`.
+    StoppedError
+        A signal has come while it was searched for what its missing index would tell.
+
+    """
+
+    def look(_read: int) -> None:
+        if stop.is_set():
+            raise StoppedError
+
+    return read_bag(path, allow_truncated=True, told=look)
+
+
+def unfinished_text(bag: Bag) -> str:
+    """Return why an end is missing, of a bag that is truncated."""
+    text = 'its recording was killed, or still runs'
+    return text if bag.path.is_dir() else f'{text}, or goes on in another file'
+
+
+def run_or_blank(bag: Bag) -> RunAccount:
+    """Return what a run says of itself in its bag; blank where it does not, or damaged."""
+    try:
+        return run_account(bag)
+    except BagError:
+        return RunAccount()
+
+
+def gaps(bag: Bag) -> Iterator[str]:
+    """Yield what is missing of a bag within it, so that what comes after may differ."""
+    diagnostics = run_said(bag).get('diagnostics_topic')
+    dropped = sum(
+        count for topic, count in counts_in(bag.custom, 'dropped').items() if topic != diagnostics
+    )
+    if dropped:
+        yield f'{dropped} messages had to be dropped when it was recorded: {_GAP}'
+    recovered = bag.custom.get(RECOVERED, '')
+    if recovered and not recovered.endswith(NOTHING_LOST):
+        yield f'recovered {recovered}: {_GAP}'
+
+
+_GAP = 'what depends on one that is not there may differ'
 
 
 class BagReading:
@@ -53,6 +108,13 @@ class BagReading:
         self._bag, self._stop = bag, stop
         self._told: Callable[[int, int], None] = lambda _done, _of: None
         self._size = max(1, sum(layout_of(file).content for file in bag.files) // _MIB)
+
+    def glance(self) -> Iterator[BagMessage]:
+        """Yield the messages to one who looks for something; raise StoppedError at the wish."""
+        for number, message in enumerate(self._bag.messages(), 1):
+            yield message
+            if not number % TOLD_EVERY and self._stop.is_set():
+                raise StoppedError
 
     @contextmanager
     def told(self) -> Iterator[Iterator[BagMessage]]:

@@ -56,6 +56,7 @@ effects:
   rate_limit: {rate: 500}
   dropout: {probability: 0.1, burst: 3}
   delay: {seconds: 0.002}
+  markers: {rate: 30}
 """
 """A scene with every effect, each for one joint, pin or link, on the four-bar that is shipped."""
 

@@ -17,9 +17,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.reading.reader import Bag, BagMessage
 from linkage_ros.bag.reading.run_events import RunAccount
 from linkage_ros.cli.message_values import JOINT_STATE
 from linkage_ros.errors import BagError, did_you_mean
@@ -30,7 +30,12 @@ DEFAULT = '/crank_states'
 
 
 def find_crank_topic(
-    bag: Bag, scene: Scene, run: RunAccount, recorded: Scene | None, typed: str | None
+    bag: Bag,
+    messages: Iterable[BagMessage],
+    scene: Scene,
+    run: RunAccount,
+    recorded: Scene | None,
+    typed: str | None,
 ) -> str:
     """
     Return the topic of the samples that all linkages of a scene can be driven with.
@@ -38,7 +43,9 @@ def find_crank_topic(
     Parameters
     ----------
     bag
-        The bag; it is read as far as needed.
+        The bag.
+    messages
+        Its messages; they are looked at as far as needed.
     scene
         The scene.
     run, recorded
@@ -59,7 +66,7 @@ def find_crank_topic(
     }
     wanting = {topic: set(range(len(scene.members))) for topic in readers}
     names: dict[str, None] = {}
-    for topic, _, _, data in bag.messages() if readers else ():
+    for topic, _, _, data in messages if readers else ():
         if not wanting.get(topic):
             continue
         found = [

@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     if bag is not None:
         picture = Path(f'{bag}.png')
         try:
-            draw(bag, picture)
+            draw(bag, picture, Event())  # it is Ctrl-C that has ended the run
         except LinkageError as error:
             # A run that was ended before it began, or no matplotlib: the run itself was good.
             print(f'picture   none: {error}')

@@ -28,16 +28,16 @@ import argparse
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
-import json
 from pathlib import Path
 import sys
 from threading import Event
-from typing import Any
 
 from linkage_ros.bag.reading.layout import layout_of
-from linkage_ros.bag.reading.reader import Bag, read_bag, RUN_FILE
-from linkage_ros.cli.message_values import JOINT_STATE, Key, TYPES
+from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.cli.bag_reading import opened, run_or_blank, unfinished_text
+from linkage_ros.cli.message_values import JOINT_STATE, Key, POSITION, TYPES, UNITS
 from linkage_ros.cli.progress import progress
+from linkage_ros.cli.proof import turning_joints
 from linkage_ros.cli.table_files import block_rows, check_kind, table_file
 from linkage_ros.cli.tick_rows import (
     Found,
@@ -50,26 +50,11 @@ from linkage_ros.cli.tick_rows import (
     TIME,
 )
 from linkage_ros.errors import BagError, did_you_mean, LinkageError
-from linkage_ros.kinematics.linkage import RevoluteJoint
 from linkage_ros.replay import recorded_scene
 from linkage_ros.scene.scene import Scene
+from linkage_ros.stop import StoppedError
 
 _MIB = 2**20
-
-_UNITS = {
-    'position': ('rad', 'm'),
-    'rate': ('rad/s', 'm/s'),
-    'acceleration': ('rad/s²', 'm/s²'),
-    'effort': ('N·m', 'N'),
-    'force x': ('N', 'N'),
-    'force y': ('N', 'N'),
-    'torque': ('N·m', 'N·m'),
-}
-"""Of each quantity the unit where the joint turns, and where it slides."""
-
-
-class _StopError(Exception):
-    """A signal has asked for an end."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -84,8 +69,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Write the file; return 1 where it was stopped."""
     try:
-        found = export(arguments.bag, arguments.output, arguments.topic, stop.is_set)
-    except _StopError:
+        found = export(arguments.bag, arguments.output, arguments.topic, stop)
+    except StoppedError:
         print('linkage export: stopped; nothing was written', file=sys.stderr)
         return 1
     for (topic, reason), count in found.left_out.items():
@@ -95,7 +80,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     return 0
 
 
-def export(bag_path: Path, file: Path, topic: str | None, stopped: Callable[[], bool]) -> Found:
+def export(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Found:
     """
     Write a bag's joints to a file; memory does not grow with the bag.
 
@@ -107,27 +92,30 @@ def export(bag_path: Path, file: Path, topic: str | None, stopped: Callable[[], 
         The file; one that exists is replaced.
     topic
         What to write alone; nothing for the joint states and what was published with them.
-    stopped
-        Whether to stop.
+    stop
+        The wish to stop.
 
     Raises
     ------
+    StoppedError
+        There was one.
     LinkageError
         Where the bag cannot be read or holds nothing to write, or the file cannot be written.
 
     """
     check_kind(file)
-    bag = read_bag(bag_path, allow_truncated=True)
+    bag = opened(bag_path, stop)
     if bag.truncated:
-        print(f'linkage export: {bag_path}: has no end; its whole part is taken', file=sys.stderr)
+        unfinished = f'unfinished: {unfinished_text(bag)}; what it holds is taken'
+        print(f'linkage export: {bag_path}: {unfinished}', file=sys.stderr)
     scene = _scene(bag)
     source = _source(bag, scene, topic)
-    turning = _turning(scene)
+    turning = turning_joints(scene) if scene is not None else {}
 
     def bounded(told: Callable[[int, int], None], of: int) -> Callable[[int], None]:
         def tell(read: int) -> None:
-            if stopped():
-                raise _StopError
+            if stop.is_set():
+                raise StoppedError
             told(read // _MIB, max(of, read // _MIB))
 
         return tell
@@ -171,21 +159,17 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
                 bag.path, f'{topic} is of {types[topic]}, which is not about joints', others
             )
         return Source(bag, {topic: types[topic]}, (), _any)
-    run = _run(bag)
-    joint_states = str(run.get('joint_states_topic'))
+    run = run_or_blank(bag)
+    joint_states = run.joint_states_topic
     if joint_states not in readable:
         joint_states = _only_joint_states(bag, readable)
         return Source(bag, {joint_states: JOINT_STATE}, (), _any)
-    written = [joint_states]
-    written += [str(name) for name in run.get('extra_topics', ()) if str(name) in readable]
-    crank, faults, withheld = (
-        str(run.get(f'{name}_topic')) for name in ('crank', 'faults', 'withheld')
-    )
-    own = _Own(scene) if scene is not None and crank == joint_states else _any
+    written = [joint_states, *(name for name in run.extras if name in readable)]
+    own = _Own(scene) if scene is not None and run.crank_topic == joint_states else _any
     return Source(
         bag,
         {name: types[name] for name in written},
-        {crank, faults, withheld},
+        {run.crank_topic, run.faults_topic, run.withheld_topic, run.resets_topic},
         own,
     )
 
@@ -217,16 +201,6 @@ class _Own:
         return not left
 
 
-def _run(bag: Bag) -> Mapping[str, Any]:
-    """Return a bag's account of its run; nothing where it has none, or a damaged one."""
-    try:
-        run = json.loads(bag.attachments[RUN_FILE])
-    except (KeyError, ValueError, RecursionError):
-        return {}
-    whole = isinstance(run, dict) and isinstance(run.get('extra_topics', []), list)
-    return run if whole else {}
-
-
 def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
     found = [name for name, kind in readable.items() if kind == JOINT_STATE]
     if len(found) == 1:
@@ -252,24 +226,11 @@ def _nothing(source: Source, found: Found) -> BagError:
     )
 
 
-def _turning(scene: Scene | None) -> dict[str, bool]:
-    """Return of each joint that is known whether it turns, or slides."""
-    if scene is None:
-        return {}
-    turning: dict[str, bool] = {}
-    for member in scene.members:
-        kinds = [isinstance(joint, RevoluteJoint) for joint in member.linkage.joints.values()]
-        turning |= dict(zip(member.joints, kinds, strict=True))
-        driven = [not given.slider for given in member.linkage.inputs]
-        turning |= dict(zip(member.inputs, driven, strict=True))
-    return turning
-
-
 def _head(key: Key, turning: Mapping[str, bool]) -> str:
     """Return the heading of a column: the joint, what is told of it, and its unit."""
     name, quantity = key
-    angular, linear = _UNITS[quantity]
-    told = name if quantity == 'position' else f'{name} {quantity}'
+    angular, linear = UNITS[quantity]
+    told = name if quantity == POSITION else f'{name} {quantity}'
     if name in turning:
         return f'{told} [{angular if turning[name] else linear}]'
     return f'{told} [{angular}]' if angular == linear else f'{told} [{angular} or {linear}]'

@@ -35,16 +35,17 @@ from typing import Any
 
 from linkage_ros.bag.reading.contents import contents_of
 from linkage_ros.bag.reading.layout import layout_of
-from linkage_ros.bag.reading.reader import Bag, read_bag
+from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.cli.bag_account import (
     account_of,
     replay_account,
     scene_account,
     worst_account,
 )
+from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.linkage_file import value_text, wrapped
 from linkage_ros.cli.progress import progress
-from linkage_ros.cli.tables import show, Table
+from linkage_ros.cli.tables import clean, show, Table
 from linkage_ros.cli.worst_states import examine
 from linkage_ros.errors import LinkageError
 from linkage_ros.replay import recorded_scene
@@ -60,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Look at the bag; return 1 where it was stopped."""
-    bag = read_bag(arguments.bag, allow_truncated=True)
+    bag = opened(arguments.bag, stop)
     account = info(bag, stop)
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
@@ -113,14 +114,20 @@ def _told(told: Any, of: int, done: int) -> None:
 def tables(account: dict[str, Any]) -> Iterator[Table]:
     """Yield the account of a bag as tables."""
     yield _table(account['bag'], _facts(account))
-    heads = ('topic', 'type', '>messages', '>rate [Hz]', '>dropped', 'QoS')
+    told = [
+        word
+        for word in ('received', 'dropped', 'let_go')
+        if word == 'dropped' or _sum(account, word)
+    ]
+    counted = [f'>{word.replace("_", " ")}' for word in told]
+    heads = ('topic', 'type', '>messages', '>rate [Hz]', *counted, 'QoS')
     rows = [
         (
-            _clean(topic['name']),
-            _clean(topic['type']),
+            clean(topic['name']),
+            clean(topic['type']),
             str(topic['messages']),
             '' if topic['rate_hz'] is None else f'{topic["rate_hz"]:.6g}',
-            '?' if topic['dropped'] is None else str(topic['dropped']),
+            *('?' if topic[word] is None else str(topic[word]) for word in told),
             _qos(topic),
         )
         for topic in account['topics']
@@ -137,18 +144,23 @@ def _facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name in ('begin', 'end') if duration is not None else ():
         yield name, f'{account[name]} ({account[f"{name}_ns"]} ns)'
     yield 'size', f'{account["size_bytes"]} bytes'
-    yield 'files', ', '.join(_clean(file['name']) for file in account['files'])
+    yield 'files', ', '.join(clean(file['name']) for file in account['files'])
     yield 'compression', ', '.join(map(_compression, account['compressions'])) or 'none'
-    truncated = account['truncated']
-    yield 'truncated', 'yes: its recording was killed, or still runs' if truncated else 'no'
+    yield 'unfinished', account['unfinished'] or 'no'
+    if account['beginning_missing']:
+        yield 'beginning', account['beginning_missing']
     if account['damage']:
         yield 'DAMAGED', f'{account["damage"]}; what lies before is told here'
     if account['recording_failure']:
         yield 'FAILED', account['recording_failure']
     yield 'messages', str(account['messages'])
-    dropped = [topic['dropped'] for topic in account['topics']]
-    told = dropped and None not in dropped
-    yield 'dropped', str(sum(dropped)) if told else 'not told: no recorder of ours closed the bag'
+    received, dropped, let_go = (_sum(account, word) for word in ('received', 'dropped', 'let_go'))
+    if received is not None:
+        yield 'received', str(received)
+    told = 'not told: no recorder of ours closed the bag' if dropped is None else str(dropped)
+    yield 'dropped', told
+    if let_go:
+        yield 'let go', f'{let_go}, with files that made way for newer ones'
     yield 'versions', ', '.join(_versions(account['versions'])) or 'not told'
     scene = account['scene']
     if scene:
@@ -163,6 +175,12 @@ def _facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if account['replay']:
         of, same = account['replay'].values()
         yield 'run again', f'{same} of {of} joint states come to the same bytes'
+
+
+def _sum(account: dict[str, Any], word: str) -> int | None:
+    """Return what the bag counts over all topics; nothing where it does not."""
+    counts = [topic[word] for topic in account['topics']]
+    return sum(counts) if counts and None not in counts else None
 
 
 def _linkage(linkage: dict[str, Any], begin: int | None) -> Iterator[tuple[str, str]]:
@@ -207,7 +225,7 @@ def _input(value: float, given: dict[str, str]) -> str:
 def _compression(found: dict[str, Any]) -> str:
     if found['name'] == 'none':
         return 'none'
-    return f'{_clean(found["name"])}, {found["content_bytes"]} bytes in {found["stored_bytes"]}'
+    return f'{clean(found["name"])}, {found["content_bytes"]} bytes in {found["stored_bytes"]}'
 
 
 def _versions(versions: dict[str, Any]) -> Iterator[str]:
@@ -220,19 +238,14 @@ def _versions(versions: dict[str, Any]) -> Iterator[str]:
         ('written_by', 'written by'),
     ):
         if versions[key] is not None:
-            yield f'{name} {_clean(str(versions[key]))}'
+            yield f'{name} {clean(str(versions[key]))}'
 
 
 def _qos(topic: dict[str, Any]) -> str:
     """Return a quality of service in a word, or in two where who comes late gets the last."""
     latched = ', transient local' if topic['durability'] == 'transient_local' else ''
-    return _clean(topic['reliability']).replace('_', ' ') + latched
+    return clean(topic['reliability']).replace('_', ' ') + latched
 
 
 def _table(title: str, facts: Iterator[tuple[str, str]]) -> Table:
-    return Table(_clean(title), ('', ''), [(name, _clean(value)) for name, value in facts])
-
-
-def _clean(text: str) -> str:
-    """Return a text without what a terminal would obey: bags come from anywhere."""
-    return text if text.isprintable() else repr(text)[1:-1]
+    return Table(clean(title), ('', ''), [(name, clean(value)) for name, value in facts])

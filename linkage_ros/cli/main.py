@@ -51,6 +51,11 @@ _MODULES = {'import': 'import_urdf'}
 """Modules of another name: no module can be named as a word of Python's."""
 
 
+def module_of(command: str) -> str:
+    """Return the name of the module of a subcommand."""
+    return f'linkage_ros.cli.{_MODULES.get(command, command)}'
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run ``linkage``; return 0, 1 for a run that went wrong, 2 for wrong input, 3 for a loss."""
     # First of all: from here on Ctrl-C ends a run by closing its bag.
@@ -67,7 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('command', choices=COMMANDS, metavar='COMMAND')
     name = parser.parse_args(arguments[:1]).command
 
-    module = import_module(f'linkage_ros.cli.{_MODULES.get(name, name)}')
+    module = import_module(module_of(name))
     subparser = argparse.ArgumentParser(prog=f'linkage {name}', description=module.__doc__)
     module.add_arguments(subparser)
     try:

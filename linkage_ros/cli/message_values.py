@@ -42,11 +42,23 @@ POSITION, RATE, ACCELERATION, EFFORT = 'position', 'rate', 'acceleration', 'effo
 FORCE_X, FORCE_Y, TORQUE = 'force x', 'force y', 'torque'
 QUANTITIES = (POSITION, RATE, ACCELERATION, EFFORT, FORCE_X, FORCE_Y, TORQUE)
 
+UNITS = {
+    POSITION: ('rad', 'm'),
+    RATE: ('rad/s', 'm/s'),
+    ACCELERATION: ('rad/s²', 'm/s²'),
+    EFFORT: ('N·m', 'N'),
+    FORCE_X: ('N', 'N'),
+    FORCE_Y: ('N', 'N'),
+    TORQUE: ('N·m', 'N·m'),
+}
+"""Of each quantity the unit where the joint turns, and where it slides."""
+
 MALFORMED = Rejection.MALFORMED.value
 UNEQUAL = Rejection.UNEQUAL.value
 TWICE = 'a joint named twice'
 POINTS = 'not one point'
 POSES = 'transforms or twists'
+NO_JOINTS = 'not about joints'
 
 Key = tuple[str, str]
 """A joint's name, and the quantity."""
@@ -115,14 +127,14 @@ class MessageValues:
     Parameters
     ----------
     message_type
-        One of `JOINT_STATE`, `TRAJECTORY` and `WRENCHES`.
+        One of `JOINT_STATE`, `TRAJECTORY` and `WRENCHES`; messages of others tell nothing.
 
     """
 
     __slots__ = ('_layout', '_parse')
 
     def __init__(self, message_type: str) -> None:
-        self._parse = _PARSERS[message_type]
+        self._parse = _PARSERS.get(message_type, _others)
         self._layout: _Layout | None = None
 
     def read(self, data: bytes) -> Values | str:
@@ -236,6 +248,10 @@ def _wrenches(data: bytes) -> _Parsed | str:
     for name in names if n else ():
         keys += [(name, FORCE_X), (name, FORCE_Y), None, None, None, (name, TORQUE)]
     return cursor.order, names, [_Array(count_at, first, keys)]
+
+
+def _others(_: bytes) -> str:
+    return NO_JOINTS
 
 
 _PARSERS: dict[str, Callable[[bytes], _Parsed | str]] = {

@@ -17,25 +17,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 import json
 from pathlib import Path
 from typing import NamedTuple
 
 from linkage_ros.bag.reading.reader import Bag, RUN_FILE
-from linkage_ros.bag.reading.run_events import BEGUN, RunAccount, Taken, Turned, WITH_THE_RUN
+from linkage_ros.bag.reading.run_events import (
+    BEGUN,
+    OWN_EFFECTS,
+    Reset,
+    run_said,
+    RunAccount,
+    Taken,
+    Turned,
+    WITH_THE_RUN,
+)
 from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cdr import time_message
 from linkage_ros.cli.message_values import JOINT_STATE
-from linkage_ros.cli.what_if import Remade, WhatIf
+from linkage_ros.cli.what_if import Done, WhatIf
 from linkage_ros.errors import LinkageError
 from linkage_ros.pipeline import Pipeline
-from linkage_ros.replay import versions_here
+from linkage_ros.replay import own_effects_here, versions_here
 from linkage_ros.scene.scene import Scene
 
 _FLUSHED_EVERY = 50_000
+_TIME = 'builtin_interfaces/msg/Time'
 _CHANGES_QOS = QosProfile(depth=100, durability='transient_local')
 
 
@@ -68,7 +77,7 @@ class Names(NamedTuple):
 
     Attributes
     ----------
-    joint_states, faults, withheld
+    joint_states, faults, withheld, resets
         Of the topics.
     extras
         Of the scene's further topics, in their order.
@@ -78,6 +87,7 @@ class Names(NamedTuple):
     joint_states: str
     faults: str
     withheld: str
+    resets: str
     extras: tuple[str, ...]
 
 
@@ -88,7 +98,12 @@ def names_for(source: Source, scene: Scene, what_if: WhatIf) -> Names:
     if source.recorded is not None:
         private = [extra.topic for extra in Pipeline(source.recorded).extras]
         known = dict(zip(private, run.extras, strict=False))
-    pairs = {'~/withheld': run.withheld_topic, '~/faults': run.faults_topic, **known}
+    pairs = {
+        '~/withheld': run.withheld_topic,
+        '~/faults': run.faults_topic,
+        '~/resets': run.resets_topic,
+        **known,
+    }
     joint_states = run.joint_states_topic or '/joint_states'
     nodes = [name.removesuffix(key[1:]) for key, name in pairs.items() if name.endswith(key[1:])]
     node = nodes[0] if nodes else f'{joint_states.rpartition("/")[0]}/linkage_node'
@@ -105,6 +120,7 @@ def names_for(source: Source, scene: Scene, what_if: WhatIf) -> Names:
         joint_states,
         resolved('~/faults'),
         resolved('~/withheld'),
+        resolved('~/resets'),
         tuple(resolved(extra.topic) for extra in what_if.extras),
     )
 
@@ -136,11 +152,12 @@ class NewBag:
             ('joint_states_topic', names.joint_states, JOINT_STATE, QosProfile()),
             ('crank_topic', source.crank_topic, JOINT_STATE, own[source.crank_topic].qos),
         ]
+        if source.run.resets_topic:
+            topics.append(('resets_topic', names.resets, _TIME, QosProfile()))
         if scene.faults:
             topics.append(('faults_topic', names.faults, 'std_msgs/msg/String', _CHANGES_QOS))
         if what_if.withholds:
-            withheld = 'builtin_interfaces/msg/Time'
-            topics.append(('withheld_topic', names.withheld, withheld, QosProfile()))
+            topics.append(('withheld_topic', names.withheld, _TIME, QosProfile()))
         self._what_if = what_if
         self._numbers = {key: number for number, (key, *_) in enumerate(topics)}
         self._first_extra = len(topics)
@@ -156,8 +173,9 @@ class NewBag:
             **named,
             'extra_topics': list(names.extras),
             BEGUN: WITH_THE_RUN,
+            **({OWN_EFFECTS: own_effects} if (own_effects := own_effects_here(scene)) else {}),
             **versions_here(),
-            'made_from': {'bag': str(bag.path.resolve()), 'run': _said(bag)},
+            'made_from': {'bag': str(bag.path.resolve()), 'run': run_said(bag)},
         }
         files = {name: ('application/yaml', data) for name, data in scene.files.items()}
         files[RUN_FILE] = ('application/json', json.dumps(account).encode())
@@ -171,22 +189,24 @@ class NewBag:
         """Return how many messages were written on each topic."""
         return dict(zip((topic.name for topic in self._topics), self._written, strict=True))
 
-    def add(self, event: Taken | Turned | Remade) -> None:
+    def add(self, event: Done) -> None:
         """Write what happened; raises RecordingError where it cannot be."""
         if isinstance(event, Taken):
             self._write(self._numbers['crank_topic'], *event)
         elif isinstance(event, Turned):
             self._write(self._numbers['faults_topic'], *event)
+        elif isinstance(event, Reset):
+            self._write(self._numbers['resets_topic'], *event)
         else:
             log_time, time, _, tick = event
             if tick is None:
                 return
             if tick.message:
                 self._write(self._numbers['joint_states_topic'], log_time, time, tick.message)
-                for number, message in enumerate(tick.extras, self._first_extra):
-                    if message:
-                        self._write(number, log_time, time, message)
-            elif self._what_if.withheld(tick):
+            for number, message in enumerate(tick.extras, self._first_extra):
+                if message:
+                    self._write(number, log_time, time, message)
+            if self._what_if.withheld(tick):
                 withheld = time_message(time)
                 self._write(self._numbers['withheld_topic'], log_time, time, withheld)
 
@@ -216,12 +236,3 @@ def _described(bag: Bag, name: str, kind: str, qos: QosProfile) -> Topic:
             '--output', f'{kind} takes rclpy, which is not installed', 'source a ROS 2 workspace'
         ) from None
     return replace(bag_topic(name, message_type(kind, '--scene'), RosProfile(depth=10)), qos=qos)
-
-
-def _said(bag: Bag) -> Mapping[str, object]:
-    """Return what the bag says of its own run; nothing of a foreign one."""
-    try:
-        said = json.loads(bag.attachments[RUN_FILE])
-    except (KeyError, ValueError, RecursionError):
-        return {}
-    return said if isinstance(said, dict) else {}

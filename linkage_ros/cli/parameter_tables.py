@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Drives, effects and faults as tables: their parameters with units, defaults and bounds."""
+"""Drives, effects, faults and solvers as tables: parameters, units, defaults and bounds."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from typing import Any
 
 from linkage_ros.cli.tables import Table
 from linkage_ros.drives.drive import DRIVES
-from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.effects.stage import EFFECTS, module_of
 from linkage_ros.faults.fault import FAULTS
 from linkage_ros.parameters import (
     Choice,
@@ -43,11 +43,13 @@ from linkage_ros.parameters import (
     Text,
 )
 from linkage_ros.scene.schema import default_of, is_required, KIND_NAMES, summary
+from linkage_ros.solvers.registry import SOLVERS
 
 REGISTRIES: Mapping[str, Mapping[str, str]] = {
     'drive': DRIVES,
     'effect': EFFECTS,
     'fault': FAULTS,
+    'solver': SOLVERS,
 }
 """All that a scene can name, by what it is."""
 
@@ -55,8 +57,9 @@ _HEADS = ('parameter', 'unit', 'default', 'values', 'meaning')
 
 
 def table_of(what: str, name: str) -> Table:
-    """Return the table of one drive, effect or fault: ``what`` is a key of `REGISTRIES`."""
-    parameters = import_module(REGISTRIES[what][name]).PARAMETERS
+    """Return the table of what a scene can name: ``what`` is a key of `REGISTRIES`."""
+    module = module_of(name) if what == 'effect' else import_module(REGISTRIES[what][name])
+    parameters = module.PARAMETERS
     title = f'{what} {name}: {summary(parameters)}'
     rows = list(_rows('', parameters))
     return Table(title, _HEADS, rows) if rows else Table(title, ('',), [('no parameters',)])

@@ -32,9 +32,11 @@ from threading import Event
 
 from linkage_ros.bag.reading.being_written import is_being_written
 from linkage_ros.bag.reading.in_time import TimeOrder
-from linkage_ros.bag.reading.reader import Bag, read_bag
+from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.bag.topic import Topic
+from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.progress import progress, Told
+from linkage_ros.cli.tables import clean
 from linkage_ros.errors import BagError, did_you_mean, LinkageError
 from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.ros.bag_publishers import offer
@@ -95,7 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Play the bag; return 1 where it is damaged, and was played up to there."""
-    bag = read_bag(arguments.bag, allow_truncated=True)
+    bag = opened(arguments.bag, stop)
     if bag.truncated:
         _say_truncated(bag)
     topics = _topics(bag, arguments.topics)
@@ -138,7 +140,7 @@ def _say_truncated(bag: Bag) -> None:
         if is_being_written(file):
             raise BagError(file, 'is being written', 'end its recording first')
     print(
-        f'linkage play: {bag.path}: its recording was killed; what it holds is played',
+        f'linkage play: {bag.path}: unfinished: its recording was killed; what it holds is played',
         file=sys.stderr,
     )
 
@@ -152,7 +154,7 @@ def _topics(bag: Bag, names: Sequence[str] | None) -> list[Topic]:
         return list(topics.values())
     for name in names:
         if name not in topics:
-            others = f'there are: {_printable(", ".join(topics))}'
+            others = f'there are: {clean(", ".join(topics))}'
             remedy = did_you_mean(name, topics, others)
             raise LinkageError(name, f'{bag.path} has no such topic', remedy)
     return [topics[name] for name in dict.fromkeys(names)]
@@ -166,12 +168,7 @@ def _without_clock(topics: Sequence[Topic]) -> list[Topic]:
 
 
 def _say(error: LinkageError, what: str = 'left out: ') -> None:
-    print(f'linkage play: {what}{_printable(str(error))}', file=sys.stderr)
-
-
-def _printable(text: str) -> str:
-    """Return a text without what a terminal would obey: bags come from anywhere."""
-    return text if text.isprintable() else repr(text)[1:-1]
+    print(f'linkage play: {what}{clean(str(error))}', file=sys.stderr)
 
 
 def _tell(told: Told, first: int, last: float, now: int) -> None:

@@ -24,12 +24,13 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.cli.bag_reading import opened
 from linkage_ros.effects.turns import wrapped
 from linkage_ros.errors import BagError, LinkageError
 from linkage_ros.joint_state import JointStateReader, Rejection
 from linkage_ros.kinematics.linkage import Input, RevoluteJoint
 from linkage_ros.replay import recorded_scene, replay
+from linkage_ros.stop import StoppedError
 
 _COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
 """Okabe and Ito's, which colour-blind readers can tell."""
@@ -43,15 +44,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('-o', '--output', type=Path, help='PNG, SVG or PDF; without it BAG.png')
 
 
-def run(arguments: argparse.Namespace, _stop: Event) -> int:
+def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Draw the bag."""
     picture = arguments.output or Path(f'{str(arguments.bag).rstrip("/")}.png')
-    draw(arguments.bag, picture)
+    draw(arguments.bag, picture, stop)
     print(picture)
     return 0
 
 
-def draw(bag_path: Path, picture: Path) -> None:
+def draw(bag_path: Path, picture: Path, stop: Event) -> None:
     """
     Draw a bag: each published joint, and its rate where there is one, over one turn of the crank.
 
@@ -61,13 +62,15 @@ def draw(bag_path: Path, picture: Path) -> None:
     ------
     LinkageError
         Where matplotlib is not installed, or the bag holds nothing to draw.
+    StoppedError
+        The event was set.
 
     """
     if find_spec('matplotlib') is None:
         raise LinkageError(
             'matplotlib', 'is not installed', 'pip install linkage_ros[report], or apt its package'
         )
-    bag = read_bag(bag_path, allow_truncated=True)
+    bag = opened(bag_path, stop)
     scene = recorded_scene(bag)
     # Over the crank of the first linkage, with its joints.
     member = scene.members[0]
@@ -83,6 +86,8 @@ def draw(bag_path: Path, picture: Path) -> None:
     reader = JointStateReader(member.joints)
     states = 0
     for _, recorded, _, tick in replay(bag, scene):
+        if stop.is_set():
+            raise StoppedError
         crank_state = tick.looks[0].crank
         if crank_state is None or not recorded:
             continue

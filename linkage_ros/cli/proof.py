@@ -16,9 +16,10 @@
 """
 The proof of a bag: its scene run once more over its samples, and compared with what is recorded.
 
-A bag that a service has begun in mid-run lacks what the node remembered then: the newest sample,
-whole turns, delay lines, random generators. Its first ticks, until one comes again, say nothing;
-and whole turns are no difference there.
+A bag that does not hold its run from the beginning (begun in mid-run, or its first files have made
+way for newer ones) lacks what the node remembered then: the newest sample, whole turns, delay
+lines, random generators. Its first ticks, until one comes again, say nothing; and whole turns are
+no difference there.
 """
 
 from __future__ import annotations
@@ -26,8 +27,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
+from linkage_ros.bag.reading.beginning import lost_beginning
 from linkage_ros.bag.reading.reader import Bag, BagMessage
-from linkage_ros.bag.reading.run_events import MID_RUN, run_account
+from linkage_ros.bag.reading.run_events import run_account
 from linkage_ros.cli.message_values import JOINT_STATE
 from linkage_ros.cli.replay_comparison import At, Comparison, First
 from linkage_ros.kinematics.linkage import RevoluteJoint
@@ -38,7 +40,11 @@ from linkage_ros.scene.scene import Scene
 IDENTICAL, DIFFERENT, UNTOLD = 'identical', 'different', 'cannot be told'
 
 _NEVER_FOUND_AGAIN = ('rate_limit', 'noise', 'jitter', 'dropout')
-"""Effects whose memory does not come back: generators, and the time of the first tick."""
+"""
+Effects whose memory does not come back: generators, and the time of the first tick. So with an
+incremental encoder, which counts from where it was switched on, and with markers that leave a
+trace.
+"""
 
 
 class Proof(NamedTuple):
@@ -50,11 +56,11 @@ class Proof(NamedTuple):
     comparison
         The ticks that could be compared.
     untold
-        How many ticks at the start could not be told, since the bag was begun in mid-run.
+        How many ticks at the start could not be told, since the run's beginning is not in the bag.
     first_untold
         What the first of these differs in.
-    mid_run
-        Whether it was begun so.
+    beginning
+        Why it is not; '' where it is.
     lost
         Drives and effects that then never come to the same again.
 
@@ -63,7 +69,7 @@ class Proof(NamedTuple):
     comparison: Comparison
     untold: int
     first_untold: First | None
-    mid_run: bool
+    beginning: str
     lost: tuple[str, ...]
 
     @property
@@ -109,10 +115,10 @@ def prove(
     types += [JOINT_STATE] * len(run.extras)  # for those of which the scene knows nothing
     topics = [(run.joint_states_topic, JOINT_STATE), *zip(run.extras, types, strict=False)]
     silent = (b'',) * len(topics)
-    mid_run = run.begun == MID_RUN
-    turning = turning_joints(scene) if mid_run and not scene.wrapped else {}
+    beginning = lost_beginning(bag, run)
+    turning = turning_joints(scene) if beginning and not scene.wrapped else {}
     comparison, probe = Comparison(topics, turning), Comparison(topics, turning)
-    untold, in_step = 0, not mid_run
+    untold, in_step = 0, not beginning
     for number, replayed in enumerate(replay_all(bag, scene, messages), 1):
         time, joint_states, extras, tick = replayed
         look(replayed)
@@ -127,13 +133,13 @@ def prove(
                 continue
         comparison.add(at, recorded, now)
     comparison.settle()
-    lost = _lost(scene) if mid_run else ()
-    return Proof(comparison, untold, probe.first if untold else None, mid_run, lost)
+    lost = _lost(scene) if beginning else ()
+    return Proof(comparison, untold, probe.first if untold else None, beginning, lost)
 
 
-def mid_run_text(proof: Proof) -> str:
-    """Return in words what could not be told of a bag that was begun in mid-run."""
-    text = f'begun in mid-run: what the node remembered then is not in it, so {proof.untold} '
+def beginning_text(proof: Proof) -> str:
+    """Return in words what could not be told of a bag without the beginning of its run."""
+    text = f'{proof.beginning}: what the node remembered then is not in it, so {proof.untold} '
     text += f'of {proof.ticks} ticks, at the start, could not be told'
     if proof.verdict == UNTOLD and proof.lost:
         text += f'; {" and ".join(proof.lost)} cannot come to the same again'
@@ -153,8 +159,12 @@ def turning_joints(scene: Scene) -> dict[str, bool]:
 
 def _lost(scene: Scene) -> tuple[str, ...]:
     named = [member.drive[0] for member in scene.members if member.drive[0] != 'topic']
-    named += [
-        effect for member in scene.members for effect in member.effects
-        if effect in _NEVER_FOUND_AGAIN
-    ]  # fmt: skip
+    for member in scene.members:
+        named += [effect for effect in member.effects if effect in _NEVER_FOUND_AGAIN]
+        encoder = member.effects.get('encoder')
+        if encoder and any(each.incremental for each in encoder.joints.values()):
+            named.append('encoder')
+        markers = member.effects.get('markers')
+        if markers and markers.trace:
+            named.append('markers')
     return tuple(dict.fromkeys(named))

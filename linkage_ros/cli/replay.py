@@ -34,9 +34,9 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reading.reader import Bag, read_bag
+from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.bag.reading.run_events import run_account
-from linkage_ros.cli.bag_reading import BagReading
+from linkage_ros.cli.bag_reading import BagReading, opened
 from linkage_ros.cli.proof import DIFFERENT, IDENTICAL, prove, turning_joints
 from linkage_ros.cli.replay_account import (
     bag_account,
@@ -48,9 +48,9 @@ from linkage_ros.cli.replay_account import (
     versions_text,
 )
 from linkage_ros.cli.replay_other import replayed_with
-from linkage_ros.cli.tables import show
+from linkage_ros.cli.tables import clean, show
 from linkage_ros.errors import BagError, LinkageError
-from linkage_ros.replay import recorded_scene, ReplayedTick, versions_here
+from linkage_ros.replay import own_effects_here, recorded_scene, ReplayedTick, versions_here
 from linkage_ros.scene.load import load_scene
 
 EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     for option, value in (('-o', arguments.output), ('--crank-topic', arguments.crank_topic)):
         if value is not None and arguments.scene is None:
             raise LinkageError(option, 'is for another scene', 'name it with --scene')
-    bag = read_bag(arguments.bag, allow_truncated=True)
+    bag = opened(arguments.bag, stop)
     reading = BagReading(bag, stop)
     if arguments.scene is None:
         account = replayed(bag, reading)
@@ -121,7 +121,11 @@ def replayed(bag: Bag, reading: BagReading) -> dict[str, Any]:
         proof = prove(bag, scene, messages, look)
     if not begin and not reading.damage and not reading.stopped:
         raise BagError(bag.path, 'holds no joint states', 'record a run with a crank')
-    versions = {'bag': run_account(bag).versions, 'here': versions_here()}
+    run = run_account(bag)
+    versions = {
+        'bag': {**run.versions, **run.own_effects},
+        'here': {**versions_here(), **own_effects_here(scene)},
+    }
     account = proof_account(proof, turning_joints(scene), versions)
     return bag_account(bag, scene, reading, begin) | account
 
@@ -133,20 +137,22 @@ def _show_proof(account: dict[str, Any]) -> None:
     if verdict == IDENTICAL:
         text = f'identical: what {ticks} ticks have made comes to the same again'
     else:
-        text = f'{verdict}: {differ} of {ticks} ticks differ'
+        text = f'{verdict}: {differ} of {ticks} ticks differ' if ticks else verdict
     print(f'{account["bag"]}: {text}')
-    if account['mid_run']:
-        print(account['mid_run'])
+    if account['beginning_missing']:
+        print(account['beginning_missing'])
+    for gap in account['gaps'] if differ else ():
+        print(clean(gap))
     first = account['first_difference']
     if first and differ:
-        print(f'first: {first_text(first, begin)}')
+        print(clean(f'first: {first_text(first, begin)}'))
         last = account['last_different_tick']['tick']
         if last < account['ticks'] and last != first['tick']:
             print(f'from tick {last + 1} on all are the same')
     elif first:
-        print(f'not told, first: {first_text(first, begin)}')
+        print(clean(f'not told, first: {first_text(first, begin)}'))
     if account['withheld_ticks']:
-        print(f'{account["withheld_ticks"]} ticks have withheld their messages, then and now')
+        print(f'{account["withheld_ticks"]} ticks are without a message, then and now')
     for line in versions_text(account['versions']):
         print(line)
     print()
@@ -179,7 +185,7 @@ def _show_what_if(account: dict[str, Any]) -> None:
 def _shortcomings(account: dict[str, Any]) -> Iterator[str]:
     """Yield why not all of the bag was replayed."""
     if account['truncated']:
-        yield f'{account["bag"]}: has no end; its whole part was replayed'
+        yield f'{account["bag"]}: unfinished: {account["unfinished"]}; what it holds was replayed'
     if account['damage']:
         yield f'{account["damage"]}; what lies before was replayed'
     if account['stopped']:

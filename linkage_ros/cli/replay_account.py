@@ -22,28 +22,17 @@ from math import isfinite
 from typing import Any
 
 from linkage_ros.bag.reading.reader import Bag
-from linkage_ros.cli.bag_reading import BagReading
-from linkage_ros.cli.message_values import ACCELERATION, EFFORT, POSITION, RATE
-from linkage_ros.cli.proof import mid_run_text, Proof
+from linkage_ros.cli.bag_reading import BagReading, gaps, unfinished_text
+from linkage_ros.cli.message_values import UNITS
+from linkage_ros.cli.proof import beginning_text, Proof
 from linkage_ros.cli.replay_comparison import At, Comparison, First, TopicComparison, ulps
-from linkage_ros.cli.tables import Table
+from linkage_ros.cli.tables import clean, Table
 from linkage_ros.scene.scene import Scene
-
-_UNITS = {
-    POSITION: ('rad', 'm'),
-    RATE: ('rad/s', 'm/s'),
-    ACCELERATION: ('rad/s²', 'm/s²'),
-    EFFORT: ('N·m', 'N'),
-    'force x': ('N', 'N'),
-    'force y': ('N', 'N'),
-    'torque': ('N·m', 'N·m'),
-}
-"""Of each quantity the unit where the joint turns, and where it slides."""
 
 
 def unit_of(joint: str, quantity: str, turning: Mapping[str, bool]) -> str:
     """Return the unit of a joint's number."""
-    return _UNITS[quantity][not turning.get(joint, True)]
+    return UNITS[quantity][not turning.get(joint, True)]
 
 
 def bag_account(bag: Bag, scene: Scene, reading: BagReading, begin: list[int]) -> dict[str, Any]:
@@ -53,6 +42,8 @@ def bag_account(bag: Bag, scene: Scene, reading: BagReading, begin: list[int]) -
         'scene': scene.name,
         'begin_ns': begin[0] if begin else None,
         'truncated': bag.truncated,
+        'unfinished': unfinished_text(bag) if bag.truncated else None,
+        'gaps': list(gaps(bag)),
         'damage': reading.damage or None,
         'stopped': reading.stopped,
     }
@@ -82,7 +73,7 @@ def proof_account(
         'different_ticks': found.differing,
         'withheld_ticks': found.withheld,
         'untold_ticks': proof.untold,
-        'mid_run': mid_run_text(proof) if proof.mid_run else None,
+        'beginning_missing': beginning_text(proof) if proof.beginning else None,
         'topics': [topic_account(topic) for topic in found.topics],
         'first_difference': first_account(found.first or proof.first_untold, turning),
         'last_different_tick': at_account(found.last) if found.last else None,
@@ -191,7 +182,7 @@ def topics_table(account: Mapping[str, Any]) -> Table:
         heads.insert(3, '>but for turns')
         keys.insert(2, 'same_but_for_turns')
     rows = [
-        (_clean(topic['name']), *(str(topic[key]) for key in keys)) for topic in account['topics']
+        (clean(topic['name']), *(str(topic[key]) for key in keys)) for topic in account['topics']
     ]
     return Table('', heads, rows)
 
@@ -215,7 +206,7 @@ def joints_table(account: Mapping[str, Any], begin: int) -> Table:
     """Return the differences joint by joint as a table."""
     rows = [
         (
-            _clean(row['joint']),
+            clean(row['joint']),
             f'{row["quantity"]} [{row["unit"]}]',
             str(row['compared']),
             _number(row['rms']),
@@ -238,12 +229,13 @@ def versions_text(versions: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
 
 def _versions(said: Mapping[str, str]) -> str:
     words = {'linkage_ros': 'linkage_ros', 'python': 'Python', 'machine': 'on'}
-    told = [f'{word} {_clean(said[key])}' for key, word in words.items() if key in said]
+    told = [f'{word} {clean(said[key])}' for key, word in words.items() if key in said]
+    told += [f'{clean(key)} ({clean(said[key])})' for key in said if key not in words]
     return ', '.join(told) or 'versions that it does not tell'
 
 
 def _place(where: Mapping[str, Any], begin: int) -> str:
-    return f'{_clean(where["joint"])}, {_tick(where, begin)}'
+    return f'{clean(where["joint"])}, {_tick(where, begin)}'
 
 
 def _tick(where: Mapping[str, Any], begin: int) -> str:
@@ -256,8 +248,3 @@ def _number(value: float | None) -> str:
 
 def _finite(value: float) -> float | None:
     return value if isfinite(value) else None
-
-
-def _clean(text: str) -> str:
-    """Return a text without what a terminal would obey: bags come from anywhere."""
-    return text if text.isprintable() else repr(text)[1:-1]

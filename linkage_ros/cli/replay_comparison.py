@@ -207,7 +207,7 @@ class Comparison:
         self.ticks = self.differing = 0
         """How many ticks were compared, and how many of them differ."""
         self.withheld = 0
-        """How many ticks have withheld their messages, then and now."""
+        """How many ticks are without a message, then and now."""
         self.first: First | None = None
         self.last: At | None = None
         """The last tick that differs."""

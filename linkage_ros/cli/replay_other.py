@@ -62,7 +62,7 @@ def replayed_with(
     """
     check_drives(scene, scene.members[0].content.file)
     run, recorded = _own_account(bag)
-    topic = find_crank_topic(bag, scene, run, recorded, crank_topic)
+    topic = find_crank_topic(bag, reading.glance(), scene, run, recorded, crank_topic)
     source = Source(bag, run, recorded, topic)
     what_if = WhatIf(scene, recorded)
     names = names_for(source, scene, what_if)
@@ -135,7 +135,7 @@ def _side_by_side(
     """Return what a tick has made on each topic that both runs have, then and now."""
     then = dict(zip((run.joint_states_topic, *run.extras), event.recorded, strict=False))
     now: dict[str, bytes] = {}
-    if event.tick is not None and event.tick.message:
+    if event.tick is not None:
         now = dict(zip(names.extras, event.tick.extras, strict=False))
         now[run.joint_states_topic] = event.tick.message
     return [then.get(name, b'') for name in shared], [now.get(name, b'') for name in shared]

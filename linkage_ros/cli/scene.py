@@ -52,8 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--list',
         nargs='*',
         metavar='NAME',
-        help='drives, effects and faults: their parameters, units, defaults and bounds; all of '
-        'them, or those named',
+        help='drives, effects, faults and solvers: their parameters, units, defaults and bounds; '
+        'all of them, or those named',
     )
     one.add_argument('--schema', choices=SCHEMAS, help='the JSON Schema of scene or linkage files')
 
@@ -90,11 +90,14 @@ def _named(names: list[str]) -> Iterator[tuple[str, str]]:
         yield from known
     for name in names:
         found = [entry for entry in known if entry[1] == name]
+        if '.' in name:
+            # One of one's own, which no list has.
+            found = [('effect', name)]
         if not found:
             words = [word for _, word in known]
             raise LinkageError(
                 f'--list {name}',
-                'there is no such drive, effect or fault',
+                'there is no such drive, effect, fault or solver',
                 did_you_mean(name, words, f'known: {", ".join(words)}'),
             )
         yield from found

@@ -23,7 +23,7 @@ from typing import Any
 
 from linkage_ros.cli.tables import Table
 from linkage_ros.drives.drive import DRIVES
-from linkage_ros.effects.stage import bringing, EFFECTS
+from linkage_ros.effects.stage import bringing, module_of
 from linkage_ros.line import Line
 from linkage_ros.parameters import declared
 from linkage_ros.pipeline import Pipeline
@@ -36,6 +36,7 @@ _WHERE = {
     'begin': 'in the mechanism',
     'stage': 'in the mechanism',
     'sensor': 'between mechanism and message',
+    'writer': 'beside the joint states',
 }
 """Where in a tick an effect stands, by the function that builds it."""
 
@@ -46,7 +47,7 @@ _LONGEST = 60
 
 def tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
     """Yield what there is to say of a scene that has been built."""
-    yield Table(title, ('', ''), list(_facts(scene)))
+    yield Table(title, ('', ''), [*_facts(scene), *_solvers(pipeline.lines)])
     for lines in _alike(pipeline.lines):
         names = _some([line.member.name for line in lines if line.member.name])
         heads = ('>', 'stage', 'where', 'what it does', 'as said here', '')
@@ -77,6 +78,18 @@ def _facts(scene: Scene) -> Iterator[tuple[str, str]]:
     yield 'recorded', recorded
 
 
+def _solvers(lines: list[Line]) -> Iterator[tuple[str, str]]:
+    """Yield what closes the loops, where the scene says so."""
+    for line in lines:
+        name = f'{line.member.name}: ' if line.member.name else ''
+        if line.choice is not None:
+            yield 'solver', f'{name}for an accuracy of {line.member.accuracy:g}: {line.choice.why}'
+        elif line.member.solver is not None:
+            solver, parameters = line.member.solver
+            said = _said(parameters)
+            yield 'solver', f'{name}{solver}{said and ", "}{said}'
+
+
 def _alike(lines: list[Line]) -> list[list[Line]]:
     """Return the linkages, those together that have the same drive and effects."""
     groups: dict[str, list[Line]] = {}
@@ -90,7 +103,7 @@ def _stages(line: Line) -> Iterator[tuple[str, ...]]:
     module = import_module(DRIVES[name])
     yield '0', name, 'drive', summary(module.PARAMETERS), _said(parameters), ''
     for number, stage in enumerate(line.stages, 1):
-        module = import_module(EFFECTS[stage])
+        module = module_of(stage)
         named = line.member.effects
         yield (
             str(number),

@@ -23,6 +23,11 @@ import sys
 from typing import NamedTuple
 
 
+def clean(text: str) -> str:
+    """Return a text without what a terminal would obey: files come from anywhere."""
+    return text if text.isprintable() else repr(text)[1:-1]
+
+
 class Table(NamedTuple):
     """
     A table.

@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from re import search
 from typing import Any, TYPE_CHECKING
 
 from jsonschema import Draft202012Validator
@@ -81,8 +82,9 @@ def _said(error: ValidationError, whole: Schema) -> Iterator[_Said]:
     match rule:
         case 'additionalProperties':
             known = list(schema['properties'])
+            others = '|'.join(schema.get('patternProperties', ())) or '$^'
             for key in value:
-                if key not in known:
+                if key not in known and not search(others, key):
                     yield (*path, key), 'unknown key', _near(key, known)
         case 'required':
             # Each missing key is an error of its own, which names it in its message only.

@@ -32,8 +32,8 @@ from collections.abc import Generator, Iterable, Iterator
 from dataclasses import replace
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.bag.reading.run_events import Event, Made, Taken, Turned
-from linkage_ros.cdr import text_message
+from linkage_ros.bag.reading.run_events import Event, Made, Reset, Taken, Turned
+from linkage_ros.cdr import text_message, TIME_END
 from linkage_ros.errors import LinkageError
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.replay import change_text, read_change
@@ -41,6 +41,10 @@ from linkage_ros.scene.scene import Scene
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Injection
+
+
+_LARGEST_LEAD = 2 * 3600 * 1_000_000_000
+"""No sample that was taken was as far ahead of its tick, in [ns]."""
 
 
 class Remade(NamedTuple):
@@ -62,6 +66,9 @@ class Remade(NamedTuple):
     time: int
     recorded: tuple[bytes, ...]
     tick: Tick | None
+
+
+Done = Taken | Turned | Reset | Remade
 
 
 def check_drives(scene: Scene, where: str) -> None:
@@ -102,9 +109,7 @@ class WhatIf:
         self._closures = self._pipeline.closures
         self.extras = self._pipeline.extras
         """Its topics beside the joint states."""
-        # Play moves on where the linkage is open, so a replay has to know of such ticks.
-        self._play = any('backlash' in member.effects for member in scene.members)
-        self.withholds = self._play or self._pipeline.withholds
+        self.withholds = self._pipeline.withholds
         """Whether there may be ticks of which a replay has to know, and without a message."""
         self._seen = self._last = 0  # the log times of the last event, and of what was written
         self._period = round(1e9 / scene.rate) if scene.rate else 0
@@ -126,18 +131,16 @@ class WhatIf:
             }
         )
 
-    def run(self, events: Iterable[Event]) -> Iterator[Taken | Turned | Remade]:
-        """Yield, in their order, what is written: samples, faults and ticks."""
+    def run(self, events: Iterable[Event]) -> Iterator[Done]:
+        """Yield, in their order, what is written: samples, faults, resets and ticks."""
         return self._on_clock(events) if self._period else self._on_samples(events)
 
     def withheld(self, tick: Tick) -> bool:
         """Return whether a tick without a message is one of which a replay has to know."""
-        return not tick.message and any(
-            position is not None and reading is None and bool(position.joints or self._play)
-            for _, position, _, reading in tick.looks
-        )
+        said = tick.message or tick.extras
+        return self.withholds and not said and self._pipeline.remembers(tick)
 
-    def _on_samples(self, events: Iterable[Event]) -> Iterator[Taken | Turned | Remade]:
+    def _on_samples(self, events: Iterable[Event]) -> Iterator[Done]:
         made: Remade | None = None  # what the bag has of it may follow
         for event in events:
             if isinstance(event, Made):
@@ -152,13 +155,15 @@ class WhatIf:
                 made = None
             if isinstance(event, Turned):
                 yield from self._follow(event)
+            elif isinstance(event, Reset):
+                yield self._reset(event)
             elif (yield from self._offer(event)):
                 now = self._clock(event.log_time)
                 made = self._tick(now, self._pipeline.newest_stamp, ())
         if made is not None:
             yield made
 
-    def _on_clock(self, events: Iterable[Event]) -> Iterator[Taken | Turned | Remade]:
+    def _on_clock(self, events: Iterable[Event]) -> Iterator[Done]:
         taken: int | None = None  # when a tick took samples that may have published nothing
         for event in events:
             at = event.log_time
@@ -177,6 +182,9 @@ class WhatIf:
             self._seen = at
             if isinstance(event, Turned):
                 yield from self._follow(event)
+                continue
+            if isinstance(event, Reset):
+                yield self._reset(event)
                 continue
             yield from self._offer(event)
             if self._clocked:
@@ -204,8 +212,10 @@ class WhatIf:
     def _catch_up(self, to: int) -> Iterator[Turned | Remade]:
         """Make the ticks that were due before a time, in [ns]."""
         while (due := self._due) is not None and due + self._slack < to:
-            if self._clock(due) - self._pipeline.newest_stamp > self._pipeline.max_age:
-                # Without a crank nothing comes of a tick, however many there are.
+            age = self._clock(due) - self._pipeline.newest_stamp
+            # Without a crank nothing comes of a tick, however many there are; and a bag whose
+            # times are nonsense may ask for years of them.
+            if not -_LARGEST_LEAD <= age <= self._pipeline.max_age:
                 self._due = due + -(-(to - self._slack - due) // self._period) * self._period
                 return
             now = max(due, self._seen)
@@ -224,8 +234,10 @@ class WhatIf:
             yield Remade(now, at, recorded, None)
 
     def _tick(self, now: int, at: int, recorded: tuple[bytes, ...]) -> Remade:
+        if at >= TIME_END:
+            return Remade(now, at, recorded, None)
         tick = self._pipeline.tick(at)
-        if tick.message or self.withheld(tick):
+        if tick.message or tick.extras or self.withheld(tick):
             self._last = now
         return Remade(now, at, recorded, tick)
 
@@ -238,11 +250,17 @@ class WhatIf:
         yield event._replace(log_time=now)
         return good
 
+    def _reset(self, event: Reset) -> Reset:
+        """Begin anew where the run did."""
+        self._last = now = self._clock(event.log_time)
+        self._pipeline = Pipeline(self._scene, self._closures, self._injection)
+        return Reset(now, now, event.data)
+
     def _follow(self, event: Turned) -> Iterator[Turned]:
         """Let a fault begin or end as it did in the run."""
         try:
             name, on = read_change(event.data)
-        except (ValueError, LookupError, TypeError, RecursionError):
+        except ValueError:
             return
         if self._injection is None or name not in self._followed:
             return

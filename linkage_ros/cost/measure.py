@@ -32,7 +32,7 @@ from typing import NamedTuple
 
 from linkage_ros.cost.feed import feed
 from linkage_ros.cost.variants import FAULTS, Names, Variant, Variants
-from linkage_ros.effects.stage import bringing, EFFECTS, LOADED
+from linkage_ros.effects.stage import bringing, EFFECTS, in_order, LOADED
 from linkage_ros.scene.scene import Scene
 
 _BLOCK = 100
@@ -154,7 +154,8 @@ def measure(
     named |= {FAULTS} if scene.faults else set()
     variants = Variants(scene)
     bare, whole = variants.build(Names()), variants.build(named)
-    computed = [name for name in (*EFFECTS, FAULTS) if name in named or bringing(name, named)]
+    effects_of = in_order({*EFFECTS, *named} - {FAULTS})
+    computed = [n for n in (*effects_of, FAULTS) if n in named or bringing(n, named)]
     added = {name: _added(name, named, variants) for name in computed}
     without = {
         name: _left_out(name, named, variants)
@@ -247,8 +248,8 @@ def _middle(nanoseconds: Sequence[int]) -> tuple[float, float]:
 
 def _medians(nanoseconds: Sequence[int]) -> list[float]:
     """Return the median of each block of ticks, in [µs]."""
-    begins = range(0, len(nanoseconds), _BLOCK)
-    return [median(nanoseconds[begin : begin + _BLOCK]) * 1e-3 for begin in begins]
+    ends = [*range(0, len(nanoseconds), _BLOCK), len(nanoseconds)]
+    return [median(nanoseconds[begin:end]) * 1e-3 for begin, end in pairwise(ends)]
 
 
 def _quartiles(values: Sequence[float]) -> tuple[float, float]:

@@ -19,10 +19,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib import import_module
 from time import perf_counter_ns
 
-from linkage_ros.effects.stage import brings, EFFECTS, LOADED
+from linkage_ros.effects.stage import brings, in_order, LOADED, module_of
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
@@ -103,9 +102,9 @@ def _with(member: Member, named: Names) -> Member:
     own = member.effects
     brought = {need for effect in own for need in brings(effect)}
     effects = {
-        name: own[name] if name in own else import_module(EFFECTS[name]).PARAMETERS()
-        for name in EFFECTS
-        if name in named and (name in own or name in brought)
+        name: own[name] if name in own else module_of(name).PARAMETERS()
+        for name in in_order({*own, *brought})
+        if name in named
     }
     forced = member.drive[0] == 'torque' or not named.isdisjoint(LOADED)
     return replace(member, effects=effects, loads=member.loads if forced else None)

@@ -116,7 +116,8 @@ def _collect(package: str, kind: str, texts: dict[str, str]) -> None:
     text = texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
     # In the order of their full names, as rosbag2 has them.
     for needed in sorted(name if '/' in name else f'{package}/{name}' for name in _types(text)):
-        _collect(*needed.rsplit('/', 1), texts)
+        needed_package, _, needed_kind = needed.rpartition('/')
+        _collect(needed_package, needed_kind, texts)
 
 
 def _types(text: str) -> Iterator[str]:

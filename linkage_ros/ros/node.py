@@ -23,6 +23,7 @@ executor: transitions, services, parameters, diagnostics, and all that is logged
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial, wraps
 import time
 from typing import Any, TYPE_CHECKING
@@ -36,6 +37,7 @@ from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros import pacing
 from linkage_ros.ros.bag_topics import bag_topic
 from linkage_ros.ros.diagnostics import Health, Snapshot
+from linkage_ros.ros.late_answers import LateAnswers
 from linkage_ros.ros.parameters import declare_parameters, nearness_limits
 from linkage_ros.ros.run_recording import RunRecording
 from linkage_ros.ros.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
@@ -43,7 +45,7 @@ from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
 from linkage_ros.ros.warnings import Warnings
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -106,6 +108,10 @@ class LinkageNode(LifecycleNode):
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
         self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
+        self._snapshot_answers = LateAnswers(
+            self.create_service(Trigger, '~/snapshot', self._on_snapshot)
+        )
+        self._snapshot_written = self.create_guard_condition(self.recording.collect)
         # Not by the node's clock, which stands still where the simulation does.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_WATCH_PERIOD, self._watch, clock=steady)
@@ -133,11 +139,18 @@ class LinkageNode(LifecycleNode):
             scene = load_scene(file)
             pipeline = Pipeline(scene)  # what it calls for is proven now, not at the first tick
             self._scene_topics.connect(pipeline)
+            if scene.robot_description:
+                self._scene_topics.describe(scene, pipeline)
         except LinkageError as error:
             self._scene_topics.disconnect()
             self.failure = error
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
+        for line in pipeline.lines:
+            if line.choice is not None:
+                name = f'{line.member.name}: ' if line.member.name else ''
+                accuracy = f'accuracy {line.member.accuracy:g}'
+                self.get_logger().info(f'{name}{accuracy}: {line.choice.why}')
         self.failure, self.scene, self._closures = None, scene, pipeline.closures
         return TransitionCallbackReturn.SUCCESS
 
@@ -278,7 +291,7 @@ class LinkageNode(LifecycleNode):
         if self.loop is None or not self.loop.running:
             return _answer(response, False, 'not active: nothing to record')
         if self.loop.recorder is not None:
-            return _answer(response, False, f'already recording to {self.loop.recorder.folder}')
+            return _answer(response, False, f'already {self.recording.describe(self.loop)}')
         line = self._start_recording()
         return _answer(response, self.loop.recorder is not None, line)
 
@@ -287,8 +300,20 @@ class LinkageNode(LifecycleNode):
     ) -> Trigger.Response:
         if self.loop is None or self.loop.recorder is None:
             return _answer(response, False, 'not recording')
-        line = self.recording.stop(self.loop)
-        return _answer(response, not self.recording.ended[-1].failure, line)
+        return _answer(response, *self.recording.stop(self.loop))
+
+    def _on_snapshot(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self.loop is None or not self.loop.running:
+            return _answer(response, False, 'not active: nothing is kept in memory')
+        refusal = self.recording.snapshot(self._snapshot_answers.answer, self._wake)
+        if refusal:
+            return _answer(response, False, refusal)
+        return self._snapshot_answers.defer(response)
+
+    def _wake(self) -> None:
+        """Have the executor collect a snapshot; from the thread that has written it."""
+        with suppress(InvalidHandle):  # a disk may answer when the node is gone
+            self._snapshot_written.trigger()
 
     # Watching.
 
@@ -332,6 +357,7 @@ class LinkageNode(LifecycleNode):
             before=self._before,
             now=now,
             recording_failure=self.recording.failure,
+            snapshots=self.recording.snapshots,
             limits=nearness_limits(self),
         )
         self._before = now

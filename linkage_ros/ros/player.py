@@ -25,7 +25,7 @@ from threading import Event
 from time import monotonic
 
 from linkage_ros.bag.reading.in_time import TimeOrder
-from linkage_ros.cdr import time_message
+from linkage_ros.cdr import TIME_END, time_message
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.ros.cues import cues, Part, read_ahead
@@ -39,7 +39,6 @@ from rosgraph_msgs.msg import Clock
 
 CLOCK = '/clock'
 
-_TIME_END = 2**31 * NANOSECONDS  # as a message has it
 _SWITCH_INTERVAL = 1e-4
 _LOOK = 0.05
 _ACQUAINTANCE = 0.3
@@ -174,7 +173,7 @@ def play(
 
 def _clock_message(time: int) -> bytes:
     """Return a ``rosgraph_msgs/msg/Clock``, whose one field is a time."""
-    if not 0 <= time < _TIME_END:
+    if not 0 <= time < TIME_END:
         raise LinkageError(
             '--clock', f'{time} ns is beyond the times of messages', 'play it without --clock'
         )

@@ -28,6 +28,7 @@ from linkage_ros.replay import change_text
 from linkage_ros.ros.bag_topics import bag_topic, message_type
 from linkage_ros.ros.run_recording import EXTRA
 from linkage_ros.ros.tick_loop import Take
+from linkage_ros.scene.scene import Scene
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -45,6 +46,9 @@ CRANK_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 OUTPUT_QOS = QoSProfile(depth=10)
 """Reliable, volatile, as robot_state_publisher and RViz take it."""
+
+_DESCRIPTION_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""As robot_state_publisher and RViz take a robot model, at whatever time they start."""
 
 _CHANGES_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """One who joins later has to know which faults are on."""
@@ -70,6 +74,7 @@ class SceneTopics:
         self._on_inject = on_inject
         self._kinds: dict[str, str] = {}
         self._changes: Publisher | None = None
+        self._description: Publisher | None = None
         self._injectors: list[Any] = []
         self._withholds = False
         self.extras: list[Publisher] = []
@@ -117,9 +122,29 @@ class SceneTopics:
                 serve = partial(self._on_inject, name)
                 self._injectors.append(node.create_service(SetBool, f'~/inject/{name}', serve))
 
+    def describe(self, scene: Scene, pipeline: Pipeline) -> None:
+        """
+        Publish the linkages as a robot model, once and for whoever comes later.
+
+        Raises
+        ------
+        LinkageError
+            Where the published joints do not tell where all links are.
+
+        """
+        from linkage_ros.models.urdf import urdf  # local import: few scenes ask for it
+        from linkage_ros.scene.robot_model import scene_model  # local import: as above
+
+        text_type = message_type('std_msgs/msg/String', 'robot_description')
+        model = scene_model(scene, pipeline.closures, urdf).decode()
+        self._description = self._node.create_publisher(
+            text_type, 'robot_description', _DESCRIPTION_QOS
+        )
+        self._description.publish(text_type(data=model))
+
     def disconnect(self) -> None:
         """Have nothing."""
-        for publisher in (*self.extras, self._changes):
+        for publisher in (*self.extras, self._changes, self._description):
             if publisher is not None:
                 self._node.destroy_publisher(publisher)
         for service in self._injectors:
@@ -127,7 +152,7 @@ class SceneTopics:
         if self.crank is not None:
             self._node.destroy_subscription(self.crank)
         self.extras, self._injectors, self._kinds = [], [], {}
-        self._changes = self.crank = None
+        self._changes = self._description = self.crank = None
 
     @property
     def crank_topic(self) -> str:
@@ -159,15 +184,19 @@ class SceneTopics:
             topics.append(
                 ('faults_topic', bag_topic(changes.topic_name, changes.msg_type, _CHANGES_QOS))
             )
+        # For the replay alone: on the graph there is nothing to say of these.
+        time_type = message_type('builtin_interfaces/msg/Time', 'record')
+        withheld, resets = (
+            bag_topic(f'{node.get_fully_qualified_name()}/{name}', time_type, OUTPUT_QOS)
+            for name in ('withheld', 'resets')
+        )
         if self._withholds:
-            # For the replay alone: on the graph there is nothing to say at such a tick.
-            name = f'{node.get_fully_qualified_name()}/withheld'
-            time_type = message_type('builtin_interfaces/msg/Time', 'record')
-            topics.append(('withheld_topic', bag_topic(name, time_type, OUTPUT_QOS)))
+            topics.append(('withheld_topic', withheld))
         topics += [
             (EXTRA, bag_topic(extra.topic_name, extra.msg_type, extra.qos_profile))
             for extra in self.extras
         ]
+        topics.append(('resets_topic', resets))
         return topics
 
 

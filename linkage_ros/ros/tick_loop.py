@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 JOINT_STATES, DIAGNOSTICS = range(2)
 """
 The recorder's first topics. Where there are such, the crank's follows, those of the faults and of
-the ticks without a message, and those of the pipeline's extras.
+the ticks without a message, and those of the pipeline's extras. The last is that of the resets.
 """
 
 _CLOSED = Status.CLOSED
@@ -123,8 +123,10 @@ class TickLoop:
         self._crank_number = DIAGNOSTICS + 1
         self._change_number = self._crank_number + (take is not None)
         self._withheld_number = self._change_number + (self.injection is not None)
-        first = self._withheld_number + self._pipeline.withholds
+        self._withholds = self._pipeline.withholds
+        first = self._withheld_number + self._withholds
         self._publish_extras = tuple(enumerate(publish_extras, first))
+        self._reset_number = first + len(self._publish_extras)
         self._stopping = Event()
         self._thread: Thread | None = None
         self.counts = Counts()
@@ -210,6 +212,10 @@ class TickLoop:
         if self.reset_requested:
             self.reset_requested = False
             self.counts.resets += 1
+        if (recorder := self.recorder) is not None:
+            # Where the clock jumps back after ticks of which nothing is recorded, the times in the
+            # bag go on.
+            recorder.offer(self._reset_number, now, now, time_message(now))
         self._pipeline = self._build()
 
     def _inject(self, injection: Injection, now: int) -> int:
@@ -234,12 +240,17 @@ class TickLoop:
             if recorder is not None:
                 recorder.offer(JOINT_STATES, now, at, message)
             counts.published += 1
-            if extras:
-                for (number, publish), extra in zip(self._publish_extras, extras, strict=True):
-                    if extra:
-                        publish(extra)
-                        if recorder is not None:
-                            recorder.offer(number, now, at, extra)
+        # Of a linkage without a pose there may be an extra, which then tells of the tick.
+        if extras:
+            for (number, publish), extra in zip(self._publish_extras, extras, strict=True):
+                if extra:
+                    publish(extra)
+                    if recorder is not None:
+                        recorder.offer(number, now, at, extra)
+        elif message or recorder is None:
+            pass
+        elif self._withholds and self._pipeline.remembers(tick):
+            recorder.offer(self._withheld_number, now, at, time_message(at))
         counts.ticks += 1
         for number, (_, position, _, reading) in enumerate(looks):
             if position is None:
@@ -249,8 +260,6 @@ class TickLoop:
                 counts.last_unclosed = number, position
             if reading is None and position is not None and position[2]:
                 counts.withheld += 1
-                if recorder is not None and not message:
-                    recorder.offer(self._withheld_number, now, at, time_message(at))
 
     def _guarded(self, pace: Pace) -> None:
         # A defect here must neither vanish with its thread nor show a traceback.

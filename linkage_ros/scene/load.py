@@ -18,31 +18,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import MISSING, replace
 from importlib import import_module
 from os.path import isfile
 from pathlib import Path
 from typing import Any, Literal
 
 from linkage_ros.drives.drive import DRIVES
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.effects.stage import EFFECTS, in_order, module_of
+from linkage_ros.errors import DefinitionError, did_you_mean, quoted
 from linkage_ros.faults.fault import Fault, FAULTS
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
+from linkage_ros.parameters import declared
 from linkage_ros.scene.linkage_file import looks_like_linkage, read_linkage
 from linkage_ros.scene.loads import read_loads
-from linkage_ros.scene.read import parts_of, read_parameters
+from linkage_ros.scene.read import Parts, parts_of, read_parameters
 from linkage_ros.scene.scene import Member, RecordParameters, Scene
 from linkage_ros.scene.section import Section
 from linkage_ros.scene.storage import read_storage
 from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
+from linkage_ros.solvers.registry import SOLVERS
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
 """Names of the files of a scene where a bag carries them; further linkages are numbered."""
 
 LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
 """Ticks a second, in [Hz]: of these the higher is what a core was measured to hold."""
+
+FINEST_ACCURACY, COARSEST_ACCURACY = 1e-12, 1e-2
+"""What `accuracy` may be, in [rad] or [m]."""
 
 Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
@@ -128,7 +133,13 @@ def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
     )
 
 
-def parse_scene(name: str, where: str, files: Mapping[str, bytes], folder: str = '') -> Scene:
+def parse_scene(
+    name: str,
+    where: str,
+    files: Mapping[str, bytes],
+    folder: str = '',
+    solvers: Mapping[str, Any] | None = None,
+) -> Scene:
     """
     Read a scene out of the files that a bag carries.
 
@@ -140,6 +151,9 @@ def parse_scene(name: str, where: str, files: Mapping[str, bytes], folder: str =
         Where the files come from, for messages.
     files, folder
         As in `Scene`.
+    solvers
+        By the name of each linkage whose scene asks for an accuracy what was chosen: a solver, as
+        the scene could have said it.
 
     Raises
     ------
@@ -157,7 +171,18 @@ def parse_scene(name: str, where: str, files: Mapping[str, bytes], folder: str =
             raise within.error('linkage', 'is not among the files', 'name another bag')
         return parse_yaml(files[part], f'{where}: {part}'), files[part]
 
-    return _scene(name, content, open_linkage, files[SCENE_FILE], folder)
+    scene = _scene(name, content, open_linkage, files[SCENE_FILE], folder)
+    if not solvers:
+        return scene
+    return replace(scene, members=tuple(_as_chosen(one, solvers) for one in scene.members))
+
+
+def _as_chosen(member: Member, solvers: Mapping[str, Any]) -> Member:
+    """Return a linkage with the solver that was chosen for it, where one was."""
+    if member.accuracy is None or member.name not in solvers:
+        return member
+    where = Section(member.content.file, '', {'solver': solvers[member.name]})
+    return replace(member, solver=_solver(where, {}), accuracy=None)
 
 
 def _scene(
@@ -189,6 +214,7 @@ def _scene(
         record=_record(content.section('record')) if 'record' in content else None,
         files=files,
         folder=folder,
+        robot_description=content.flag('robot_description', False),
     )
     for key in _OF_A_MEMBER:
         if key in content:
@@ -205,10 +231,10 @@ def _scene(
     return scene
 
 
-_OF_A_MEMBER = ('publish_input', 'drive', 'effects', 'loads')
+_OF_A_MEMBER = ('publish_input', 'drive', 'effects', 'loads', 'solver', 'accuracy')
 """What an entry of ``linkages`` may say for itself, and the scene for all that do not."""
 
-_OF_A_SCENE = ('rate', 'angles', 'seed', 'faults', 'record', *_OF_A_MEMBER)
+_OF_A_SCENE = ('rate', 'angles', 'seed', 'faults', 'record', 'robot_description', *_OF_A_MEMBER)
 """What a scene may say beside the linkages that it names."""
 
 
@@ -240,7 +266,7 @@ def _member(
             'effort', 'is that of the input joint', 'set publish_input: true, or name pin_forces'
         )
     parts = parts_of(linkage)
-    types = {e: import_module(EFFECTS[e]).PARAMETERS for e in EFFECTS if e in effects}
+    types = _effects(effects)
     member = Member(
         name=name,
         linkage=linkage,
@@ -257,9 +283,65 @@ def _member(
         loads=read_loads(loads) if loads is not None else None,
         content=own,
         linkage_content=linkage_content,
+        **_solving(own, scene, parts),
     )
     effects.finish(tuple(EFFECTS))
     return member
+
+
+def _effects(effects: Section) -> dict[str, Any]:
+    """Return the types of parameters of the effects that are named, in the order of physics."""
+    try:
+        named = in_order([name for name in effects if name in EFFECTS or '.' in name])
+        return {name: module_of(name).PARAMETERS for name in named}
+    except DefinitionError as error:
+        raise effects.error(error.where, error.reason, error.remedy) from None
+
+
+def _solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
+    """Return what closes the loops, or how well that is to be done."""
+    # What a linkage says for itself stands for both of the scene's.
+    where = own if 'solver' in own or 'accuracy' in own else scene
+    if 'accuracy' not in where:
+        return {'solver': _solver(where, parts) if 'solver' in where else None}
+    if 'solver' in where:
+        raise where.error('accuracy', 'stands beside solver', 'write one of the two')
+    bounds = {'least': FINEST_ACCURACY, 'most': COARSEST_ACCURACY}
+    return {'accuracy': where.number('accuracy', unit='rad or m', **bounds)}
+
+
+def _solver(where: Section, parts: Parts) -> tuple[str, Any]:
+    """Return a solver's name and parameters; a name may stand alone."""
+    if isinstance(where.mapping['solver'], str):
+        return _named_solver(where)
+    solvers = where.section('solver')
+    named = list(solvers)
+    if len(named) > 1:
+        raise solvers.error(named[1], 'is a second solver', f'leave it, or {named[0]}, out')
+    if not named or named[0] not in SOLVERS:
+        solvers.finish(tuple(SOLVERS))
+        raise solvers.error('', 'names none', f'write one of {", ".join(SOLVERS)}')
+    (name,) = named
+    parameters = import_module(SOLVERS[name]).PARAMETERS
+    return name, read_parameters(solvers.section(name), parameters, parts)
+
+
+def _named_solver(where: Section) -> tuple[str, Any]:
+    name = where.text('solver')
+    if name not in SOLVERS:
+        known = f'known: {", ".join(SOLVERS)}'
+        raise where.error(
+            'solver', f'there is no {quoted(name)}', did_you_mean(name, SOLVERS, known)
+        )
+    parameters = import_module(SOLVERS[name]).PARAMETERS
+    for entry, _ in declared(parameters):
+        if entry.default is MISSING:
+            raise where.error(
+                'solver',
+                f'{name} has no {entry.name}',
+                f'write solver: {{{name}: {{{entry.name}: …}}}}',
+            )
+    return name, parameters()
 
 
 def _with_inputs(linkage: Linkage, content: Section) -> Linkage:

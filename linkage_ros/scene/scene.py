@@ -70,6 +70,10 @@ class Member:
         The drive's name, and its parameters.
     effects
         Parameters of each effect that is called for, by its name, in physical order.
+    solver
+        What closes its loops: the name and its parameters; nothing for the closed form.
+    accuracy
+        Of its positions, in [rad] or [m], where the cheapest solver is to be found; else nothing.
     loads
         What acts on it; nothing where the scene does not say.
     content, linkage_content
@@ -84,6 +88,8 @@ class Member:
     loads: Loads | None
     content: Section = field(compare=False, repr=False)
     linkage_content: Section = field(compare=False, repr=False)
+    solver: tuple[str, Any] | None = None
+    accuracy: float | None = None
 
     @property
     def prefix(self) -> str:
@@ -126,6 +132,8 @@ class Scene:
         The scene and linkage files as they stand, by a name for each.
     folder
         To which the paths in it are relative.
+    robot_description
+        Whether the node publishes the linkages as URDF.
 
     """
 
@@ -138,6 +146,7 @@ class Scene:
     record: RecordParameters | None
     files: Mapping[str, bytes]
     folder: str = field(compare=False)
+    robot_description: bool = False
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -60,6 +60,7 @@ _ONE_SOLVER: Schema = {
 _OWN_EFFECT: Schema = {
     'description': "An effect of one's own: a module that Python finds, and its parameters.",
     'type': 'object',
+    'additionalProperties': True,
 }
 _STRONGEST = 1e9
 _STIFFEST = 1e12

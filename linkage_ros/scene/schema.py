@@ -54,6 +54,9 @@ CHARACTER = r'[^\u0000-\u001f\u007f-\u00a0\u2028\u2029]'
 
 ROS_NAME = '^[A-Za-z][A-Za-z0-9_]*$'
 
+DOTTED = r'^[^.\s]+(\.[^.\s]+)+$'
+"""Pattern of the name of a module within a package."""
+
 KIND_NAMES = {
     'joint': 'published joint',
     'input': 'driven joint',

@@ -31,7 +31,7 @@ from campaigns.processes import results_of
 from linkage_ros.bag.metadata import METADATA_FILE
 import pytest
 
-EVERY = 23
+EVERY = 29
 """A sample of one in so many; it shares no divisor with the ways in which a call can fail."""
 
 

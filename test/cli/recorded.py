@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 import json
 from pathlib import Path
 from threading import Event
@@ -68,6 +68,8 @@ class Recorded:
         What comes from elsewhere, at every tick; nothing where the scene has a drive of its own.
     crank_topic
         On which.
+    resets
+        The numbers of the ticks before which somebody asks for a reset.
     drop
         Tells by the number of the tick and the topic's name whether the recorder has to drop it.
 
@@ -79,10 +81,12 @@ class Recorded:
         scene: Path,
         crank: Crank | None = None,
         crank_topic: str = '/crank_states',
+        resets: Collection[int] = (),
         drop: Callable[[int, str], bool] = lambda _number, _topic: False,
     ) -> None:
         loaded = load_scene(scene)
         self.folder = folder
+        self._scene, self._resets = loaded, resets
         self.pipeline = Pipeline(loaded)
         self.rate = loaded.rate or 1000.0
         self._crank, self._crank_topic, self._drop = crank, crank_topic, drop
@@ -108,6 +112,9 @@ class Recorded:
             run['crank_topic'] = crank_topic
             if crank_topic != '/joint_states':
                 topics.append(topic(crank_topic, JOINT_STATE, 'best_effort'))
+        if resets:
+            run['resets_topic'] = '/linkage/resets'
+            topics.append(topic('/linkage/resets', 'builtin_interfaces/msg/Time'))
         self._numbers = {each.name: number for number, each in enumerate(topics)}
         self._writer = BagWriter(
             folder,
@@ -121,6 +128,9 @@ class Recorded:
         for number in range(ticks):
             stamp = BEGIN + round(number * SECOND / self.rate)
             now = stamp + MS // 4  # when the tick takes its sample
+            if number in self._resets:
+                self.pipeline = Pipeline(self._scene)
+                self._write(number, '/linkage/resets', now, now, time_message(now))
             if self._crank:
                 states = self._crank(number)
                 angles, rates = zip(*states.values(), strict=True) if states else ((), ())

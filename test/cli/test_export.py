@@ -476,7 +476,7 @@ def test_of_a_bag_that_was_cut_the_whole_part_is_written(
     assert 100 < len(rows) < 398
     # The last tick may have lost what followed its joint state.
     assert rows[:-1] == whole[: len(rows) - 1]
-    assert 'has no end; its whole part is taken' in capsys.readouterr().err
+    assert ': unfinished: its recording was killed, ' in capsys.readouterr().err
 
 
 def test_of_a_damaged_bag_nothing_is_written(bag: Path, tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from linkage_ros.bag.reading.reader import BagMessage, read_bag, RUN_FILE
+from linkage_ros.bag.writing.storage import Storage
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cli import replay
 from linkage_ros.errors import LinkageError
@@ -57,10 +58,12 @@ SCENES = {
     'wrapped': 'angles: wrapped\n',
     'motions and forces': 'effects: {acceleration: {}, effort: {}, pin_forces: {}}\n'
     'loads: {gravity: [0, -9.81]}\n',
+    'markers': 'effects: {markers: {rate: 90}, pin_forces: {}}\n',
     'readings withheld': f'effects: {{{NOISE}, dropout: {{probability: 0.3}}}}\n',
     'late readings': 'effects: {velocity: {}, delay: {seconds: 0.05}}\n',
     'two that withhold': f'{TWO}drive: {{sine: {{amplitude: 1.0, frequency: 2.0}}}}\n'
     'effects: {dropout: {probability: 0.5}}\n',
+    'reset': f'effects: {{{NOISE}}}\n',
     'driven by itself': 'drive: {sine: {amplitude: 1.0, frequency: 2.0}}\n',
 }
 
@@ -68,6 +71,9 @@ SCENES = {
 def turning(number: int) -> Mapping[str, tuple[float, float]]:
     """Turn the crank at 20 rad/s; samples come every third tick."""
     return {} if number % 3 else {'crank_joint': (0.02 * number, 20.0)}
+
+
+RESETS = {'reset': (20, 21, 150)}
 
 
 def recorded(folder: Path, text: str, ticks: int = TICKS, **options: Any) -> Path:
@@ -80,19 +86,27 @@ Edit = Callable[[int, BagMessage], BagMessage | None]
 """Makes of a message, by its number, what is written; nothing for none."""
 
 
-def rewritten(bag_path: Path, name: str, edit: Edit, twice: str = '', **said: object) -> Path:
+def rewritten(
+    bag_path: Path,
+    name: str,
+    edit: Edit,
+    twice: str = '',
+    storage: Storage | None = None,
+    custom: Mapping[str, str] | None = None,
+    **said: object,
+) -> Path:
     """Write a bag once more with other messages, so that its checksums fit, and another run."""
     bag = read_bag(bag_path)
     files = {key: ('', data) for key, data in bag.attachments.items()}
     account = json.loads(bag.attachments[RUN_FILE]) | said
     files[RUN_FILE] = ('', json.dumps(account).encode())
     numbers = {each.name: number for number, each in enumerate(bag.topics)}
-    writer = BagWriter(bag_path.with_name(name), bag.topics, files)
+    writer = BagWriter(bag_path.with_name(name), bag.topics, files, storage)
     for number, message in enumerate(bag.messages()):
         edited = edit(number, message)
         for _ in range(1 + (message.topic == twice) if edited else 0):
             writer.write(numbers[edited.topic], *edited[1:])
-    writer.close()
+    writer.close(custom)
     return writer.folder
 
 
@@ -105,7 +119,7 @@ def told(capsys: pytest.CaptureFixture[str], *typed: object) -> tuple[int, dict[
 
 @pytest.mark.parametrize('name', SCENES)
 def test_a_run_comes_to_the_same_bytes(tmp_path, capsys, name):
-    bag = recorded(tmp_path, SCENES[name])
+    bag = recorded(tmp_path, SCENES[name], resets=RESETS.get(name, ()))
     code, account = told(capsys, bag)
     assert (code, account['verdict']) == (0, 'identical')
     in_bag = [message.topic for message in read_bag(bag).messages()]
@@ -253,6 +267,9 @@ MID_RUN = {
     'readings lost': (
         'effects: {dropout: {probability: 0.3}}\n', 31, 'mid-run', 1, 'cannot be told', None
     ),
+    'between two markers': ('effects: {markers: {}}\n', 42, 'mid-run', 0, 'identical', 0),
+    'at a marker': ('effects: {markers: {rate: 25}}\n', 120, 'mid-run', 0, 'identical', 1),
+    'a trace': ('effects: {markers: {trace: 0.1}}\n', 42, 'mid-run', 1, 'cannot be told', 0),
     'the bag does not say': ('effects: {velocity: {}}\n', 31, '', 3, 'different', 0),
     'with the run': ('effects: {velocity: {}}\n', 31, 'with the run', 3, 'different', 0),
 }  # fmt: skip
@@ -274,7 +291,7 @@ def test_a_bag_that_was_begun_in_mid_run(tmp_path, capsys, name):
     elif 'delay' in text:
         # 50 ms of readings at 1 kHz, and up to two ticks without a sample.
         assert 50 <= account['untold_ticks'] <= 53
-    assert bool(account['mid_run']) == (begun == 'mid-run')
+    assert bool(account['beginning_missing']) == (begun == 'mid-run')
     states = account['topics'][0]
     assert account['compared_ticks'] + account['untold_ticks'] == account['ticks']
     if verdict == 'identical':
@@ -312,7 +329,7 @@ def test_a_bit_is_found_in_a_bag_of_mid_run_too(tmp_path, capsys):
 @pytest.mark.parametrize(('running', 'said'), [(True, 'mid-run'), (False, 'with the run')])
 def test_a_recording_says_when_it_was_begun(tmp_path, running, said):
     logger = SimpleNamespace(info=lambda _: None, error=lambda _: None)
-    loop = SimpleNamespace(running=running, recorder=None)
+    loop = SimpleNamespace(running=running, recorder=None, pipeline=SimpleNamespace(lines=[]))
     recording = RunRecording(logger)
     scene = load_scene(scene_file(tmp_path, ''))
     states = topic('/joint_states', JOINT_STATE)
@@ -333,7 +350,10 @@ def test_a_truncated_bag_is_replayed_as_far_as_it_goes(tmp_path, capsys):
     assert account['truncated']
     assert account['verdict'] == 'identical'
     assert 1000 < account['topics'][0]['same'] < 12_000
-    assert err == f'linkage replay: {part}: has no end; its whole part was replayed\n'
+    assert err == (
+        f'linkage replay: {part}: unfinished: its recording was killed, or still runs, or goes on '
+        'in another file; what it holds was replayed\n'
+    )
 
 
 def test_a_damaged_bag_is_replayed_up_to_the_damage(tmp_path, capsys):

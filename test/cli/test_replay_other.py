@@ -17,18 +17,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 import json
 from math import acos, atan2, cos, hypot, remainder, sin, sqrt, tau
 from pathlib import Path
+from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reading.reader import read_bag, RUN_FILE
+from linkage_ros.bag.reading.reader import BagMessage, read_bag, RUN_FILE
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cli import replay
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.scene.load import load_scene
+from linkage_ros.stop import StoppedError
 import pytest
 from rosbags.highlevel import AnyReader
 
@@ -69,9 +71,16 @@ def rocker(a: float, b: float, c: float, d: float, theta: float) -> float:
     return remainder(atan2(-y, -x) - acos((s * s + c * c - b * b) / (2.0 * s * c)), tau)
 
 
-def recorded(folder: Path, text: str = PLAIN, linkage: str = FOUR_BAR, ticks: int = TICKS) -> Path:
+def recorded(
+    folder: Path,
+    text: str = PLAIN,
+    linkage: str = FOUR_BAR,
+    ticks: int = TICKS,
+    resets: Collection[int] = (),
+) -> Path:
     own = None if 'drive: {' in text and 'topic' not in text else crank
-    return Recorded(folder / 'bag', scene_file(folder, text, linkage), own).run(ticks)
+    scene = scene_file(folder, text, linkage)
+    return Recorded(folder / 'bag', scene, own, resets=resets).run(ticks)
 
 
 def other(folder: Path, text: str, linkage: str = FOUR_BAR) -> Path:
@@ -187,6 +196,49 @@ def test_the_new_bag_replays_by_itself(tmp_path, capsys, name):
     assert counts == account['written']
 
 
+@pytest.mark.parametrize('rate', [1000, 500, 0])
+def test_a_reset_is_one_of_another_scene_too(tmp_path, capsys, rate):
+    resets = (40, 41, 200)
+    bag = recorded(tmp_path, resets=resets)
+    # A reset without a sample at its tick: nothing is published until the next one comes.
+    scene = other(tmp_path, f'rate: {rate}\neffects: {{{NOISE}, backlash: {{play: 0.1}}}}\n')
+    account = told(capsys, bag, '--scene', scene, '-o', tmp_path / 'new')
+    assert account['written']['/linkage/resets'] == len(resets)
+    times = [m.log_time for m in read_bag(bag).messages() if m.topic == '/linkage/resets']
+    new = read_bag(tmp_path / 'new').messages()
+    assert [m.log_time for m in new if m.topic == '/linkage/resets'] == times
+    again = told(capsys, tmp_path / 'new')
+    assert (again['verdict'], again['ticks'] > 100) == ('identical', True)
+
+
+def test_a_wish_to_stop_is_heard_while_the_samples_are_looked_for(tmp_path):
+    bag = foreign(tmp_path, '/a', joints=('x', 'y'), count=6000)
+    stop = Event()
+    stop.set()
+    with pytest.raises(StoppedError):
+        answer(replay, bag, '--scene', other(tmp_path, ''), stop=stop)
+
+
+def test_times_that_are_nonsense_do_not_ask_for_years_of_ticks(tmp_path, capsys):
+    bag = recorded(tmp_path)
+
+    def made_in(message: BagMessage, time: int) -> BagMessage:
+        states = message.topic == '/joint_states'
+        return message._replace(publish_time=time) if states else message
+
+    found = read_bag(bag)
+    files = {name: ('', data) for name, data in found.attachments.items()}
+    numbers = {each.name: number for number, each in enumerate(found.topics)}
+    writer = BagWriter(tmp_path / 'odd', found.topics, files)
+    for message in found.messages():
+        odd = message.log_time == BEGIN + 100 * MS + MS // 4
+        writer.write(numbers[message.topic], *(made_in(message, 1) if odd else message)[1:])
+    writer.close()
+    scene = other(tmp_path, 'effects: {bias: {joints: {rocker_joint: 0.125}}}\n')
+    account = told(capsys, tmp_path / 'odd', '--scene', scene)
+    assert TICKS - 2 <= account['joint_states'] <= TICKS + 2
+
+
 def test_the_new_bag_says_what_it_is(tmp_path, capsys):
     bag = recorded(tmp_path, 'effects: {acceleration: {}}\n')
     text = 'effects: {acceleration: {}, dropout: {probability: 0.1}, pin_forces: {}}\nseed: 3\n'
@@ -212,11 +264,16 @@ def test_the_new_bag_says_what_it_is(tmp_path, capsys):
         assert {each.topic for each in reader.connections} == names
 
 
-def foreign(folder: Path, *topics: str, joints: tuple[str, ...] = ('a', 'crank_joint')) -> Path:
+def foreign(
+    folder: Path,
+    *topics: str,
+    joints: tuple[str, ...] = ('a', 'crank_joint'),
+    count: int = TICKS,
+) -> Path:
     """Write a bag that nothing of ours has recorded."""
     writer = BagWriter(folder / 'foreign', [topic(name, JOINT_STATE) for name in topics])
     write = JointStateWriter(joints).write
-    for number in range(TICKS):
+    for number in range(count):
         stamp = BEGIN + number * 5 * MS
         for each in range(len(topics)):
             numbers = [0.1, angle(number)][: len(joints)]

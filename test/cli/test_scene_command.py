@@ -157,7 +157,7 @@ WRONG = [
     (
         'linkages:\n- {name: a, linkage: l.yaml}\n- {name: b, linkage: l.yaml, rate: 5}\n',
         'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
-        ['s.yaml:3: linkages[2].rate: unknown key; known: drive, effects, linkage, loads, name'],
+        ['s.yaml:3: linkages[2].rate: unknown key; known: accuracy, drive, effects, linkage, l'],
     ),
     (
         'linkage: l.yaml\nfaults: {a-b: {freeze: {}, silence: {}}}\n',
@@ -235,8 +235,11 @@ def test_the_list_tells_unit_default_bounds_and_meaning(capsys):
 @pytest.mark.parametrize(
     ('name', 'said'),
     [
-        ('encodr', "--list encodr: there is no such drive, effect or fault; did you mean 'encod"),
-        ('xyz', '--list xyz: there is no such drive, effect or fault; known: topic, '),
+        (
+            'encodr',
+            "--list encodr: there is no such drive, effect, fault or solver; did you mean '",
+        ),
+        ('xyz', '--list xyz: there is no such drive, effect, fault or solver; known: topic, '),
     ],
 )
 def test_a_name_that_is_none(name, said):

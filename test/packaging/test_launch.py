@@ -20,6 +20,7 @@ import importlib.util
 import sys
 from types import ModuleType
 
+from linkage_ros.errors import LinkageError
 import pytest
 
 
@@ -106,3 +107,16 @@ def test_a_urdf_starts_robot_state_publisher(start, tmp_path):
     assert publisher['package'] == publisher['executable'] == 'robot_state_publisher'
     assert publisher['namespace'] == 'arm'
     assert publisher['parameters'][0]['robot_description'] == '<robot name="r"/>'
+
+
+def test_robot_state_publisher_takes_the_model_that_the_scene_makes(start, root):
+    scene = root / 'config' / 'scenes' / 'two_fingers.yaml'
+    _, publisher = start(scene=str(scene), robot_state_publisher='true')
+    model = publisher['parameters'][0]['robot_description']
+    assert '<robot name="two_fingers">' in model
+    assert '<joint name="left_rocker_joint" type="revolute">' in model
+
+
+def test_without_a_scene_there_is_no_model(start):
+    with pytest.raises(LinkageError, match='has no scene; name scene:=FILE too'):
+        start(robot_state_publisher='true')

@@ -29,8 +29,8 @@ PACKAGE = 'linkage_ros'
 HEIGHTS = (
     ('errors', 'stop', 'tuples', 'parameters'),
     ('kinematics', 'shipped', 'cdr', 'bag'),
-    ('joint_state', 'synthesis', 'dynamics', 'drawing'),
-    ('joint_trajectory', 'multi_dof_joint_state', 'joint_effort'),
+    ('joint_state', 'synthesis', 'dynamics', 'drawing', 'solvers', 'models'),
+    ('joint_trajectory', 'multi_dof_joint_state', 'joint_effort', 'marker_array'),
     ('drives',),
     ('effects',),
     ('faults',),
@@ -54,6 +54,7 @@ ROS = (
     'std_msgs',
     'std_srvs',
     'trajectory_msgs',
+    'visualization_msgs',
 )
 
 # An import of ours within a function is for pipeline.py, which imports what a scene calls for,

@@ -449,7 +449,8 @@ def test_a_killed_recording_is_played_as_far_as_it_goes(tmp_path, bag, play):
     said, complaints = play(bag, '--rate', 10).ended()
     assert '/joints: 100\n' in said
     assert (
-        complaints == f'linkage play: {bag}: its recording was killed; what it holds is played\n'
+        complaints == f'linkage play: {bag}: unfinished: its recording was killed; '
+        'what it holds is played\n'
     )
 
 

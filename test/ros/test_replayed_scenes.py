@@ -16,29 +16,20 @@
 """
 A run of any scene replays from its bag to the same bytes: withheld, pushed, or with faults.
 
-The tick loop is the node's own, with its recorder; only DDS is left out: messages come from a
-list.
+The tick loop is the node's own, with its recorder; only DDS is left out.
 """
 
 from __future__ import annotations
 
-from functools import partial
-import json
 from math import cos, sin
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cdr import text_message
 from linkage_ros.joint_state import JointStateWriter
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.replay import change_text, recorded_scene, replay
-from linkage_ros.ros.tick_loop import TickLoop
+from linkage_ros.replay import recorded_scene, replay
 from linkage_ros.scene.load import load_scene
 import pytest
 
 from .conftest import LINKAGES
+from .ticked import Moment, run
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
@@ -85,55 +76,35 @@ loads: {gravity: [0, -9.81]}
 }  # fmt: skip
 
 
-def run(folder, text):
-    """Record a run and return its bag, and how many joint states it has published."""
-    (folder / 'scene.yaml').write_text(f'linkage: {LINKAGES}/four_bar.yaml\n{text}')
-    scene = load_scene(folder / 'scene.yaml')
-    pipeline = Pipeline(scene)
-    closures, injection = pipeline.closures, pipeline.injection
-    waiting, published = [], []
-    loop = TickLoop(
-        partial(Pipeline, scene, closures, injection),
-        (lambda: waiting.pop(0) if waiting else None) if pipeline.topic else None,
-        published.append,
-        publish_extras=[lambda _: None] * len(pipeline.extras),
-        publish_change=lambda c: text_message(change_text(c, scene.faults[c.name].kind)),
-    )
-    names = {
-        'joint_states_topic': '/joint_states',
-        'diagnostics_topic': '/diagnostics',
-        **({'crank_topic': '/crank'} if pipeline.topic else {}),
-        **({'faults_topic': '/faults'} if injection else {}),
-        **({'withheld_topic': '/withheld'} if pipeline.withholds else {}),
-    }
-    extras = [f'/extra_{number}' for number in range(len(pipeline.extras))]
-    said = {'scene': 'scene', 'extra_topics': extras, **names}
-    files = {name: ('application/yaml', data) for name, data in scene.files.items()}
-    topics = [Topic(name, 'sensor_msgs/msg/JointState', '', '') for name in names.values()]
-    topics += [Topic(name, 'sensor_msgs/msg/JointState', '', '') for name in extras]
-    attached = {**files, 'run.json': ('application/json', json.dumps(said).encode())}
-    recorder = Recorder(BagWriter(folder / 'bag', topics, attached))
-    loop.recorder = recorder
+def moments(text):
+    """Yield ticks and samples of 400 ms."""
     write = JointStateWriter(['crank_joint']).write
     for number in range(TICKS):
         # As a real clock has it: no two ticks are a period apart.
         now = BEGIN + number * MS + number * number % 137_000
+        messages, asked = (), ()
         if number % 3 == 0 and not 300 < number < 340:
             angle, effort = sin(0.01 * number), 0.01 * cos(0.1 * number)
-            message = write(now, [angle], [10.0 * cos(0.01 * number)], [effort])
-            waiting.append((message, {'source_timestamp': now}))
+            messages = (write(now, [angle], [10.0 * cos(0.01 * number)], [effort]),)
         if text == SCENES['faults on demand']:
-            for name, begin, end in (('quiet', 60, 90), ('frozen', 80, 120)):
-                if number in (begin, end):
-                    injection.ask(name, number == begin)
-        loop.tick_at(now)
-    recorder.stop()
-    return read_bag(folder / 'bag'), published
+            asked = tuple(
+                (name, number == begin)
+                for name, begin, end in (('quiet', 60, 90), ('frozen', 80, 120))
+                if number in (begin, end)
+            )
+        yield Moment(now, messages, False, asked)
+
+
+def recorded(folder, text):
+    """Record a run and return its bag, and the joint states that it has published."""
+    (folder / 'scene.yaml').write_text(f'linkage: {LINKAGES}/four_bar.yaml\n{text}')
+    bag, published, _, _ = run(folder / 'bag', folder / 'scene.yaml', moments(text))
+    return bag, published
 
 
 @pytest.mark.parametrize('name', SCENES)
 def test_a_run_replays_to_the_same_bytes(tmp_path, name):
-    bag, published = run(tmp_path, SCENES[name])
+    bag, published = recorded(tmp_path, SCENES[name])
     assert len(set(published)) > 30
     again = list(replay(bag, recorded_scene(bag)))
     assert [each.recorded for each in again] == published
@@ -145,7 +116,7 @@ def test_a_run_replays_to_the_same_bytes(tmp_path, name):
 @pytest.mark.parametrize('name', ['readings lost', 'lost and delayed', 'faults at their times'])
 def test_another_seed_replays_to_other_bytes(tmp_path, name):
     # What is equal above is not so by chance.
-    bag, published = run(tmp_path, SCENES[name])
+    bag, published = recorded(tmp_path, SCENES[name])
     text = (tmp_path / 'scene.yaml').read_text()
     (tmp_path / 'scene.yaml').write_text(f'{text}\nseed: 1\n')
     other = [each.tick.message for each in replay(bag, load_scene(tmp_path / 'scene.yaml'))]

@@ -19,12 +19,13 @@ from __future__ import annotations
 
 from cmath import exp
 from contextlib import nullcontext
-from math import cos, remainder, sin, sqrt, tau
+from math import cos, hypot, remainder, sin, sqrt, tau
 from pathlib import Path
 
 import pytest
 from sensor_msgs.msg import JointState, MultiDOFJointState
 from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
 
 from .graph import NS, stamp_of, wait_for
 from .loops import four_bar, inverted_slider_crank, modulo_turns
@@ -53,6 +54,15 @@ PUBLISHED = {
     'motion': (FOUR_BAR, 'velocity', {'motion': 'trajectory_msgs/msg/JointTrajectory'}, True),
     'torque_crank': (DRIVEN_FOUR_BAR, 'velocity effort', {}, False),
     'two_fingers': (FINGERS, 'velocity', {}, False),
+    'visible_bucket': (
+        BUCKET,
+        'velocity effort',
+        {
+            'pin_forces': 'sensor_msgs/msg/MultiDOFJointState',
+            'markers': 'visualization_msgs/msg/MarkerArray',
+        },
+        False,
+    ),
     'worn_press': (
         ['crank_joint', 'rod_joint', 'piston_slide'],
         'velocity effort',
@@ -142,6 +152,19 @@ def worn_and_loaded(states, extras):
         assert abs(force.wrench[3].force.x) < 30.0
 
 
+def drawn_where_it_is(states, extras):
+    by_stamp = {stamp_of(state): state for state in states}
+    compared = 0
+    for array in extras['markers']:
+        if (state := by_stamp.get(stamp_of(array.markers[0]))) is not None:
+            compared += 1
+            (rim,) = [m for m in array.markers if (m.ns, m.id) == ('pins', 0)]
+            # The cylinder is as long as its pins are apart: K on the ground, C on the rod.
+            apart = [hypot(pin.x - 1.18, pin.y - 0.3) for pin in rim.points]
+            assert min(abs(length - state.position[0]) for length in apart) < 1e-9
+    assert 10 < compared <= 30 * span(states) + 2
+
+
 def accelerations_of_the_same_instant(states, extras):
     by_stamp = {stamp_of(state): state for state in states}
     compared = 0
@@ -166,6 +189,7 @@ SHOWN = {
     'motion': accelerations_of_the_same_instant,
     'torque_crank': at_rest_under_its_brake,
     'two_fingers': two_loops_of_their_own,
+    'visible_bucket': drawn_where_it_is,
     'worn_press': worn_and_loaded,
 }
 OF_EVERY_NODE = {
@@ -177,6 +201,7 @@ OF_EVERY_NODE = {
 TYPES = {
     'trajectory_msgs/msg/JointTrajectory': JointTrajectory,
     'sensor_msgs/msg/MultiDOFJointState': MultiDOFJointState,
+    'visualization_msgs/msg/MarkerArray': MarkerArray,
 }
 
 

@@ -28,7 +28,9 @@ from linkage_ros.errors import BagError, quoted
 from mcap.writer import MCAP0_MAGIC
 import yaml
 
-_MOST_METADATA = 16 * 2**20  # of a bag with thousands of topics rosbag2 writes about 10 MB
+MOST_METADATA = 16 * 2**20
+"""How long metadata may be; of a bag with thousands of topics rosbag2 writes about 10 MB."""
+
 _WITHOUT = 'move metadata.yaml away to read the folder without it'
 
 
@@ -45,7 +47,7 @@ def information_of(folder: Path) -> dict[str, Any]:
     file = folder / METADATA_FILE
     try:
         with file.open('rb') as stream:
-            text = stream.read(_MOST_METADATA + 1)
+            text = stream.read(MOST_METADATA + 1)
     except FileNotFoundError:
         return {}
     except OSError as error:
@@ -54,7 +56,7 @@ def information_of(folder: Path) -> dict[str, Any]:
         information = yaml.safe_load(text.decode())[ROOT_KEY]
     except Exception:  # noqa: BLE001 (yaml has its own errors, and RecursionError and others)
         information = None
-    if not isinstance(information, dict) or len(text) > _MOST_METADATA:
+    if not isinstance(information, dict) or len(text) > MOST_METADATA:
         raise BagError(file, "is not a bag's metadata", 'read the MCAP file by itself')
     return information
 
@@ -68,9 +70,7 @@ def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
         # By name only, as rosbag2 does: old bags carry the folder too, which may have moved.
         names = [_name_of(path, PurePosixPath(str(name))) for name in named]
     else:
-        # NAME_2.mcap before NAME_10.mcap
-        names = [file.name for file in path.glob('*.mcap')]
-        names.sort(key=lambda name: (len(name), name))
+        names = [file.name for file in sorted(path.glob('*.mcap'), key=by_number)]
     if not names:
         raise BagError(path, 'holds no .mcap file', "name a bag's folder")
     for number, name in enumerate(names):
@@ -82,6 +82,11 @@ def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
                 path / name, "leads out of the bag's folder", 'name the file that it leads to'
             )
     return [path / name for name in names]
+
+
+def by_number(file: Path) -> tuple[int, str]:
+    """Return what files are sorted by: NAME_2.mcap stands before NAME_10.mcap."""
+    return len(file.name), file.name
 
 
 def _name_of(folder: Path, path: PurePosixPath) -> str:

@@ -28,7 +28,7 @@ from pathlib import Path
 from struct import Struct
 from typing import Any, BinaryIO, NamedTuple
 
-from linkage_ros.bag.reading.folder import unreadable
+from linkage_ros.bag.reading.folder import MOST_METADATA, unreadable
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Header, Metadata
@@ -40,7 +40,6 @@ _CHUNK = Struct('<QQQII')
 """First and last time, size when decompressed, its checksum, length of the compression's name."""
 
 _LONGEST_NAME = 64
-_MOST_METADATA = 16 * 2**20  # of a bag with thousands of topics rosbag2 writes about 10 MB
 
 
 class Layout(NamedTuple):
@@ -89,9 +88,9 @@ def layout_of(file: Path) -> Layout:
                     name, unpacked = _chunk(stream)
                     stored, made = compressions.get(name, (0, 0))
                     compressions[name] = stored + length, made + unpacked
-                elif opcode == Opcode.HEADER and length <= _MOST_METADATA:
+                elif opcode == Opcode.HEADER and length <= MOST_METADATA:
                     library = _library(stream.read(length))
-                elif opcode == Opcode.METADATA and length <= _MOST_METADATA:
+                elif opcode == Opcode.METADATA and length <= MOST_METADATA:
                     rosbag2 = _rosbag2(stream.read(length)) or rosbag2
                 content += unpacked
     except OSError as error:

@@ -17,15 +17,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
+from linkage_ros.bag.account import UNFINISHED
 from linkage_ros.bag.reading.compression import DamagedError
 from linkage_ros.bag.reading.data_section import DataSection, Found
+from linkage_ros.bag.reading.ending import ending_of
 from linkage_ros.bag.reading.file_index import index_of
 from linkage_ros.bag.reading.folder import (
     custom_of,
@@ -44,6 +46,11 @@ import yaml
 
 RUN_FILE = 'run.json'
 """Name of the attachment in which a run names its scene, topics and versions."""
+
+_RECOVER = 'linkage recover makes a whole bag of what is there'
+
+Told = Callable[[int], None]
+"""Takes how many bytes of a file have been read, now and then; what it raises ends the reading."""
 
 
 class BagMessage(NamedTuple):
@@ -71,9 +78,10 @@ class Bag:
     attachments
         Name to content.
     custom
-        ``custom_data`` of its metadata.
+        ``custom_data`` of its metadata, or where these are missing of its last file.
     truncated
-        Whether its recording was killed, so that an end is missing.
+        Whether an end is missing, since its recording was killed or still runs: of a file, or of
+        the bag, where all of its files are whole and the next one never came.
 
     """
 
@@ -99,14 +107,16 @@ class Bag:
         """
         for file in self.files:
             until_damage = self.truncated and file == self.files[-1]
-            for found in _contents(file, Definitions(), until_damage=until_damage):
+            for found in _contents(file, Definitions(), _untold, until_damage=until_damage):
                 if isinstance(found, Message):
                     yield BagMessage(
                         found.channel.topic, found.log_time, found.publish_time, found.data
                     )
 
 
-def read_bag(path: str | Path, *, allow_truncated: bool = False) -> Bag:
+def read_bag(
+    path: str | Path, *, allow_truncated: bool = False, told: Told = lambda read: None
+) -> Bag:
     """
     Open a bag for reading.
 
@@ -116,6 +126,8 @@ def read_bag(path: str | Path, *, allow_truncated: bool = False) -> Bag:
         The bag's folder, or an MCAP file.
     allow_truncated
         Whether a bag whose recording was killed will do, as far as it goes.
+    told
+        Is told of the reading of files without an index, which are read to their end.
 
     Raises
     ------
@@ -135,28 +147,37 @@ def read_bag(path: str | Path, *, allow_truncated: bool = False) -> Bag:
         raise BagError(
             files[whole.index(False)],
             'has no end: its recording was killed, or still runs',
-            'linkage recover makes a whole bag of what is there',
+            _RECOVER,
         )
     topics: dict[str, Topic] = {}
     attachments: dict[str, bytes] = {}
     for file, finished in zip(files, whole, strict=True):
-        definitions, attached = _description(file, finished=finished)
+        definitions, attached = _description(file, told, finished=finished)
         for channel in definitions.channels.values():
             topic = topic_of(channel, definitions.schema_of(channel))
             topics.setdefault(topic.name, topic)
         for attachment in attached:
             attachments.setdefault(attachment.name, attachment.data)
+    ending = ending_of(files[-1])
+    custom = custom_of(information) if information else ending.custom
+    # Where the account is there, nothing is missing but the last words of the metadata.
+    unfinished = UNFINISHED in custom and not ending.accounted
+    # A file that was named by itself is whole, wherever its recording went on.
+    if unfinished and path.is_dir() and not allow_truncated:
+        raise BagError(path, 'is not finished: its recording was killed, or still runs', _RECOVER)
     return Bag(
         path=path,
         files=tuple(files),
         topics=tuple(topics.values()),
         attachments=attachments,
-        custom=custom_of(information),
-        truncated=begun or not all(whole),
+        custom=custom,
+        truncated=begun or not all(whole) or unfinished,
     )
 
 
-def _description(file: Path, *, finished: bool) -> tuple[Definitions, list[Attachment]]:
+def _description(
+    file: Path, told: Told, *, finished: bool
+) -> tuple[Definitions, list[Attachment]]:
     """Return schemas, channels and attachments of a file; from its index, if it has one."""
     if finished:
         with _translated(file), file.open('rb') as stream:
@@ -167,11 +188,13 @@ def _description(file: Path, *, finished: bool) -> tuple[Definitions, list[Attac
                     attachment_at(source, each.offset)[0] for each in index.attachments
                 ]
     definitions = Definitions()
-    contents = _contents(file, definitions, until_damage=not finished)
+    contents = _contents(file, definitions, told, until_damage=not finished)
     return definitions, [found for found in contents if isinstance(found, Attachment)]
 
 
-def _contents(file: Path, definitions: Definitions, *, until_damage: bool) -> Iterator[Found]:
+def _contents(
+    file: Path, definitions: Definitions, told: Told, *, until_damage: bool
+) -> Iterator[Found]:
     """Yield messages, attachments and metadata in the order of the file; checksums fit."""
     finished = is_finished(file)
     with _translated(file), file.open('rb') as stream:
@@ -185,6 +208,7 @@ def _contents(file: Path, definitions: Definitions, *, until_damage: bool) -> It
         messages, at = 0, len(MCAP0_MAGIC)
         try:
             while not data.finished:
+                told(at)
                 records, end = data.take(at)
                 for found in records:
                     messages += isinstance(found, Message)
@@ -202,6 +226,10 @@ def _contents(file: Path, definitions: Definitions, *, until_damage: bool) -> It
         promised = index.statistics
         if promised and promised.message_count != messages:
             raise DamagedError(f'{messages:,} messages are there of {promised.message_count:,}')
+
+
+def _untold(_read: int) -> None:
+    pass
 
 
 @contextmanager

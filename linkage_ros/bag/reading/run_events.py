@@ -13,19 +13,25 @@
 # limitations under the License.
 
 
-"""What happened in a run, put together from its bag: samples, faults, and what each tick made."""
+"""What happened in a run, put together from its bag: samples, faults, resets, what ticks made."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 import json
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkage_ros.bag.reading.reader import Bag, BagMessage, RUN_FILE
 from linkage_ros.errors import BagError
 
 BEGUN, MID_RUN, WITH_THE_RUN = 'begun', 'mid-run', 'with the run'
 """The key under which a bag says when it was begun, and what it says."""
+
+CHOSEN = 'solver'
+"""The key under which it says what closes the loops, where the scene asks for an accuracy."""
+
+OWN_EFFECTS = 'effects'
+"""The key under which it says which modules the effects are that are not of this package."""
 
 VERSIONS = ('linkage_ros', 'python', 'machine')
 
@@ -46,6 +52,14 @@ class Turned(NamedTuple):
     data: bytes
 
 
+class Reset(NamedTuple):
+    """A message that all was forgotten before this tick, and when, in [ns]."""
+
+    log_time: int
+    publish_time: int
+    data: bytes
+
+
 class Made(NamedTuple):
     """
     What a tick made.
@@ -56,7 +70,7 @@ class Made(NamedTuple):
         When it was, and for when it solved, in [ns].
     messages
         The joint state and the extras, each empty where there is none; all are where the bag says
-        that the tick had a pose and withheld it.
+        that there was a tick without a message.
 
     """
 
@@ -65,7 +79,7 @@ class Made(NamedTuple):
     messages: tuple[bytes, ...]
 
 
-Event = Taken | Turned | Made
+Event = Taken | Turned | Reset | Made
 
 
 class RunAccount(NamedTuple):
@@ -76,12 +90,16 @@ class RunAccount(NamedTuple):
     ----------
     scene, scene_folder
         The scene's name, and to what the paths in it are relative.
-    crank_topic, joint_states_topic, faults_topic, withheld_topic, extras
+    crank_topic, joint_states_topic, faults_topic, withheld_topic, resets_topic, extras
         Names of the topics.
     begun
         When the bag was begun, as `MID_RUN`; '' where it does not say.
     versions
         Of what made it, by what they are of.
+    solvers
+        What was chosen to close the loops, as a scene could say it, by the name of the linkage.
+    own_effects
+        Which modules the effects are that are not of this package, by their names.
 
     """
 
@@ -91,9 +109,12 @@ class RunAccount(NamedTuple):
     joint_states_topic: str = ''
     faults_topic: str = ''
     withheld_topic: str = ''
+    resets_topic: str = ''
     extras: tuple[str, ...] = ()
     begun: str = ''
     versions: Mapping[str, str] = {}
+    solvers: Mapping[str, Any] = {}
+    own_effects: Mapping[str, str] = {}
 
 
 def run_account(bag: Bag) -> RunAccount:
@@ -110,21 +131,64 @@ def run_account(bag: Bag) -> RunAccount:
         raise BagError(
             bag.path, f'carries no {RUN_FILE}', 'name a bag that linkage_ros has recorded'
         )
+    said = run_said(bag)
+    extras = said.get('extra_topics', [])
+    texts = {
+        key: value
+        for key, value in said.items()
+        if key in (*_TEXTS, BEGUN, *VERSIONS) and isinstance(value, str)
+    }
+    missing = {'scene', 'joint_states_topic'} - set(texts)
+    wrong = (said.keys() & {*_TEXTS, BEGUN}) - set(texts)
+    solvers = said.get(CHOSEN, {})
+    topics = [value for key, value in texts.items() if key.endswith('_topic')]
+    named = _are_names(topics) and _are_names(extras)
+    if missing or wrong or not named or not isinstance(solvers, dict):
+        raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag')
+    # It is shown, and nothing else; a file's name may be anything.
+    if not texts['scene'].isprintable():
+        texts['scene'] = repr(texts['scene'])[1:-1]
+    return RunAccount(
+        **{key: texts[key] for key in _TEXTS if key in texts},
+        extras=tuple(extras),
+        begun=texts.get(BEGUN, ''),
+        versions={key: texts[key] for key in VERSIONS if key in texts},
+        solvers=solvers,
+        own_effects=_own_effects(said),
+    )
+
+
+def _own_effects(said: Mapping[str, Any]) -> dict[str, str]:
+    found = said.get(OWN_EFFECTS)
+    return {name: str(which) for name, which in found.items()} if isinstance(found, dict) else {}
+
+
+_TEXTS = (
+    'scene',
+    'scene_folder',
+    'crank_topic',
+    'joint_states_topic',
+    'faults_topic',
+    'withheld_topic',
+    'resets_topic',
+)
+"""Keys under which a run says something of itself, which are fields of `RunAccount` too."""
+
+
+def _are_names(values: Any) -> bool:
+    # What is not printable is no topic, and some of it no text that a bag could hold.
+    return isinstance(values, list) and all(
+        isinstance(value, str) and value.isprintable() for value in values
+    )
+
+
+def run_said(bag: Bag) -> dict[str, Any]:
+    """Return what a run says of itself, as it stands in its bag; nothing if it is damaged."""
     try:
-        run = json.loads(bag.attachments[RUN_FILE])
-        return RunAccount(
-            scene=str(run['scene']),
-            scene_folder=str(run.get('scene_folder', '')),
-            crank_topic=str(run.get('crank_topic', '')),
-            joint_states_topic=str(run['joint_states_topic']),
-            faults_topic=str(run.get('faults_topic', '')),
-            withheld_topic=str(run.get('withheld_topic', '')),
-            extras=tuple(map(str, run.get('extra_topics', ()))),
-            begun=str(run.get(BEGUN, '')),
-            versions={key: str(run[key]) for key in VERSIONS if key in run},
-        )
-    except (ValueError, KeyError, TypeError, AttributeError):
-        raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag') from None
+        said = json.loads(bag.attachments[RUN_FILE])
+    except (KeyError, ValueError, RecursionError):
+        return {}
+    return said if isinstance(said, dict) else {}
 
 
 def recorded_events(
@@ -153,6 +217,7 @@ def recorded_events(
     shared = run.crank_topic == run.joint_states_topic
     topics = (run.joint_states_topic, *run.extras) if run.joint_states_topic else ()
     outputs = {topic: number for number, topic in enumerate(topics)}
+    others = {run.faults_topic, run.withheld_topic, run.resets_topic} - {''}
     open_tick: tuple[int, int, list[bytes]] | None = None  # more of its messages may follow
     withheld: tuple[int, int] | None = None
     for topic, log_time, publish_time, data in messages:
@@ -160,7 +225,7 @@ def recorded_events(
         if shared and output == 0 and not data.startswith(own, 12):
             output = None
         taken = topic == crank and (output is None or crank != run.crank_topic)
-        if output is None and not taken and topic not in (run.faults_topic, run.withheld_topic):
+        if output is None and not taken and topic not in others:
             continue
         if output is not None and open_tick is not None:
             _, time, made = open_tick
@@ -171,7 +236,7 @@ def recorded_events(
             log, time, made = open_tick
             yield Made(log, time, tuple(made))
             open_tick = None
-        # Two linkages that withhold at one tick say so twice.
+        # In older bags two linkages that withhold at one tick say so twice.
         again, withheld = withheld == (log_time, publish_time), None
         if taken:
             yield Taken(log_time, publish_time, data)
@@ -180,6 +245,8 @@ def recorded_events(
             open_tick[2][output] = data
         elif topic == run.faults_topic:
             yield Turned(log_time, publish_time, data)
+        elif topic == run.resets_topic:
+            yield Reset(log_time, publish_time, data)
         elif topic == run.withheld_topic:
             withheld = log_time, publish_time
             if not again:

@@ -28,7 +28,13 @@ from typing import Any
 from linkage_ros.bag.account import UNFINISHED
 from linkage_ros.bag.metadata import METADATA_FILE
 from linkage_ros.bag.reading.being_written import is_being_written
-from linkage_ros.bag.reading.folder import custom_of, files_of, information_of, unreadable
+from linkage_ros.bag.reading.folder import (
+    by_number,
+    custom_of,
+    files_of,
+    information_of,
+    unreadable,
+)
 from linkage_ros.bag.reading.records import Message, Source
 from linkage_ros.bag.recovering.new_bag import NewBag
 from linkage_ros.bag.recovering.recovery import promised_counts, RECOVERED, Recovery, TopicRecovery
@@ -135,7 +141,7 @@ def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> l
             # By their numbers: one that made way in a ring may be left, before those named.
             files = there
         else:
-            files = [*named, *(file for file in there if file not in named)]
+            files = _in_order(named, [file for file in there if file not in named])
     else:
         files = [path]
     found = []
@@ -157,6 +163,13 @@ def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> l
         if is_being_written(file)
     ]
     return found
+
+
+def _in_order(named: Sequence[Path], others: Sequence[Path]) -> list[Path]:
+    """Put files that nobody names to those that are: a ring that was killed left older ones."""
+    place = by_number(named[0]) if named else (0, '')
+    older = [file for file in others if by_number(file) < place]
+    return [*older, *named, *(file for file in others if file not in older)]
 
 
 def _foretaste(path: Path, files: Sequence[Path], stopped: Stopped) -> tuple[str, str]:

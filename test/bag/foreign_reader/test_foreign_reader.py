@@ -101,12 +101,13 @@ def run(folder: Path, text: str, linkage: str = 'four_bar') -> Path:
         if pipeline.injection is not None:
             latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             described.append(('faults_topic', '/node/faults', 'std_msgs/msg/String', latched))
+        time = 'builtin_interfaces/msg/Time'
         if pipeline.withholds:
-            time = 'builtin_interfaces/msg/Time'
             described.append(('withheld_topic', '/node/withheld', time, QoSProfile(depth=10)))
         for extra in pipeline.extras:
             name = extra.topic.replace('~', '/node')
             described.append((EXTRA, name, extra.message, QoSProfile(depth=10)))
+        described.append(('resets_topic', '/node/resets', time, QoSProfile(depth=10)))
         return [
             (key, bag_topic(name, message_type(kind, 'scene'), qos))
             for key, name, kind, qos in described
