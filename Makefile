@@ -20,13 +20,14 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy synthesis round_trips gallery schema cost effects docs lint format
-.PHONY: clean damage kills endurance disk
+.PHONY: clean damage kills endurance disk accuracy_page
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
 	@echo 'make test      lint, then all tests'
 	@echo 'make bench     measure'
 	@echo 'make accuracy  prove the kinematics on 11 million cases (30 min)'
+	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (10 min)'
 	@echo 'make synthesis compute and draw what docs/synthesis.md says'
 	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
 	@echo 'make damage    cut a bag at every byte and flip every bit of it (30 min)'
@@ -73,6 +74,9 @@ bench: $(STAMP)
 
 accuracy: $(STAMP)
 	@$(BIN)/python -m campaigns.accuracy
+
+accuracy_page: $(STAMP)
+	@$(BIN)/python -m docs.make_accuracy
 
 synthesis: $(STAMP)
 	@$(BIN)/python -m docs.make_synthesis

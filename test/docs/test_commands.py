@@ -57,11 +57,16 @@ OVAL = (
 )
 
 
-def given_to_the_readme(folder: Path) -> None:
-    """Lay out what the README takes for granted: linkages, data, a run, and a damaged bag."""
+def given_a_scene(folder: Path) -> None:
+    """Lay out linkages, and a scene of one's own."""
     for file in (ROOT / 'config' / 'linkages').iterdir():
         shutil.copy(file, folder)
     (folder / 'my_scene.yaml').write_text('linkage: four_bar.yaml\neffects: {velocity: {}}\n')
+
+
+def given_to_the_readme(folder: Path) -> None:
+    """Lay out what the README takes for granted: linkages, data, a run, and a damaged bag."""
+    given_a_scene(folder)
     (folder / 'five.csv').write_text(FIVE)
     (folder / 'curve.csv').write_text(OVAL)
     scene = 'linkage: four_bar.yaml\ndrive: {sine: {amplitude: 1.0, frequency: 2.0}}\n'
@@ -71,7 +76,7 @@ def given_to_the_readme(folder: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-GIVEN = {'README.md': given_to_the_readme}
+GIVEN = {'README.md': given_to_the_readme, 'docs/accuracy.md': given_a_scene}
 """What is laid out beforehand, by page."""
 
 
