@@ -69,7 +69,8 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     os.environ['ROS_DOMAIN_ID'] = str(1 + os.getpid() % _DOMAINS)
     print(
         f'{scene.name}: {arguments.seconds:g} s; from a second terminal: '
-        f'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]}'
+        f'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]}',
+        flush=True,  # it is of use while the run goes on, and to a pipe too
     )
     with _beside(scene, arguments.seconds):
         code, bag = run_scene(str(file), arguments, stop)
