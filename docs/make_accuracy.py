@@ -34,8 +34,8 @@ DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'accuracy.md'
 SCENES = DOCS.parent / 'config' / 'scenes'
 
-SHOWN = ('demo', 'torque_crank', 'jansen_leg')
-"""A four-bar whose crank is measured, one that a torque moves, and a chain of dyads."""
+SHOWN = ('demo', 'torque_crank')
+"""A four-bar whose crank is measured, and one that a torque moves."""
 
 
 def main() -> int:

@@ -25,8 +25,10 @@ found. Its only argument is a JSON object, `Task` as it is.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 import json
+from math import remainder, tau
 from random import Random
 import sys
 from threading import Event
@@ -145,9 +147,17 @@ class Consumer(Companion):
             ages.append(now - stamp)
             age = (now - stamp) * 1e-9
             truth = self._closure.position(crank(now - begin)[0]).joints
-            held.append(max(abs(values[k] - truth[k]) for k in self._counted))
-            carried.append(max(abs(values[k] + rates[k] * age - truth[k]) for k in self._counted))
+            held.append(self._error(values, truth))
+            forward = [value + rate * age for value, rate in zip(values, rates, strict=True)]
+            carried.append(self._error(forward, truth))
         return {'motion': name, 'ages': ages, 'held': held, 'carried': carried, 'unused': unused}
+
+    def _error(self, joints: Sequence[float], truth: Sequence[float]) -> float:
+        """Return how far the worst joint is off; angles as directions, since the node's run on."""
+        return max(
+            abs(remainder(off, tau) if self._closure.turning[k] else off)
+            for k, off in ((k, joints[k] - truth[k]) for k in self._counted)
+        )
 
     def _newest(self) -> tuple[int, tuple[float, ...], tuple[float, ...]] | None:
         """Take all states that have come; return stamp, joints and rates of the last."""
