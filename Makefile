@@ -27,7 +27,7 @@ help:
 	@echo 'make test      lint, then all tests'
 	@echo 'make bench     measure'
 	@echo 'make accuracy  prove the kinematics on 11 million cases (30 min)'
-	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (5 min)'
+	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (9 min)'
 	@echo 'make synthesis compute and draw what docs/synthesis.md says'
 	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
 	@echo 'make damage    cut a bag at every byte and flip every bit of it (30 min)'

@@ -34,7 +34,7 @@ DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / 'accuracy.md'
 SCENES = DOCS.parent / 'config' / 'scenes'
 
-SHOWN = ('demo', 'torque_crank')
+SHOWN = ('demo', 'torque_crank', 'jansen_leg')
 """A four-bar whose crank is measured, and one that a torque moves."""
 
 
