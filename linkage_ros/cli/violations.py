@@ -100,6 +100,9 @@ def _said(error: ValidationError, whole: Schema) -> Iterator[_Said]:
             kinds = [kind['required'][0] for kind in wanted]
             named = [kind for kind in kinds if kind in value]
             yield path, f'{len(named)} kinds', f'name one of {", ".join(kinds)}'
+        case 'not':
+            one, other = wanted['required']
+            yield (*path, other), f'stands beside {one}', 'write one of the two'
         case None:
             yield path, 'does not go with the keys beside it', 'leave it out'
         case _:

@@ -49,14 +49,7 @@ from linkage_ros.scene.storage import AS_THE_RUN_GOES, LEASTS, SPLITS, StoragePa
 from linkage_ros.solvers.registry import SOLVERS
 
 _RATE = 'Ticks a second [Hz]; 0: one for every crank sample.'
-_ONE_SOLVER: Schema = {
-    'if': {'required': ['solver']},
-    'then': {
-        'properties': {
-            'accuracy': {'description': 'leave it out: a solver is named', 'maximum': 0}
-        }
-    },
-}
+_ONE_SOLVER: Schema = {'not': {'required': ['solver', 'accuracy']}}
 _OWN_EFFECT: Schema = {
     'description': "An effect of one's own: a module that Python finds, and its parameters.",
     'type': 'object',
@@ -118,7 +111,7 @@ def scene_schema() -> Schema:
         'if': {'required': ['linkages']},
         'then': {'properties': {'linkage': False}},
         'else': {'required': ['linkage']},
-        'allOf': [_ONE_SOLVER],
+        **_ONE_SOLVER,
         '$defs': _of_a_linkage(),
     }
 
@@ -136,7 +129,7 @@ def _linkages(own: Mapping[str, Schema]) -> Schema:
         },
         required=('name', 'linkage'),
     )
-    one['allOf'] = [_ONE_SOLVER]
+    one |= _ONE_SOLVER
     return {
         'description': 'Several linkages in the place of one.',
         'if': {'type': 'array'},
@@ -202,10 +195,11 @@ def _solver() -> Schema:
         'How the loops are closed: one solver.',
         {name: parameters_schema(of) for name, of in solvers.items()},
     )
+    others = ', '.join(f'{{{name}: {{…}}}}' for name in solvers if name not in alone)
     return {
         'description': one['description'],
         'if': {'type': 'string'},
-        'then': {'enum': alone},
+        'then': {'enum': alone, 'description': f'or with its parameters: {others}'},
         'else': {**one, 'minProperties': 1, 'maxProperties': 1},
         'default': 'closed_form',
     }

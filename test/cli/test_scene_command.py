@@ -172,6 +172,16 @@ WRONG = [
         '',
         ['s.yaml:1: drive: topic, sine stand beside each other; leave all but 1 out'],
     ),
+    (
+        'linkage: l.yaml\nsolver: table\n',
+        'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
+        ["s.yaml:2: solver: 'table' does not fit; write closed_form (or with its parameters: {n"],
+    ),
+    (
+        'linkage: l.yaml\nsolver: closed_form\naccuracy: 1e-6\n',
+        'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
+        ['s.yaml:3: accuracy: stands beside solver; write one of the two'],
+    ),
     ('linkage: nowhere.yaml\n', '', ["s.yaml:1: linkage: 'nowhere.yaml' is not a file; name one"]),
     ('rate: [\n', '', ['s.yaml:2: is not valid YAML']),
     (
