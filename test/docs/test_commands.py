@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Every command of the documentation is run, in a folder with nothing but what its page shows."""
+"""Every command and Python block of the documentation runs, in a folder with what its page has."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from .blocks import Block, blocks, COMMANDS, commands, missing, PAGES, ROOT
 BLOCKS = {page.relative_to(ROOT).as_posix(): list(blocks(page)) for page in PAGES}
 ALL = [block for found in BLOCKS.values() for block in found if block.language in COMMANDS]
 WITH_COMMANDS = [
-    name for name, found in BLOCKS.items() if {b.language for b in found} & {*COMMANDS}
+    name for name, found in BLOCKS.items() if {b.language for b in found} & {*COMMANDS, 'python'}
 ]
 
 NOT_RUN = {
@@ -147,6 +147,10 @@ def test_the_commands_of_a_page_do_what_it_says(page, tmp_path):
         if block.file:
             (folder / block.file).parent.mkdir(exist_ok=True)
             (folder / block.file).write_text(block.text)
+        elif block.language == 'python':
+            (folder / 'block.py').write_text(block.text)
+            done = run(f'{sys.executable} block.py', folder, own)
+            assert done.returncode == 0, f'{block.page}:{block.line}:\n{done.stderr}'
         elif block.language in COMMANDS and not block.why_not:
             work_through(block, folder, own)
 
