@@ -20,7 +20,7 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy synthesis round_trips gallery schema cost effects docs lint format
-.PHONY: clean damage kills endurance disk accuracy_page
+.PHONY: clean damage kills endurance disk accuracy_page report
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
@@ -38,6 +38,7 @@ help:
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
 	@echo 'make cost      measure what every effect costs, into docs/cost.md'
 	@echo 'make effects   draw what drives, effects and faults do, for docs/effects.md'
+	@echo 'make report    record a run, and picture its page for docs/report.png'
 	@echo 'make docs      build the documentation site into build/docs'
 	@echo 'make lint      ruff and mypy'
 	@echo 'make format    let ruff put right what it can'
@@ -111,6 +112,9 @@ cost: $(STAMP)
 
 effects: $(STAMP)
 	@$(BIN)/python -m docs.make_effects
+
+report: $(STAMP)
+	@$(BIN)/python -m docs.make_report
 
 docs: $(STAMP)
 	@$(BIN)/python -m sphinx -q -W --keep-going -d build/docs_read docs build/docs

@@ -125,7 +125,11 @@ setup(
     maintainer_email='maintainers@linkage-ros.example',
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={f'{NAME}.accuracy.page': ['page.css', 'page.js']},
+    package_data={
+        f'{NAME}.page': ['page.css', 'page.js'],
+        f'{NAME}.accuracy.page': ['page.css', 'page.js'],
+        f'{NAME}.report': ['*.css', '*.js'],
+    },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

@@ -31,6 +31,7 @@ COMMANDS = {
     'play': 'publish a bag on the graph, at its own pace or another',
     'plot': 'draw the joints of a bag over the angle of its crank',
     'info': 'say what a bag holds, how well its loops closed, and where a toggle was nearest',
+    'report': 'write a run as one HTML page: its linkage moving, plots, events, counts',
     'export': 'write the joints of a bag, or one of its topics, to a CSV or Parquet file',
     'recover': 'make a whole bag of what a damaged or unfinished one still holds',
     'replay': 'run the scene of a bag once more and compare, or another scene over its samples',

@@ -25,11 +25,11 @@ import re
 import xml.etree.ElementTree as ET
 
 from linkage_ros.accuracy.page.csv_text import diagram_csv, table_csv
-from linkage_ros.accuracy.page.document import POLICY
 from linkage_ros.accuracy.page.folder import page_files, write_page
 from linkage_ros.accuracy.results import Diagram, Part, Results, Table
 from linkage_ros.accuracy.spread import Spread
 from linkage_ros.errors import LinkageError
+from linkage_ros.page.document import POLICY
 import numpy as np
 import pytest
 

@@ -26,7 +26,7 @@ from typing import Any
 from linkage_ros.bag.reading.reader import BagMessage, read_bag, RUN_FILE
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cdr import text_message
-from linkage_ros.cli import export, info, plot, replay
+from linkage_ros.cli import export, info, plot, replay, report
 from linkage_ros.errors import BagError, LinkageError
 from linkage_ros.replay import read_change
 import pytest
@@ -90,6 +90,7 @@ def tried(bag: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Iterat
         (info, ['--json']),
         (export, ['-o', folder / 'x.csv']),
         (plot, ['-o', folder / 'x.png']),
+        (report, ['-o', folder / 'x.html']),
     )
     for command, typed in commands:
         line = ''

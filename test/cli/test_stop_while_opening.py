@@ -39,6 +39,7 @@ COMMANDS = {
     'replay': ([], 'linkage replay: stopped\n'),
     'play': ([], 'linkage play: stopped\n'),
     'plot': ([], 'linkage plot: stopped\n'),
+    'report': (['-o', 'x.html'], 'linkage report: stopped\n'),
     'export': (['-o', 'x.csv'], 'linkage export: stopped; nothing was written\n'),
 }
 

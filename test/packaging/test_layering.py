@@ -28,7 +28,7 @@ PACKAGE = 'linkage_ros'
 # as no two import each other.
 HEIGHTS = (
     ('errors', 'stop', 'tuples', 'parameters'),
-    ('kinematics', 'shipped', 'cdr', 'bag'),
+    ('kinematics', 'shipped', 'cdr', 'bag', 'page'),
     ('joint_state', 'synthesis', 'dynamics', 'drawing', 'solvers', 'models'),
     ('joint_trajectory', 'multi_dof_joint_state', 'joint_effort', 'marker_array'),
     ('drives',),
@@ -38,6 +38,7 @@ HEIGHTS = (
     ('line',),
     ('pipeline',),
     ('replay', 'cost', 'accuracy'),
+    ('report',),
     ('ros', 'cli'),
 )
 HEIGHT = {room: height for height, rooms in enumerate(HEIGHTS) for room in rooms}

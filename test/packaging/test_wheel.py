@@ -77,12 +77,16 @@ def test_share_is_what_the_checkout_has(prefix, root):
     assert index.is_file()
 
 
-def test_what_pages_are_made_with_is_there(prefix, root):
-    packages = [folder for folder in prefix.rglob('linkage_ros/accuracy/page') if folder.is_dir()]
+@pytest.mark.parametrize('room', ['page', 'accuracy/page', 'report'])
+def test_what_pages_are_made_with_is_there(prefix, root, room):
+    packages = [folder for folder in prefix.rglob(f'linkage_ros/{room}') if folder.is_dir()]
     assert len(packages) == 1
-    for name in ('page.css', 'page.js'):
-        here = root / 'linkage_ros' / 'accuracy' / 'page' / name
-        assert (packages[0] / name).read_bytes() == here.read_bytes()
+    files = [
+        file for file in (root / 'linkage_ros' / room).iterdir() if file.suffix in ('.css', '.js')
+    ]
+    assert files
+    for file in files:
+        assert (packages[0] / file.name).read_bytes() == file.read_bytes()
 
 
 def test_tests_and_benchmarks_stay_out(prefix):

@@ -20,16 +20,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from html import escape
 
-from linkage_ros.accuracy.page.document import document, picture
-from linkage_ros.accuracy.page.numbers import Cell, cell_text, numeric_columns
+from linkage_ros.accuracy.page.numbers import cell_text, numeric_columns
 from linkage_ros.accuracy.page.places import places
 from linkage_ros.accuracy.page.plots import plot
 from linkage_ros.accuracy.page.styles import Styles
 from linkage_ros.accuracy.results import Diagram, Part, Results, Table
+from linkage_ros.page.document import document, picture
+from linkage_ros.page.parts import facts_html, table_html
 
 _ADVICE = 'What to take'
-_LONG = 28
-"""Letters from which on a cell may be broken."""
+_HERE = 'linkage_ros.accuracy.page'
 
 
 def results_html(results: Results, styles: Styles, pictures: Mapping[str, bytes]) -> str:
@@ -54,7 +54,8 @@ def results_html(results: Results, styles: Styles, pictures: Mapping[str, bytes]
     title = title_of(results)
     diagrams = [diagram for part in results.parts for diagram in part.diagrams]
     data = {'diagrams': {diagram.key: plot(diagram, styles) for diagram in diagrams}}
-    return document(title, _body(title, results, pictures), data)
+    body = _body(title, results, pictures)
+    return document(title, body, data, [(_HERE, 'page.css')], [(_HERE, 'page.js')])
 
 
 def title_of(results: Results) -> str:
@@ -64,10 +65,7 @@ def title_of(results: Results) -> str:
 
 def _body(title: str, results: Results, pictures: Mapping[str, bytes]) -> Iterator[str]:
     yield f'<header><h1>{escape(title)}</h1>'
-    yield '<dl class="machine">'
-    for name, value in results.machine:
-        yield f'<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>'
-    yield '</dl>'
+    yield from facts_html(results.machine)
     advised = [part for part in results.parts if part.advice]
     yield '<nav aria-label="Parts"><ul>'
     for part in results.parts:
@@ -114,23 +112,6 @@ def _diagram(diagram: Diagram, svg: bytes) -> Iterator[str]:
 
 
 def _table(table: Table) -> Iterator[str]:
-    numbers = numeric_columns(table)
-    heads = ''.join(map(_head, table.columns, numbers))
-    yield f'<figure><figcaption>{escape(table.title)}</figcaption>'
-    yield '<div class="scroll" tabindex="0"><table>'
-    yield f'<thead><tr>{heads}</tr></thead>'
-    yield '<tbody>'
-    for row in table.rows:
-        yield f'<tr>{"".join(map(_cell, row, numbers))}</tr>'
-    yield '</tbody></table></div>'
+    rows = (list(map(cell_text, row)) for row in table.rows)
+    yield from table_html(table.title, table.columns, rows, numeric_columns(table))
     yield f'<div class="files"><a href="{escape(table.key)}.csv">CSV</a></div></figure>'
-
-
-def _head(column: str, number: bool) -> str:
-    return f'<th{" class=number" if number else ""}>{escape(column)}</th>'
-
-
-def _cell(cell: Cell, number: bool) -> str:
-    text = cell_text(cell)
-    kind = ' class=number' if number else ' class=long' if len(text) >= _LONG else ''
-    return f'<td{kind}>{escape(text)}</td>'

@@ -3,7 +3,6 @@
 'use strict';
 
 (() => {
-  const NARROW = 640;
   const LEGEND_LINE = { narrow: 19.5, wide: 22 };
   const NOTHING = {
     text: 'nothing was measured',
@@ -13,24 +12,7 @@
     y: 0.5,
     showarrow: false,
   };
-  const diagrams = JSON.parse(document.getElementById('data').textContent).diagrams;
-  const dark = matchMedia('(prefers-color-scheme: dark)');
-  const touch = matchMedia('(pointer: coarse)');
-  const config = {
-    displaylogo: false,
-    displayModeBar: 'hover',
-    // Named one by one: none of these leads out of the page.
-    modeBarButtons: [['zoom2d', 'pan2d', 'zoomIn2d', 'zoomOut2d', 'resetScale2d']],
-    plotlyServerURL: '',
-    responsive: false,
-  };
-
-  function colours() {
-    const style = getComputedStyle(document.documentElement);
-    const named = (name) => style.getPropertyValue(`--${name}`).trim();
-    const names = ['ink', 'paper', 'panel', 'grid', 'rule'];
-    return Object.fromEntries(names.map((name) => [name, named(name)]));
-  }
+  const diagrams = Page.data.diagrams;
 
   function arms(lengths, colour) {
     if (!lengths.length) return { visible: false };
@@ -75,22 +57,8 @@
   }
 
   function axis(shown, colour) {
-    return {
-      type: shown.logarithmic ? 'log' : 'linear',
-      range: shown.range,
-      title: { text: shown.title, standoff: 8 },
-      automargin: true,
-      color: colour.ink,
-      gridcolor: colour.grid,
-      linecolor: colour.rule,
-      zeroline: false,
-      showline: true,
-      ticks: 'outside',
-      tickcolor: colour.rule,
-      exponentformat: 'power',
-      nticks: 8,
-      fixedrange: touch.matches, // a finger that scrolls the page must not zoom
-    };
+    const type = shown.logarithmic ? 'log' : 'linear';
+    return Page.axis(shown.title, colour, { type, range: shown.range });
   }
 
   function legendLines(diagram) {
@@ -99,38 +67,22 @@
   }
 
   function layout(diagram, width, colour) {
-    const narrow = width < NARROW;
+    const narrow = width < Page.NARROW;
     const lines = legendLines(diagram) * (narrow ? LEGEND_LINE.narrow : LEGEND_LINE.wide);
     const bottom = narrow ? 72 + lines : 56;
     const height = narrow ? 320 + bottom : Math.max(440, lines + 32 + bottom);
     const legend = narrow
       ? { x: 0, xanchor: 'left', y: 0, yref: 'container', yanchor: 'bottom' }
       : { x: 1.02, xanchor: 'left', y: 1, yanchor: 'top' };
-    return {
-      width,
+    return Page.layout(width, colour, {
       height,
       margin: { l: 56, r: narrow ? 12 : 16, t: 32, b: bottom, autoexpand: true },
-      paper_bgcolor: colour.paper,
-      plot_bgcolor: colour.paper,
-      font: {
-        family: getComputedStyle(document.body).fontFamily,
-        size: narrow ? 11 : 13,
-        color: colour.ink,
-      },
-      hoverlabel: {
-        align: 'left',
-        bgcolor: colour.panel,
-        bordercolor: colour.ink,
-        font: { color: colour.ink },
-      },
-      hovermode: 'closest',
-      dragmode: touch.matches ? false : 'zoom',
       showlegend: true,
       legend: { ...legend, font: { size: narrow ? 11 : 12 }, itemwidth: 30, tracegroupgap: 0 },
       xaxis: axis(diagram.x, colour),
       yaxis: axis(diagram.y, colour),
       annotations: diagram.empty ? [NOTHING] : [],
-    };
+    });
   }
 
   function draw(figure) {
@@ -139,20 +91,9 @@
     const place = figure.querySelector('.plot');
     const width = Math.floor(place.clientWidth);
     if (!width) return;
-    const colour = colours();
-    Plotly.react(place, traces(diagram, colour), layout(diagram, width, colour), config);
+    const colour = Page.colours();
+    Plotly.react(place, traces(diagram, colour), layout(diagram, width, colour), Page.config);
   }
 
-  const figures = [...document.querySelectorAll('figure[data-diagram]')];
-  for (const figure of figures) {
-    draw(figure);
-    let width = figure.clientWidth;
-    new ResizeObserver(() => {
-      // Print has a width of its own, and pictures of its own.
-      if (figure.clientWidth === width || matchMedia('print').matches) return;
-      width = figure.clientWidth;
-      requestAnimationFrame(() => draw(figure));
-    }).observe(figure);
-  }
-  dark.addEventListener('change', () => figures.forEach(draw));
+  Page.keepDrawn([...document.querySelectorAll('figure[data-diagram]')], draw);
 })();

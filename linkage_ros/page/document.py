@@ -22,7 +22,7 @@ Its policy forbids the browser to ask anybody for anything, whatever the page ho
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 from importlib.util import find_spec
@@ -36,10 +36,13 @@ POLICY = (
     "base-uri 'none'; form-action 'none'"
 )
 
-_HERE = 'linkage_ros.accuracy.page'
+_HERE = 'linkage_ros.page'
+
+Parts = Sequence[tuple[str, str]]
+"""Files of a page's own: each with its package and its name."""
 
 
-def document(title: str, body: Iterable[str], data: Any) -> str:
+def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts: Parts) -> str:
     """
     Return a page.
 
@@ -51,6 +54,8 @@ def document(title: str, body: Iterable[str], data: Any) -> str:
         Lines of HTML.
     data
         For the script, as JSON has it; numbers are finite.
+    styles, scripts
+        What the page has beside what all pages have, in their order.
 
     Raises
     ------
@@ -70,13 +75,13 @@ def document(title: str, body: Iterable[str], data: Any) -> str:
             # Without it a browser asks the server for one.
             '<link rel="icon" href="data:,">',
             f'<title>{escape(title)}</title>',
-            f'<style>\n{_own("page.css")}</style>',
+            f'<style>\n{_joined("page.css", styles)}</style>',
             '</head>',
             '<body>',
             *body,
             f'<script type="application/json" id="data">{_json(data)}</script>',
             f'<script>{_within_script(plotting_library())}</script>',
-            f'<script>\n{_own("page.js")}</script>',
+            f'<script>\n{_joined("page.js", scripts)}</script>',
             '</body>',
             '</html>',
             '',
@@ -106,8 +111,10 @@ def plotting_library() -> str:
     return str(get_plotlyjs())
 
 
-def _own(name: str) -> str:
-    return files(_HERE).joinpath(name).read_text('utf-8')
+def _joined(name: str, parts: Parts) -> str:
+    """Return a file that all pages have, and those of a page's own behind it."""
+    found = (files(room).joinpath(file) for room, file in ((_HERE, name), *parts))
+    return '\n'.join(file.read_text('utf-8') for file in found)
 
 
 def _json(data: Any) -> str:

@@ -1,0 +1,223 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Write a run as one HTML page that needs nothing else: its linkage moving, plots, events, counts.
+
+The page makes no request to anywhere. Of a long run it holds intervals with their least and
+greatest values; --since and --until show a part of it in full. A bag that is damaged or not
+finished is told as far as it goes; of one without a scene of ours, its joint states alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import suppress
+from importlib.util import find_spec
+from math import isfinite
+import os
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from linkage_ros.bag.reading.layout import layout_of
+from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.cli.bag_account import account_of, scene_account
+from linkage_ros.cli.bag_reading import gaps, opened
+from linkage_ros.cli.info import tables
+from linkage_ros.cli.progress import progress
+from linkage_ros.errors import LinkageError
+from linkage_ros.report.blocks import Progress
+from linkage_ros.report.html import run_html, Told
+from linkage_ros.report.reading import read_run
+from linkage_ros.report.run import Run, Window
+from linkage_ros.report.tables import TableOf
+from linkage_ros.report.words import seconds_text
+from linkage_ros.scene.scene import Scene
+from linkage_ros.stop import StoppedError
+
+_MIB = 2**20
+_LONGEST = 2**62
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
+    parser.add_argument(
+        '-o', '--output', type=Path, metavar='FILE', help='FILE.html; without it BAG.html'
+    )
+    for name, what in (('since', 'beginning'), ('until', 'end')):
+        parser.add_argument(
+            f'--{name}', type=float, metavar='S', help=f'{what} of a part, in seconds of the run'
+        )
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Write the page."""
+    file = arguments.output or _beside(arguments.bag)
+    _check(file)
+    window = _window(arguments.since, arguments.until)
+    # What is no text, of a name of a file, say, comes as its bytes' numbers.
+    page = report(arguments.bag, window, stop).encode('utf-8', 'backslashreplace')
+    _write(file, page)
+    print(f'{file}: {len(page) / 1e6:.1f} MB')
+    return 0
+
+
+def report(bag_path: Path, window: Window, stop: Event) -> str:
+    """
+    Return the page of a bag; memory does not grow with the bag.
+
+    Parameters
+    ----------
+    bag_path
+        The bag.
+    window
+        Which part of its run is told.
+    stop
+        The wish to stop.
+
+    Raises
+    ------
+    LinkageError
+        Where the bag cannot be read, or plotly is not installed.
+    StoppedError
+        There was the wish.
+
+    """
+    bag = opened(bag_path, stop)
+    layouts = [layout_of(path) for path in bag.files]
+    size = max(1, sum(layout.content for layout in layouts) // _MIB)
+    with progress('read [MiB]') as told:
+        found, scene, missing = read_run(
+            bag,
+            window,
+            Progress(lambda read: told(read // _MIB, max(size, read // _MIB)), stop.is_set),
+        )
+    _heed(stop)
+    account = account_of(bag, layouts, found.contents)
+    account |= {'scene': None, 'scene_missing': None, 'replay': None}
+    # A page is handed on, and does not say where its bag lay.
+    if account['damage']:
+        where, _, damage = account['damage'].partition(': ')
+        account['damage'] = f'{Path(where).name}: {damage}'
+    if scene is not None:
+        account['scene'] = scene_account(scene)
+    name = scene.name if scene is not None else bag_path.resolve().name
+    page = run_html(
+        found,
+        Told(
+            title=f'Run of {name}',
+            facts=list(_facts(account, found, scene)),
+            warnings=list(_warnings(bag, account, found, missing)),
+            tables=_tables(account),
+            wrapped=scene is not None and scene.wrapped,
+        ),
+    )
+    _heed(stop)
+    return page
+
+
+def _heed(stop: Event) -> None:
+    if stop.is_set():
+        raise StoppedError
+
+
+def _tables(account: dict[str, Any]) -> list[TableOf]:
+    bag, *others = (TableOf(*table) for table in tables(account))
+    return [bag._replace(title='Bag'), *others]
+
+
+def _facts(account: dict[str, Any], found: Run, scene: Scene | None) -> Iterator[tuple[str, str]]:
+    yield 'bag', Path(account['bag']).resolve().name
+    if account['begin']:
+        yield 'begun', account['begin']
+        yield 'duration', f'{account["duration_ns"] / 1e9:.6f} s'
+    since, until = found.window
+    if since > 0 or until < found.end:
+        yield 'part', f'{seconds_text(since)} s to {seconds_text(min(until, found.end))} s'
+    yield 'messages', f'{account["messages"]:,}'
+    if scene is not None:
+        yield 'ticks', f'{scene.rate:g} a second' if scene.rate else 'one a sample'
+    version = account['versions']['linkage_ros']
+    if version:
+        yield 'recorded by', f'linkage_ros {version}'
+
+
+def _warnings(bag: Bag, account: dict[str, Any], found: Run, missing: str) -> Iterator[str]:
+    """Yield what is missing of a run, or damaged."""
+    if missing:
+        yield f'No scene of linkage_ros, so no linkage: {missing}.'
+    if not account['messages']:
+        yield 'The bag holds no messages.'
+    if account['damage']:
+        yield f'Damaged: {account["damage"]}; what lies before is told.'
+    if account['unfinished']:
+        yield f'Unfinished: {account["unfinished"]}; what it holds is told.'
+    if account['recording_failure']:
+        yield f'The recording failed: {account["recording_failure"]}.'
+    if account['beginning_missing']:
+        yield f'Not from the beginning: {account["beginning_missing"]}.'
+    for gap in gaps(bag):
+        yield f'{gap[:1].upper()}{gap[1:]}.'
+    if account['messages'] and found.window.since > found.end:
+        yield f'The part begins after the end of the run, at {seconds_text(found.end)} s.'
+
+
+def _window(since: float | None, until: float | None) -> Window:
+    ends = []
+    for option, value, default in (('--since', since, 0), ('--until', until, _LONGEST)):
+        if value is not None and (not isfinite(value) or not 0.0 <= value < 1e9):
+            raise LinkageError(option, f'{value} is no time in a run', 'write seconds from 0 on')
+        ends.append(default if value is None else round(value * 1e9))
+    if ends[0] >= ends[1]:
+        raise LinkageError('--until', f'{until} is not after --since', 'write a later one')
+    return Window(*ends)
+
+
+def _beside(bag: Path) -> Path:
+    """Return the file beside a bag that is named as it."""
+    # The folder that one is in has no name.
+    named = bag if bag.name not in ('', '..') else bag.resolve()
+    return named.with_name(f'{named.name}.html') if named.name else named
+
+
+def _check(file: Path) -> None:
+    """Refuse what cannot be written, before anything is read."""
+    if find_spec('plotly') is None:
+        raise LinkageError('plotly', 'is not installed', 'pip install linkage_ros[report]')
+    if file.suffix.lower() not in ('.html', '.htm'):
+        raise LinkageError(file, 'is no name of a page', 'name FILE.html with -o')
+    # Of a name that is too long `Path.is_dir` raises.
+    if os.path.isdir(file):  # noqa: PTH112
+        raise LinkageError(file, 'is a folder', 'name another file with -o')
+    if not os.path.isdir(file.absolute().parent):  # noqa: PTH112
+        raise LinkageError(file, 'lies in no folder that there is', 'name another file with -o')
+
+
+def _write(file: Path, page: bytes) -> None:
+    """Write a file as a whole, or not at all."""
+    # Where it leads elsewhere, it is that which is written.
+    target = Path(os.path.realpath(file))
+    part = target.with_name(f'{target.name}.part')
+    try:
+        part.write_bytes(page)
+        part.replace(target)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        reason = f'cannot be written: {error.strerror or error}'
+        raise LinkageError(file, reason, 'name another file with -o') from None

@@ -1,0 +1,105 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What the diagnostics of a run add to its messages: ticks that were lost, drops, warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from linkage_ros.report.diagnostics import Status, statuses
+from linkage_ros.report.spans import Lane
+from linkage_ros.report.words import short
+
+_LEVELS = {1: 'warning', 2: 'error', 3: 'stale'}
+_TASKS = ('tick', 'crank', 'loop closure', 'recording', 'faults')
+
+_COUNTED = {
+    'Lost ticks': ('lost', ''),
+    'Ticks open': ('told_open', 'open'),
+    'Ticks indeterminate': ('told_open', 'indeterminate'),
+    'Ticks at a toggle': ('told_toggle', ''),
+}
+"""Counts that only grow, the lane that tells of it, and what it says."""
+
+_DROPPED = 'Dropped: '
+
+MOST_SAID = 500
+"""Values that are remembered; our node says some sixty."""
+
+
+class Health:
+    """
+    Follows the diagnostics.
+
+    Parameters
+    ----------
+    lanes
+        Where what happens is put, by kind: lost, told_open, told_toggle, dropped and health.
+    from_beginning
+        Whether the bag holds the run from its beginning: where not, counts have begun before.
+
+    Attributes
+    ----------
+    said
+        What was said last, by task and key; no more than `MOST_SAID`.
+
+    """
+
+    def __init__(self, lanes: Mapping[str, Lane], from_beginning: bool = True) -> None:
+        self.said: dict[tuple[str, str], str] = {}
+        self._lanes, self._from_beginning = lanes, from_beginning
+        self._before = 0
+        self._counts: dict[tuple[str, str], int] = {}
+
+    def take(self, message: bytes, time: int) -> None:
+        """Take a message, at a time of the run in [ns]."""
+        ours = [
+            (task, status)
+            for status in statuses(message)
+            for task in _TASKS
+            if status.name.endswith(f': {task}')
+        ]
+        for task, status in ours:
+            self._take(task, status, time)
+        if ours:
+            self._before = time
+
+    def _take(self, task: str, status: Status, time: int) -> None:
+        if status.level in _LEVELS:
+            text = f'{_LEVELS[status.level]}, {task}: {status.message}'
+            self._lanes['health'].add(self._before, time, text)
+        for key, value in status.values.items():
+            named = task, short(key)
+            if named not in self.said and len(self.said) >= MOST_SAID:
+                continue
+            self.said[named] = short(value)
+            if key in _COUNTED:
+                lane, what = _COUNTED[key]
+                self._count(lane, what, named, value, time)
+            elif key.startswith(_DROPPED):
+                topic = key.removeprefix(_DROPPED)
+                self._count('dropped', f'messages of {topic}', named, value, time)
+
+    def _count(self, lane: str, what: str, of: tuple[str, str], value: str, time: int) -> None:
+        if not value.isdecimal() or len(value) > 18:
+            return
+        count = int(value)
+        known = self._counts.get(of, 0 if self._from_beginning else count)
+        self._counts[of] = count
+        # Of a node that was started anew it begins at 0 again.
+        more = count - known if count >= known else count
+        if more:
+            self._lanes[lane].add(self._before, time, what, more)

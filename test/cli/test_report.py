@@ -1,0 +1,363 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``linkage report``: one file beside its bag, or one line; whatever the bag is like."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import errno
+import json
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.cli import report as command
+from linkage_ros.errors import LinkageError
+from linkage_ros.stop import StoppedError
+import pytest
+
+from .conftest import Run
+from .recorded import answer, JOINT_STATE, Recorded, scene_file, topic
+
+pytest.importorskip('plotly', reason='is within the page')
+
+
+def crank(number: int) -> dict[str, tuple[float, float]]:
+    """Return a crank that turns at 7 rad/s."""
+    return {'crank_joint': (1.0 + 0.007 * number, 7.0)}
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    scene = scene_file(tmp_path, 'effects: {velocity: {}}\n')
+    return Recorded(tmp_path / 'bag', scene, crank).run(300)
+
+
+def refused(*typed: object) -> str:
+    """Return the line for which the command is refused."""
+    with pytest.raises(LinkageError) as caught:
+        answer(command, *typed)
+    line = str(caught.value)
+    assert line.isprintable()
+    return line
+
+
+def data_of(page: Path) -> dict[str, Any]:
+    text = page.read_text().split('id="data">')[1].split('</script>')[0]
+    found: dict[str, Any] = json.loads(text, parse_constant=pytest.fail)
+    return found
+
+
+def warnings_of(page: Path) -> list[str]:
+    """Return what a page warns of; it is handed on, so nowhere does it say where it was made."""
+    text = page.read_text()
+    assert str(page.parent) not in text
+    _, _, rest = text.partition('<ul class="warnings" role="alert">')
+    items, _, _ = rest.partition('</ul>')
+    return [item.strip().removesuffix('</li>') for item in items.split('<li>')[1:]] if rest else []
+
+
+def test_it_is_one_file_beside_the_bag(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = {*bag.parent.iterdir()}
+    assert answer(command, bag) == 0
+    page = bag.parent / 'bag.html'
+    assert {*bag.parent.iterdir()} - before == {page}
+    assert capsys.readouterr().out == f'{page}: {page.stat().st_size / 1e6:.1f} MB\n'
+    assert warnings_of(page) == []
+    text = page.read_text()
+    assert text.startswith('<!doctype html>')
+    assert '<title>Run of scene of mine</title>' in text
+    for told in ('1000 a second', 'linkage_ros 9.8.7', '600', '/joint_states', '0.299000 s'):
+        assert told in text
+    assert data_of(page)['linkages'][0]['links']
+
+
+@pytest.mark.parametrize(
+    ('typed', 'written'),
+    [
+        (['bag/'], 'bag.html'),
+        (['bag/bag_0.mcap'], 'bag/bag_0.mcap.html'),
+        (['bag', '-o', 'x.HTM'], 'x.HTM'),
+        (['bag/../bag'], 'bag.html'),
+    ],
+)
+def test_where_it_is_written(
+    bag: Path, monkeypatch: pytest.MonkeyPatch, typed: list[str], written: str
+) -> None:
+    monkeypatch.chdir(bag.parent)
+    assert answer(command, *typed) == 0
+    assert Path(written).is_file()
+
+
+@pytest.mark.parametrize('here', ['.', '../bag'])
+def test_from_within_the_bag_it_is_written_beside_it(
+    bag: Path, monkeypatch: pytest.MonkeyPatch, here: str
+) -> None:
+    monkeypatch.chdir(bag)
+    assert answer(command, here) == 0
+    assert (bag.parent / 'bag.html').is_file()
+
+
+REFUSED = {
+    'a folder': ('taken.html', 'taken.html: is a folder; name another file with -o'),
+    'no folder': ('gone/x.html', 'gone/x.html: lies in no folder that there is; name another'),
+    'another kind': ('x.pdf', 'x.pdf: is no name of a page; name FILE.html with -o'),
+    'no kind': ('x', 'x: is no name of a page; name FILE.html with -o'),
+    'a device': ('/dev/full', '/dev/full: is no name of a page; name FILE.html with -o'),
+    'where nobody can write': ('/proc/x.html', '/proc/x.html: cannot be written: No such file'),
+    'too long': (f'{"x" * 300}.html', f'{"x" * 300}.html: cannot be written: File name too long'),
+}
+
+
+@pytest.mark.parametrize('name', REFUSED)
+def test_files_that_are_refused(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('taken.html').mkdir()
+    before = {*tmp_path.rglob('*')}
+    file, line = REFUSED[name]
+    assert refused(bag, '-o', file).startswith(line)
+    assert {*tmp_path.rglob('*')} == before
+
+
+def test_on_a_full_disk_the_page_that_was_there_stays(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / 'x.html'
+    page.write_text('old')
+
+    def full(self: Path, data: bytes) -> None:
+        with self.open('wb') as stream:
+            stream.write(data[:1000])
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr(Path, 'write_bytes', full)
+    before = {*tmp_path.iterdir()}
+    assert refused(bag, '-o', page) == (
+        f'{page}: cannot be written: No space left on device; name another file with -o'
+    )
+    assert {*tmp_path.iterdir()} == before
+    assert page.read_text() == 'old'
+
+
+def test_a_link_stays_a_link(bag: Path, tmp_path: Path) -> None:
+    there = tmp_path / 'there'
+    there.mkdir()
+    (tmp_path / 'x.html').symlink_to(there / 'page.html')
+    assert answer(command, bag, '-o', tmp_path / 'x.html') == 0
+    assert (tmp_path / 'x.html').is_symlink()
+    assert (there / 'page.html').stat().st_size > 10**6
+
+
+TIMES = {
+    'negative': (['--since', '-1'], '--since: -1.0 is no time in a run; write seconds from 0 on'),
+    'nan': (['--until', 'nan'], '--until: nan is no time in a run; write seconds from 0 on'),
+    'infinite': (['--until', 'inf'], '--until: inf is no time in a run; write seconds from 0 on'),
+    'too far': (['--since', '1e10'], '--since: 10000000000.0 is no time in a run; write seconds'),
+    'reversed': (['--since', '2', '--until', '1'], '--until: 1.0 is not after --since; write a'),
+    'nothing': (['--since', '1', '--until', '1'], '--until: 1.0 is not after --since; write a'),
+}
+
+
+@pytest.mark.parametrize('name', TIMES)
+def test_times_that_are_refused(bag: Path, name: str) -> None:
+    typed, line = TIMES[name]
+    assert refused(bag, *typed).startswith(line)
+
+
+def test_what_is_no_number_is_refused(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        answer(command, bag, '--since', 'soon')
+    assert ended.value.code == 2
+    assert "invalid float value: 'soon'" in capsys.readouterr().err
+
+
+def test_a_part_of_a_run(bag: Path, tmp_path: Path) -> None:
+    page = tmp_path / 'x.html'
+    assert answer(command, bag, '-o', page, '--since', '0.1', '--until', '0.2') == 0
+    assert '0.1 s to 0.2 s' in page.read_text()
+    assert (data_of(page)['since'], data_of(page)['until']) == (0.1, 0.2)
+    assert data_of(page)['curves'][0]['of'] == 101
+    assert warnings_of(page) == []
+
+
+def test_a_part_beyond_the_end_says_so(bag: Path, tmp_path: Path) -> None:
+    page = tmp_path / 'x.html'
+    assert answer(command, bag, '-o', page, '--since', '5') == 0
+    assert warnings_of(page) == ['The part begins after the end of the run, at 0.299 s.']
+    assert data_of(page)['curves'] == []
+
+
+def test_a_bag_without_our_scene(bag: Path, tmp_path: Path) -> None:
+    read = read_bag(bag)
+    numbers = {each.name: number for number, each in enumerate(read.topics)}
+    writer = BagWriter(tmp_path / 'foreign', read.topics)
+    for message in read.messages():
+        writer.write(numbers[message.topic], *message[1:])
+    writer.close()
+    assert answer(command, tmp_path / 'foreign') == 0
+    page = tmp_path / 'foreign.html'
+    (warning,) = warnings_of(page)
+    assert warning.startswith('No scene of linkage_ros, so no linkage: ')
+    assert 'carries no run.json, scene.yaml' in warning
+    data = data_of(page)
+    assert (data['linkages'], data['frames']) == ([], None)
+    assert {curves['title'] for curves in data['curves']} == {'/crank_states', '/joint_states'}
+    assert '<title>Run of foreign</title>' in page.read_text()
+
+
+@pytest.mark.parametrize('topics', [[], [topic('/joint_states', JOINT_STATE)]])
+def test_a_bag_of_zero_messages(tmp_path: Path, topics: list[Any]) -> None:
+    BagWriter(tmp_path / 'empty', topics).close()
+    assert answer(command, tmp_path / 'empty') == 0
+    page = tmp_path / 'empty.html'
+    assert warnings_of(page)[1:] == ['The bag holds no messages.']
+    assert 'No joint states are in this bag.' in page.read_text()
+    assert data_of(page)['curves'] == []
+
+
+def test_a_run_that_published_nothing(tmp_path: Path) -> None:
+    scene = scene_file(tmp_path, 'effects: {velocity: {}}\n')
+    Recorded(tmp_path / 'bag', scene, lambda _: {}).run(50)
+    assert answer(command, tmp_path / 'bag') == 0
+    page = tmp_path / 'bag.html'
+    assert warnings_of(page) == []
+    assert 'no joints or no positions' in page.read_text()
+
+
+def harmed(bag: Path, change: Any) -> Path:
+    file = bag / 'bag_0.mcap'
+    content = bytearray(file.read_bytes())
+    file.write_bytes(change(content) or content)
+    return bag
+
+
+def flip(at: int) -> Any:
+    def change(content: bytearray) -> None:
+        content[at] ^= 1
+
+    return change
+
+
+@pytest.fixture
+def longer(tmp_path: Path) -> Path:
+    scene = scene_file(tmp_path, 'effects: {velocity: {}}\n')
+    return Recorded(tmp_path / 'bag', scene, crank).run(3000)
+
+
+def test_a_bag_that_was_cut_is_told_as_far_as_it_goes(longer: Path) -> None:
+    harmed(longer, lambda content: content[: len(content) * 2 // 3])
+    assert answer(command, longer) == 0
+    page = longer.parent / 'bag.html'
+    (warning,) = warnings_of(page)
+    assert warning.startswith('Unfinished: its recording was killed, or still runs; what it holds')
+    assert 0 < data_of(page)['curves'][0]['of'] < 3000
+
+
+def test_a_damaged_chunk_is_told_as_far_as_it_goes(longer: Path, tmp_path: Path) -> None:
+    bag = longer
+    content = (bag / 'bag_0.mcap').read_bytes()
+    harmed(bag, flip(len(content) * 2 // 3))
+    assert answer(command, bag) == 0
+    (warning,) = warnings_of(tmp_path / 'bag.html')
+    assert warning.startswith('Damaged: ')
+    assert warning.endswith('; what lies before is told.')
+
+
+def test_a_damaged_attachment_is_a_line(bag: Path) -> None:
+    content = (bag / 'bag_0.mcap').read_bytes()
+    harmed(bag, flip(content.index(b'four_bar: {a')))
+    assert 'is damaged: ' in refused(bag)
+    assert not (bag.parent / 'bag.html').exists()
+
+
+SCENES = {
+    'a drive that there is not': b'linkage: l.yaml\ndrive: {wind: {}}\n',
+    'no YAML': b'linkage: [',
+    'not UTF-8': b'linkage: \xff',
+    'nothing': b'',
+}
+
+
+@pytest.mark.parametrize('name', SCENES)
+def test_a_scene_that_cannot_be_read_here_is_told_and_the_rest_is_shown(
+    bag: Path, tmp_path: Path, name: str
+) -> None:
+    read = read_bag(bag)
+    numbers = {each.name: number for number, each in enumerate(read.topics)}
+    attached = {key: ('', data) for key, data in read.attachments.items()}
+    attached['scene.yaml'] = '', SCENES[name]
+    writer = BagWriter(tmp_path / 'odd', read.topics, attached)
+    for message in read.messages():
+        writer.write(numbers[message.topic], *message[1:])
+    writer.close()
+    assert answer(command, tmp_path / 'odd') == 0
+    (warning,) = warnings_of(tmp_path / 'odd.html')
+    assert warning.startswith('No scene of linkage_ros, so no linkage: ')
+    assert 'scene.yaml' in warning
+    assert data_of(tmp_path / 'odd.html')['curves']
+
+
+@pytest.mark.parametrize('content', [b'', b'no bag', b'\x89MCAP1\r\n'])
+def test_what_is_no_bag_is_a_line(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / 'x.mcap'
+    file.write_bytes(content)
+    assert refused(file).startswith(f'{file}: ')
+    assert {*tmp_path.iterdir()} == {file}
+
+
+def test_no_bag_at_all_is_a_line(linkage: Run) -> None:
+    told = linkage('report', 'nowhere')
+    assert (told.returncode, told.stdout) == (2, '')
+    assert told.stderr.startswith('linkage report: nowhere: ')
+    assert told.stderr.count('\n') == 1
+
+
+def test_without_plotly_it_says_so_before_the_bag_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, 'find_spec', lambda name: None)
+    line = refused(tmp_path / 'nowhere', '-o', tmp_path / 'x.html')
+    assert line == 'plotly: is not installed; pip install linkage_ros[report]'
+
+
+def test_it_can_be_stopped_and_leaves_nothing(bag: Path) -> None:
+    stop = Event()
+    stop.set()
+    before = {*bag.parent.iterdir()}
+    with pytest.raises(StoppedError):
+        answer(command, bag, stop=stop)
+    assert {*bag.parent.iterdir()} == before
+
+
+def test_what_is_in_a_bag_is_no_part_of_the_page_but_text(bag: Path, tmp_path: Path) -> None:
+    name = '</script><script>alert(1)</script>'
+    read = read_bag(bag)
+    run = json.loads(read.attachments['run.json']) | {'scene': name, 'linkage_ros': name}
+    attached = {key: ('', data) for key, data in read.attachments.items()}
+    attached['run.json'] = '', json.dumps(run).encode()
+    odd = [replace(each, name=each.name.replace('withheld', name)) for each in read.topics]
+    writer = BagWriter(tmp_path / 'odd', odd, attached)
+    numbers = {each.name: number for number, each in enumerate(read.topics)}
+    for message in read.messages():
+        writer.write(numbers[message.topic], *message[1:])
+    writer.close()
+    assert answer(command, tmp_path / 'odd') == 0
+    text = (tmp_path / 'odd.html').read_text()
+    assert name not in text
+    assert '&lt;/script&gt;&lt;script&gt;alert(1)' in text

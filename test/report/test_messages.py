@@ -1,0 +1,204 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Messages as arrays, as rosbags reads them one by one; damaged ones are left out."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+from linkage_ros.report.diagnostics import statuses
+from linkage_ros.report.joint_states import JointStates, MOST_JOINTS
+import numpy as np
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+TYPES = STORE.types
+STATE, ARRAY = 'sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'
+
+
+def header(stamp, frame=''):
+    time = TYPES['builtin_interfaces/msg/Time'](*divmod(stamp, 10**9))
+    return TYPES['std_msgs/msg/Header'](time, frame)
+
+
+def state(stamp, joints, frame='', rates=True, efforts=False):
+    names, values = [*joints], np.array([*joints.values()], float)
+    none = np.array([])
+    return TYPES[STATE](
+        header(stamp, frame), names, values,
+        2 * values if rates else none, 3 * values if efforts else none,
+    )  # fmt: skip
+
+
+def encoded(message, little=True):
+    return bytes(STORE.serialize_cdr(message, message.__msgtype__, little_endian=little))
+
+
+NAMES = st.text('abcé', min_size=1, max_size=6)
+MESSAGES = st.lists(
+    st.tuples(
+        st.builds(
+            state,
+            st.integers(0, 2**31 * 10**9 - 1),
+            st.dictionaries(NAMES, st.floats(-1e9, 1e9), min_size=1, max_size=4),
+            st.sampled_from(['', 'base']),
+            st.booleans(),
+            st.booleans(),
+        ),
+        st.booleans(),
+    ),
+    max_size=12,
+)
+
+
+@given(MESSAGES)
+def test_all_that_publishers_may_mix_comes_out_as_rosbags_reads_it(messages):
+    data = [encoded(message, little) for message, little in messages]
+    reader = JointStates()
+    block = reader.read(data)
+    assert block.good.all()
+    assert not +reader.left_out
+    for i, one in enumerate(data):
+        read = STORE.deserialize_cdr(one, STATE)
+        stamp = read.header.stamp
+        assert block.stamps[i] == stamp.sec * 10**9 + stamp.nanosec
+        expected = np.full((3, len(reader.joints)), np.nan)
+        for row, values in enumerate((read.position, read.velocity, read.effort)):
+            for name, value in zip(read.name, values, strict=bool(len(values))):
+                expected[row, reader.joints.index(name)] = value
+        assert np.array_equal(block.numbers[i], expected, equal_nan=True)
+
+
+GOOD = encoded(state(5, {'a': 1.0, 'b': 2.0}))
+TWICE = TYPES[STATE](header(5), ['a', 'a'], np.ones(2), np.array([]), np.array([]))
+UNEQUAL = TYPES[STATE](header(5), ['a', 'b'], np.ones(2), np.ones(1), np.array([]))
+NOTHING = TYPES[STATE](header(5), [], np.array([]), np.array([]), np.array([]))
+NAMES_ALONE = TYPES[STATE](header(5), ['a'], np.array([]), np.array([]), np.array([]))
+BAD = {
+    'malformed message': [
+        b'', b'\x00\x01', GOOD[:40], b'\x07' * len(GOOD), GOOD[:4] + b'\xff' * 90
+    ],
+    'a joint named twice': [encoded(TWICE)],
+    'arrays of unequal length': [encoded(UNEQUAL)],
+    'no joints or no numbers': [encoded(NOTHING), encoded(NAMES_ALONE)],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('reason', BAD)
+def test_what_is_no_joint_state_is_left_out_and_counted(reason):
+    reader = JointStates()
+    block = reader.read([GOOD, *BAD[reason], GOOD])
+    assert [*block.good] == [True, *(False for _ in BAD[reason]), True]
+    assert +reader.left_out == {reason: len(BAD[reason])}
+    assert [*block.numbers[-1, 0]] == [1.0, 2.0]
+
+
+def test_a_command_may_have_efforts_alone():
+    command = TYPES[STATE](header(0), ['a'], np.array([]), np.array([]), np.array([1.5]))
+    reader = JointStates()
+    block = reader.read([encoded(command)])
+    assert block.good.all()
+    assert np.array_equal(block.numbers[0], [[np.nan], [np.nan], [1.5]], equal_nan=True)
+
+
+def test_joints_beyond_what_one_could_look_at_are_counted():
+    many = {f'j{i}': float(i) for i in range(MOST_JOINTS + 3)}
+    reader = JointStates()
+    block = reader.read([encoded(state(5, many))] * 2)
+    assert block.numbers.shape == (2, 3, MOST_JOINTS)
+    assert [*block.numbers[1, 0]] == [float(i) for i in range(MOST_JOINTS)]
+    assert +reader.left_out == {'joints beyond the first 64': 6}
+
+
+def test_ever_new_layouts_do_not_take_ever_more_time():
+    # Of one length, each with other names.
+    data = [encoded(state(5, {f'joint_{i:05}': 1.0})) for i in range(3000)]
+    reader = JointStates()
+    block = reader.read(data)
+    assert block.good.sum() == 64
+    assert +reader.left_out == {'ever new layouts': 2936}
+
+
+LEVELS = [0, 1, 2, 3]
+
+
+def array(*told):
+    pair = TYPES['diagnostic_msgs/msg/KeyValue']
+    status = TYPES['diagnostic_msgs/msg/DiagnosticStatus']
+    said = [
+        status(level, name, message, 'hw', [pair(key, value) for key, value in values.items()])
+        for level, name, message, values in told
+    ]
+    return TYPES[ARRAY](header(7), said)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(LEVELS),
+            st.text(max_size=9),
+            st.text(max_size=9),
+            st.dictionaries(st.text(max_size=5), st.text(max_size=5), max_size=3),
+        ),
+        max_size=4,
+    ),
+    st.booleans(),
+)
+def test_diagnostics_are_read_as_rosbags_writes_them(told, little):
+    clean = [
+        (level, *(text.replace('\0', '') for text in (name, message)),
+         {k.replace('\0', ''): v.replace('\0', '') for k, v in values.items()})
+        for level, name, message, values in told
+    ]  # fmt: skip
+    found = statuses(encoded(array(*clean), little))
+    assert [tuple(each) for each in found] == clean
+
+
+def test_diagnostics_are_read_as_the_node_writes_them():
+    pytest.importorskip('rclpy')
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+    from rclpy.serialization import serialize_message
+
+    message = DiagnosticArray()
+    message.header.stamp.sec = 7
+    for level, name, text, values in (
+        (1, 'linkage: tick', 'spät', {'Lost ticks': '3', '': ''}),
+        (0, 'linkage: crank', '', {}),
+    ):
+        pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+        status = DiagnosticStatus(level=bytes([level]), name=name, message=text, values=pairs)
+        message.status.append(status)
+    assert [tuple(each) for each in statuses(serialize_message(message))] == [
+        (1, 'linkage: tick', 'spät', {'Lost ticks': '3', '': ''}),
+        (0, 'linkage: crank', '', {}),
+    ]
+
+
+def test_what_says_to_hold_more_than_any_is_damaged():
+    whole = encoded(array(*[(0, '', '', {})] * 10_001))
+    assert statuses(whole) == []
+
+
+def test_damaged_diagnostics_say_nothing():
+    whole = encoded(array((2, 'tick', 'late', {'a': 'b'}), (0, 'crank', '', {})))
+    assert len(statuses(whole)) == 2
+    for cut in range(len(whole)):
+        assert statuses(whole[:cut]) == []
+    for at in range(12, len(whole)):
+        data = bytearray(whole)
+        data[at] = 0xFF
+        statuses(bytes(data))

@@ -1,0 +1,237 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What happened in a run is found in its bag at the time at which it was, and nowhere else."""
+
+from __future__ import annotations
+
+from math import acos, cos, sqrt
+
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.report.run import Window
+import numpy as np
+import pytest
+
+from .runs import but, curve, MS, on_lanes, read, recorded, Said, sample
+from ..ros.ticked import Moment  # noqa: TID252
+
+QUIET = 'faults: {quiet: {silence: {}}, worn: {stuck: {joint: rocker_joint}}}\n'
+SHORT_MEMORY = 'drive: {topic: {max_age: 0.2}}\n'
+SWINGING = 'four_bar: {a: 0.1, b: 0.05, c: 0.06, d: 0.12}\n'
+LIMIT = acos((0.1**2 + 0.12**2 - 0.11**2) / (2 * 0.1 * 0.12))  # coupler and rocker in line
+GAP = sqrt(0.1**2 + 0.12**2 - 2 * 0.1 * 0.12 * cos(LIMIT + 0.0005)) - 0.11
+FLAT = 'four_bar: {a: 0.25, b: 0.375, c: 0.375, d: 1.0}\n'  # stretched out at 0, and only there
+
+
+def asking(**asked):
+    """Return what asks for faults at ticks: `tick_200=('quiet', True)`."""
+    at = {int(key.removeprefix('tick_')): (change,) for key, change in asked.items()}
+    return lambda tick, moment: moment._replace(asked=at.get(tick, ()))
+
+
+def resetting(tick, moment):
+    return moment._replace(reset=tick == 300)
+
+
+def without_samples(first, last):
+    return lambda tick, m: m._replace(messages=()) if first <= tick <= last else m
+
+
+def without_ticks(first, last):
+    return lambda tick, m: None if first <= tick <= last else m
+
+
+def jumping_back(tick, moment):
+    if tick < 400:
+        return moment
+    return moment._replace(
+        time=moment.time - 500 * MS, messages=(sample(tick - 500, 0.007 * tick),)
+    )
+
+
+def swinging(tick, moment):
+    # At tick 600 the crank is within its limit, and then it goes on.
+    return moment._replace(messages=(sample(tick, LIMIT - 0.6005 + 0.001 * tick, 1.0),))
+
+
+def flat(tick, moment):
+    return moment._replace(messages=(sample(tick, -1.0 + 0.125 * tick, 1.0),))
+
+
+# Scene, what is changed of `turning`, its linkage, and what is on the lanes, in [ms].
+HAPPENS = {
+    'nothing': ('', None, '', {}),
+    'a fault, on and off': (
+        QUIET,
+        asking(tick_200=('quiet', True), tick_500=('quiet', False)),
+        '',
+        {
+            'fault': [(200, 500, 1, 'quiet (silence)')],
+            'silent': [(199, 500, 1, '')],
+            'withheld': [(200, 499, 300, '')],
+        },
+    ),
+    'faults that overlap, one to the end': (
+        QUIET,
+        asking(tick_200=('worn', True), tick_300=('quiet', True), tick_310=('quiet', False)),
+        '',
+        {
+            'fault': [(200, 999, 1, 'worn (stuck)'), (300, 310, 1, 'quiet (silence)')],
+            'silent': [(299, 310, 1, '')],
+            'withheld': [(300, 309, 10, '')],
+        },
+    ),
+    'a fault by the timeline of the scene': (
+        'faults: {quiet: {silence: {}, at: [0.25, 0.75], seconds: 0.1}}\n',
+        None,
+        '',
+        {
+            'fault': [(250, 350, 1, 'quiet (silence)'), (750, 850, 1, 'quiet (silence)')],
+            'silent': [(249, 350, 1, ''), (749, 850, 1, '')],
+            'withheld': [(250, 349, 100, ''), (750, 849, 100, '')],
+        },
+    ),
+    'a reset': ('', resetting, '', {'reset': [(300, 300, 1, '')]}),
+    # At 499 ms the sample of 299 ms is 200 ms old.
+    'no samples': (
+        SHORT_MEMORY,
+        without_samples(300, 699),
+        '',
+        {'stale': [(299, 700, 1, '')], 'silent': [(499, 700, 1, '')]},
+    ),
+    'no samples from some time on': (
+        SHORT_MEMORY,
+        without_samples(300, 999),
+        '',
+        {},  # nothing is recorded after the last joint state: nobody knows how long it went on
+    ),
+    'no ticks': ('', without_ticks(300, 349), '', {'silent': [(299, 350, 1, '')]}),
+    'a clock that jumps back': (
+        '',
+        jumping_back,
+        '',
+        {'jump': [(399, 399, 1, 'by 0.499 s')], 'reset': [(399, 399, 1, '')]},
+    ),
+    'a loop that opens': (
+        '',
+        swinging,
+        SWINGING,
+        {
+            'open': [(601, 999, 399, f'open, the links miss by {GAP:.3g} m')],
+            'silent': [(600, 999, 1, '')],
+        },
+    ),
+    'a toggle, and nothing else': (
+        'effects: {velocity: {}}\n',
+        flat,
+        FLAT,
+        {
+            'open': [(0, 15, 15, 'open, the links miss by 0.14 m')],
+            'toggle': [(8, 8, 1, '')],
+            'silent': [(0, 8, 1, ''), (8, 15, 1, '')],
+        },
+    ),
+    'readings that come late': (
+        'effects: {delay: {seconds: 0.002}}\n',
+        None,
+        '',
+        {'withheld': [(0, 1, 2, '')]},
+    ),
+}
+
+
+@pytest.mark.parametrize('block', [8192, 64])
+@pytest.mark.parametrize('name', HAPPENS)
+def test_what_happens_is_on_its_lane_at_its_time_and_nothing_on_the_others(
+    tmp_path, monkeypatch, name, block
+):
+    monkeypatch.setattr('linkage_ros.report.blocks._MOST_MESSAGES', block)
+    scene, changed, linkage, expected = HAPPENS[name]
+    ticks = 16 if linkage == FLAT else 1000
+    moments = but(ticks, changed or (lambda _tick, moment: moment))
+    more = {'linkage': linkage} if linkage else {}
+    assert on_lanes(read(recorded(tmp_path, scene, moments, **more))) == expected
+
+
+def test_blocks_make_no_difference(tmp_path, monkeypatch):
+    late = np.random.default_rng(7).integers(0, 90_000, 1000)
+    moments = but(
+        1000,
+        lambda tick, m: Moment(
+            m.time + int(late[tick]),
+            m.messages if tick % 7 and not 300 <= tick < 600 else (),
+            tick == 800,
+            (('quiet', tick == 100),) if tick in (100, 130) else (),
+        ),
+    )
+    said = [Said(ms + 0.5, 'tick', {'Lost ticks': ms}, ms // 200, 'm') for ms in range(0, 900, 97)]
+    bag = recorded(
+        tmp_path, f'{SHORT_MEMORY}{QUIET}effects: {{velocity: {{}}}}\n', moments, said=said
+    )
+
+    def all_of():
+        found = read(bag)
+        arrays = [array for each in found.curves for array in each.intervals[1:]]
+        counts = (found.lateness.counts, found.age.counts)
+        frames = [found.frames.times, *found.frames.values.values()]
+        return on_lanes(found), found.end, found.said, [*arrays, *counts, *frames]
+
+    *whole, arrays = all_of()
+    assert {'fault', 'stale', 'silent', 'reset', 'lost', 'health', 'withheld'} == {*whole[0]}
+    for size in (1, 50, 333):
+        monkeypatch.setattr('linkage_ros.report.blocks._MOST_MESSAGES', size)
+        *other, pieces = all_of()
+        assert other == whole
+        for one, two in zip(arrays, pieces, strict=True):
+            assert np.array_equal(one, two, equal_nan=True)
+
+
+TWO = """
+linkages:
+- {name: left, linkage: l.yaml}
+- {name: right, linkage: l.yaml}
+"""
+
+
+def both(tick, moment):
+    joints = ['left_crank_joint', 'right_crank_joint']
+    time = moment.time
+    if 300 <= tick < 700:
+        message = JointStateWriter(joints[:1]).write(time, [0.007 * tick], [7.0])
+    else:
+        message = JointStateWriter(joints).write(time, [0.007 * tick] * 2, [7.0] * 2)
+    return moment._replace(messages=(message,))
+
+
+def test_of_several_linkages_each_has_its_own_silence(tmp_path):
+    found = read(recorded(tmp_path, TWO, but(1000, both)))
+    # The other's sample is held for 0.2 s.
+    assert on_lanes(found) == {'silent': [(499, 700, 1, 'right')]}
+    left, right = found.linkages
+    assert (left.silent.count, right.silent.count) == (0, 1)
+
+
+def test_a_part_has_what_is_within_and_the_counts_of_all(tmp_path):
+    bag = recorded(
+        tmp_path, QUIET, but(1000, asking(tick_200=('quiet', True), tick_500=('quiet', False)))
+    )
+    whole, part = read(bag), read(bag, Window(400 * MS, 600 * MS))
+    assert on_lanes(part) == {
+        'fault': [(400, 500, 1, 'quiet (silence)')],
+        'silent': [(400, 500, 1, '')],
+        'withheld': [(400, 499, 100, '')],
+    }
+    assert curve(part, 'rocker_joint', 'position')[0] == [*range(500, 601)]
+    assert part.contents == whole.contents
+    assert part.end == whole.end

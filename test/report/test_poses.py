@@ -1,0 +1,145 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Links stand where the closure puts them, by the published joints alone, in the whole gallery."""
+
+from __future__ import annotations
+
+from cmath import exp, rect
+from dataclasses import replace
+
+from linkage_ros.drawing.figure import view
+from linkage_ros.drawing.link_frames import drawn_in_frames, link_frames
+from linkage_ros.drawing.shapes import carried_shapes, Circle, shapes
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.survey import samples, usual_inputs, Way
+from linkage_ros.report.poses import poses
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import read_yaml
+from linkage_ros.shipped import shipped
+import numpy as np
+import pytest
+
+FILES = sorted(shipped('linkages/four_bar.yaml').parent.glob('*.yaml'))
+GROUND, CRANK, COUPLER, ROCKER = 0.10, 0.04, 0.12, 0.08
+
+
+def closure_of(file):
+    return Closure(read_linkage(read_yaml(str(file))[0]))
+
+
+def published(closure, positions, inputs, prefix=''):
+    """Return what messages say of joints, by name."""
+    joints = np.array([position.joints for position in positions]).T
+    values = dict(zip(closure.linkage.joints, joints, strict=True))
+    for number, given in enumerate(closure.linkage.inputs):
+        values[given.joint] = np.array([each[number] for each in inputs])
+    return {prefix + name: value for name, value in values.items()}
+
+
+def some(closure):
+    """Return inputs at which a linkage closes, and its positions there."""
+    usual = usual_inputs(closure)
+    interval = Way(closure, usual).range_about(usual[0])
+    values = samples(interval, 24) if interval else [usual[0]]
+    inputs = [(value, *usual[1:]) for value in values]
+    found = [(each, closure.position(*each)) for each in inputs]
+    return zip(*((each, position) for each, position in found if position.joints), strict=True)
+
+
+@pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
+def test_points_are_where_the_closure_has_them(file):
+    closure = closure_of(file)
+    inputs, positions = some(closure)
+    names = [f'p_{given.joint}' for given in closure.linkage.inputs]
+    found = poses(closure, 'p_', published(closure, positions, inputs, 'p_'), names)
+    assert found.untold == ''
+    assert len(inputs) > 1
+    size = max(abs(place) for position in positions for place in closure.points(position).values())
+    for i, position in enumerate(positions):
+        for (link, point), place in closure.points(position).items():
+            if link not in closure.linkage.links or link == 'ground':
+                continue
+            x, y, angle = found.frames[i, found.links.index(link)]
+            at = complex(*closure.linkage.links[link][point])
+            assert abs(complex(x, y) + at * rect(1.0, angle) - place) < 1e-12 * size
+    assert found.apart.max() < 1e-12 * size
+
+
+@pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
+def test_shapes_in_frames_are_those_of_the_drawing(file):
+    closure = closure_of(file)
+    shown = view(closure, usual_inputs(closure))
+    data = drawn_in_frames(shown)
+    frames = {**link_frames(closure, shown.position), 'ground': (0j, 0.0)}
+    size = data['size']
+    drawn = carried_shapes(closure, shown.position, size, shown.sweep.travels)
+    assert len(data['shapes']) == len(shapes(closure, shown.position, size, shown.sweep.travels))
+    for told, (link, shape) in zip(data['shapes'], drawn, strict=True):
+        assert (told['link'], told['role']) == (link, shape.role)
+        place, angle = frames[told['link']]
+        flat = told['points']
+        points = [
+            place + complex(x, y) * exp(1j * angle)
+            for x, y in zip(flat[::2], flat[1::2], strict=True)
+        ]
+        if isinstance(shape, Circle):
+            expected = (shape.centre,)
+        else:
+            expected = shape.corners if told.get('closed') else (shape.start, shape.end)
+        assert max(abs(a - b) for a, b in zip(points, expected, strict=True)) < 1e-3 * size
+
+
+def four_bar():
+    return closure_of(shipped('linkages/four_bar.yaml'))
+
+
+def test_a_wrong_sensor_lets_links_come_apart_by_what_it_is_wrong():
+    closure = four_bar()
+    position = closure.position(1.0)
+    values = published(closure, [position] * 2, [(1.0,)] * 2)
+    values['rocker_joint'] = values['rocker_joint'] + np.array([0.0, 0.3])
+    found = poses(closure, '', values, ['crank_joint'])
+    rocker = abs(complex(*closure.linkage.links['rocker']['B']))
+    # The chord of the angle.
+    assert found.apart == pytest.approx([0.0, 2 * rocker * np.sin(0.15)], abs=1e-12)
+
+
+def test_where_a_joint_is_not_told_there_is_no_pose():
+    closure = four_bar()
+    position = closure.position(1.0)
+    values = published(closure, [position] * 2, [(1.0,)] * 2)
+    values['coupler_joint'] = values['coupler_joint'] + np.array([0.0, np.nan])
+    found = poses(closure, '', values, ['crank_joint'])
+    assert np.isfinite(found.frames[0]).all()
+    assert np.isnan(found.frames[1]).all()
+    assert np.isnan(found.apart[1])
+
+
+def test_where_joints_do_not_tell_of_a_link_the_loops_are_closed_at_the_input():
+    whole = four_bar()
+    joints = {k: v for k, v in whole.linkage.joints.items() if k != 'coupler_joint'}
+    closure = Closure(replace(whole.linkage, joints=joints))
+    inputs = [(1.0,), (np.nan,), (2.0,)]
+    values = {'crank_joint': np.array([1.0, np.nan, 2.0]), 'rocker_joint': np.zeros(3)}
+    found = poses(closure, '', values, ['crank_joint'])
+    assert 'coupler' in found.untold
+    assert np.isnan(found.frames[1]).all()
+    for i in (0, 2):
+        frames = link_frames(whole, whole.position(*inputs[i]))
+        for number, link in enumerate(found.links):
+            x, y, angle = found.frames[i, number]
+            assert abs(complex(x, y) - frames[link].place) < 1e-12
+            assert abs(rect(1.0, angle) - rect(1.0, frames[link].angle)) < 1e-12
