@@ -164,7 +164,7 @@ def _events(run: Run) -> Iterator[str]:
         if key in run.lanes and key not in there and not key.startswith('told_')
     ]
     if missing:
-        yield f'<p class="note">None: {escape("; ".join(missing))}.</p>'
+        yield f'<p class="note">None of these: {escape("; ".join(missing))}.</p>'
     yield '</section>'
 
 
