@@ -57,6 +57,13 @@ def opened(path: Path, stop: Event) -> Bag:
     return read_bag(path, allow_truncated=True, told=look)
 
 
+def beside(bag: Path, suffix: str) -> Path:
+    """Return the file beside a bag that is named as it, with a suffix behind its name."""
+    # The folder that one is in has no name.
+    named = bag if bag.name not in ('', '..') else bag.resolve()
+    return named.with_name(named.name + suffix) if named.name else named
+
+
 def unfinished_text(bag: Bag) -> str:
     """Return why an end is missing, of a bag that is truncated."""
     text = 'its recording was killed, or still runs'

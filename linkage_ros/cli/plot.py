@@ -24,7 +24,7 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.cli.bag_reading import opened
+from linkage_ros.cli.bag_reading import beside, opened
 from linkage_ros.effects.turns import wrapped
 from linkage_ros.errors import BagError, LinkageError
 from linkage_ros.joint_state import JointStateReader, Rejection
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Draw the bag."""
-    picture = arguments.output or Path(f'{str(arguments.bag).rstrip("/")}.png')
+    picture = arguments.output or beside(arguments.bag, '.png')
     draw(arguments.bag, picture, stop)
     print(picture)
     return 0
