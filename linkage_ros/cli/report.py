@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from contextlib import suppress
 from importlib.util import find_spec
 from math import isfinite
 import os
@@ -36,7 +35,7 @@ from typing import Any
 from linkage_ros.bag.reading.layout import layout_of
 from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.cli.bag_account import account_of, scene_account
-from linkage_ros.cli.bag_reading import gaps, opened
+from linkage_ros.cli.bag_reading import beside, gaps, opened
 from linkage_ros.cli.info import tables
 from linkage_ros.cli.progress import progress
 from linkage_ros.errors import LinkageError
@@ -47,6 +46,7 @@ from linkage_ros.report.run import Run, Window
 from linkage_ros.report.tables import TableOf
 from linkage_ros.report.words import seconds_text
 from linkage_ros.scene.scene import Scene
+from linkage_ros.scene.whole_file import replace_whole
 from linkage_ros.stop import StoppedError
 
 _MIB = 2**20
@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Write the page."""
-    file = arguments.output or _beside(arguments.bag)
+    file = arguments.output or beside(arguments.bag, '.html')
     _check(file)
     window = _window(arguments.since, arguments.until)
     # What is no text, of a name of a file, say, comes as its bytes' numbers.
@@ -188,13 +188,6 @@ def _window(since: float | None, until: float | None) -> Window:
     return Window(*ends)
 
 
-def _beside(bag: Path) -> Path:
-    """Return the file beside a bag that is named as it."""
-    # The folder that one is in has no name.
-    named = bag if bag.name not in ('', '..') else bag.resolve()
-    return named.with_name(f'{named.name}.html') if named.name else named
-
-
 def _check(file: Path) -> None:
     """Refuse what cannot be written, before anything is read."""
     if find_spec('plotly') is None:
@@ -210,14 +203,9 @@ def _check(file: Path) -> None:
 
 def _write(file: Path, page: bytes) -> None:
     """Write a file as a whole, or not at all."""
-    # Where it leads elsewhere, it is that which is written.
-    target = Path(os.path.realpath(file))
-    part = target.with_name(f'{target.name}.part')
     try:
-        part.write_bytes(page)
-        part.replace(target)
+        # Where it leads elsewhere, it is that which is written.
+        replace_whole(Path(os.path.realpath(file)), page)
     except OSError as error:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
         reason = f'cannot be written: {error.strerror or error}'
         raise LinkageError(file, reason, 'name another file with -o') from None

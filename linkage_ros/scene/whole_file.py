@@ -48,13 +48,22 @@ def write_whole(file: str | Path, data: bytes) -> None:
             raise LinkageError(file, 'is there already and is no file', 'name another file')
         if target.exists() and not os.access(target, os.W_OK):
             raise PermissionError(0, 'Permission denied')
-        _replace(target, data)
+        replace_whole(target, data)
     except (OSError, ValueError, RuntimeError) as error:  # the last for links in a circle
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise LinkageError(file, f'cannot be written ({reason})', 'name another file') from None
 
 
-def _replace(target: Path, data: bytes) -> None:
+def replace_whole(target: Path, data: bytes) -> None:
+    """
+    Write a file as `write_whole` does, whatever is in its place; no link is followed.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be written; what was there stays, and nothing is left beside it.
+
+    """
     temporary = target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'
     try:
         with temporary.open('xb') as stream:

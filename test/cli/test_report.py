@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import replace
 import errno
 import json
+import os
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -141,12 +142,10 @@ def test_on_a_full_disk_the_page_that_was_there_stays(
     page = tmp_path / 'x.html'
     page.write_text('old')
 
-    def full(self: Path, data: bytes) -> None:
-        with self.open('wb') as stream:
-            stream.write(data[:1000])
+    def full(_descriptor: int) -> None:
         raise OSError(errno.ENOSPC, 'No space left on device')
 
-    monkeypatch.setattr(Path, 'write_bytes', full)
+    monkeypatch.setattr(os, 'fsync', full)
     before = {*tmp_path.iterdir()}
     assert refused(bag, '-o', page) == (
         f'{page}: cannot be written: No space left on device; name another file with -o'
