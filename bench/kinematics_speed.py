@@ -30,7 +30,7 @@ from bench.processes import BenchError, ROOT
 from bench.report import say, Table
 from linkage_ros.kinematics.batch.solve import Batch
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.diagonal import margin
+from linkage_ros.kinematics.rounding import margin
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 import numpy as np

@@ -30,7 +30,7 @@ from linkage_ros.cli.check import describe_group
 from linkage_ros.cli.linkage_file import angle_text, fixed, open_linkage
 from linkage_ros.drawing.figure import picture, view
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.groups import Driven
+from linkage_ros.kinematics.structure import Driven
 from linkage_ros.kinematics.survey import conditionings, transmission_angles, usual_inputs, Way
 from PIL import Image
 

@@ -26,7 +26,7 @@ from linkage_ros.cli.linkage_file import angle_text, open_linkage, value_text
 from linkage_ros.cli.tables import show, Table
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.four_bars import four_bars
-from linkage_ros.kinematics.groups import Driven, Dyad, Group
+from linkage_ros.kinematics.structure import Driven, Dyad, Group
 from linkage_ros.kinematics.survey import (
     conditionings,
     Extreme,

@@ -33,8 +33,8 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.groups import Joint
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.structure import Joint
 import numpy as np
 from numpy.typing import NDArray
 

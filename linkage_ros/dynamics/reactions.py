@@ -40,9 +40,9 @@ from typing import NamedTuple
 from linkage_ros.dynamics.joint_matrix import Array, JointMatrix
 from linkage_ros.dynamics.mechanics import Mechanics, resistance, stretched
 from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
-from linkage_ros.kinematics.groups import Joint
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.structure import Joint
 from linkage_ros.tuples import new
 import numpy as np
 

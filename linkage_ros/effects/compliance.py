@@ -40,7 +40,7 @@ from typing import NamedTuple
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Stage, yielding
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.groups import Joint
+from linkage_ros.kinematics.structure import Joint
 from linkage_ros.parameters import each, Number
 
 _STIFFEST = 1e15

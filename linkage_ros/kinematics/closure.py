@@ -27,13 +27,14 @@ from functools import cached_property
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.checks import check
-from linkage_ros.kinematics.groups import find_groups, Structure
+from linkage_ros.kinematics.groups import find_groups
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.nearness import critical_inputs, Nearness, nearness
 from linkage_ros.kinematics.ranges import input_ranges, InputRange
 from linkage_ros.kinematics.solution import Planner
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import Pose, State
+from linkage_ros.kinematics.structure import Structure
 from linkage_ros.tuples import new
 
 if TYPE_CHECKING:

@@ -30,12 +30,12 @@ from linkage_ros.kinematics.equations import (
     OnLine,
     Parallel,
 )
-from linkage_ros.kinematics.groups import Joint
 from linkage_ros.kinematics.iteration import Iteration
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.starting_pose import starting_pose
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State, Step
+from linkage_ros.kinematics.structure import Joint
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.solution import Planner

@@ -22,8 +22,8 @@ from itertools import product
 from typing import NamedTuple
 
 from linkage_ros.kinematics.grashof import four_bar_type, FourBarType
-from linkage_ros.kinematics.groups import Driven, Dyad, Structure
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.structure import Driven, Dyad, Structure
 
 
 class FourBar(NamedTuple):

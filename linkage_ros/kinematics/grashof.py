@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import fsum
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import margin
+from linkage_ros.kinematics.rounding import margin
 
 
 class FourBarType(NamedTuple):

@@ -35,7 +35,6 @@ from collections.abc import Sequence
 from math import ceil, inf, remainder, tau
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
 from linkage_ros.kinematics.equations import (
     along,
     Array,
@@ -45,6 +44,7 @@ from linkage_ros.kinematics.equations import (
     line_motion,
     OnLine,
 )
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.starting_pose import StartingPose
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State, Step

@@ -26,11 +26,11 @@ from cmath import rect
 from collections.abc import Iterable, Mapping
 from math import frexp, hypot, ldexp
 
-from linkage_ros.kinematics.groups import Joint, Structure
 from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
 from linkage_ros.kinematics.linkage import GROUND, Linkage, Point
 from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail
 from linkage_ros.kinematics.step import Step
+from linkage_ros.kinematics.structure import Joint, Structure
 
 
 class KnownLinks:

@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import inf, pi, remainder, sin, sqrt, tau
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.diagonal import CrankDiagonal
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure, Position

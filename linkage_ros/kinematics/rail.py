@@ -28,7 +28,7 @@ from cmath import phase, rect
 from math import inf, pi, sqrt
 from typing import NamedTuple, Protocol
 
-from linkage_ros.kinematics.diagonal import margin, reach, root_of
+from linkage_ros.kinematics.rounding import margin, reach, root_of
 from linkage_ros.kinematics.step import facing, State
 from linkage_ros.tuples import new
 

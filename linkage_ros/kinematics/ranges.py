@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator
 from math import acos, asin, inf, pi, sqrt, tau
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.diagonal import CrankDiagonal
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
 from linkage_ros.kinematics.status import Status

@@ -21,13 +21,8 @@ from cmath import phase, rect
 from math import inf
 
 from linkage_ros.errors import DefinitionError, quoted
-from linkage_ros.kinematics.diagonal import (
-    AnyDiagonal,
-    CrankDiagonal,
-    FreeDiagonal,
-    ROUNDING,
-    UNIT_ROUNDOFF,
-)
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
+from linkage_ros.kinematics.diagonal import AnyDiagonal
 from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import Carry, DrivenRRRDyad, Side
 from linkage_ros.kinematics.dyads.prp import PRPDyad
@@ -35,12 +30,14 @@ from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad, swivel_diagonal
 from linkage_ros.kinematics.dyads.rrp import RRPDyad
 from linkage_ros.kinematics.dyads.rrr import crank_diagonal, RRRDyad
-from linkage_ros.kinematics.groups import Driven, Dyad, Iterated, Structure
+from linkage_ros.kinematics.free_diagonal import FreeDiagonal
 from linkage_ros.kinematics.known_links import KnownLinks
 from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
 from linkage_ros.kinematics.linkage import Input, Linkage
 from linkage_ros.kinematics.places import Turned
 from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
+from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
+from linkage_ros.kinematics.structure import Driven, Dyad, Iterated, Structure
 
 _SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
 _SIDES['RPR'] = _SIDES['RRP']

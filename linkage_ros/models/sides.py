@@ -30,8 +30,9 @@ from math import pi, remainder, tau
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.groups import Dyad, find_groups, Iterated
+from linkage_ros.kinematics.groups import find_groups
 from linkage_ros.kinematics.linkage import Linkage, Point, Pose, Side
+from linkage_ros.kinematics.structure import Dyad, Iterated
 from linkage_ros.kinematics.survey import usual_inputs
 
 Poses = Mapping[str, tuple[complex, float]]

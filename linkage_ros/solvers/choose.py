@@ -38,8 +38,8 @@ from typing import Any
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.groups import Dyad, Iterated
 from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.structure import Dyad, Iterated
 from linkage_ros.kinematics.survey import usual_inputs, Way
 from linkage_ros.solvers.newton import NewtonClosure
 from linkage_ros.solvers.newton_dyad import LEAST_SINE

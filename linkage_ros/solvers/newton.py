@@ -40,11 +40,11 @@ from math import copysign
 from typing import Any, TYPE_CHECKING
 
 from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
-from linkage_ros.kinematics.groups import Dyad, Iterated
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import PLACED, State, Step
+from linkage_ros.kinematics.structure import Dyad, Iterated
 from linkage_ros.kinematics.survey import usual_inputs
 from linkage_ros.parameters import number
 from linkage_ros.solvers.knots import Knots

@@ -30,7 +30,8 @@ from __future__ import annotations
 
 from cmath import rect
 
-from linkage_ros.kinematics.diagonal import cross, UNIT_ROUNDOFF
+from linkage_ros.kinematics.plane import cross
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.solvers.loops import Loops, Vector
 
 _STEPS = 12

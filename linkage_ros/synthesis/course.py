@@ -31,7 +31,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 import numpy as np
 from numpy.typing import NDArray
 

@@ -38,7 +38,7 @@ from linkage_ros.accuracy.solving.poses import (
 from linkage_ros.accuracy.solving.shown import part_of
 from linkage_ros.accuracy.spread import Spread
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.groups import Dyad
+from linkage_ros.kinematics.structure import Dyad
 from mpmath import mp, mpf
 import pytest
 

@@ -27,8 +27,8 @@ from math import radians, remainder, sqrt, tau
 from pathlib import Path
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.groups import Dyad, Iterated
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.structure import Dyad, Iterated
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 import pytest

@@ -23,9 +23,10 @@ import random
 
 from linkage_ros.kinematics import closure as closure_module
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.groups import Driven, find_groups, Iterated, Structure
+from linkage_ros.kinematics.groups import find_groups
 from linkage_ros.kinematics.linkage import GROUND, Linkage, Pose
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.structure import Driven, Iterated, Structure
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 import pytest

@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from math import tan
 from typing import Any, NamedTuple, Protocol, TypeAlias, TypeVar
 
-from linkage_ros.kinematics.diagonal import ROUNDING, UNIT_ROUNDOFF
+from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 import numpy as np
 from numpy.typing import NDArray

@@ -47,8 +47,9 @@ from linkage_ros.kinematics.batch.arrays import (
     sine_cosine,
     TOGGLE,
 )
-from linkage_ros.kinematics.diagonal import CrankDiagonal, ROUNDING, SMALLEST, UnsignedDiagonal
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.dyads.rrr import RRRDyad
+from linkage_ros.kinematics.rounding import ROUNDING, SMALLEST
 import numpy as np
 
 Pair: TypeAlias = tuple[Array, Array]

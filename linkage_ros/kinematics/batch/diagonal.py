@@ -33,13 +33,10 @@ from linkage_ros.kinematics.batch.arrays import (
     sine_cosine,
     States,
 )
-from linkage_ros.kinematics.diagonal import (
-    CrankDiagonal,
-    Diagonal,
-    FreeDiagonal,
-    SMALLEST,
-    UnsignedDiagonal,
-)
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
+from linkage_ros.kinematics.diagonal import Diagonal
+from linkage_ros.kinematics.free_diagonal import FreeDiagonal
+from linkage_ros.kinematics.rounding import SMALLEST
 from linkage_ros.tuples import new
 import numpy as np
 

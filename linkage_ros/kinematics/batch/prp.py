@@ -20,8 +20,9 @@ from __future__ import annotations
 from typing import Any
 
 from linkage_ros.kinematics.batch.arrays import codes_of, States, turned
-from linkage_ros.kinematics.diagonal import cross, ROUNDING
 from linkage_ros.kinematics.dyads.prp import PRPDyad, PRPPose, resolved
+from linkage_ros.kinematics.plane import cross
+from linkage_ros.kinematics.rounding import ROUNDING
 from linkage_ros.tuples import new
 import numpy as np
 

@@ -20,8 +20,8 @@ from __future__ import annotations
 from typing import Any
 
 from linkage_ros.kinematics.batch.arrays import codes_of, States
-from linkage_ros.kinematics.diagonal import SMALLEST
 from linkage_ros.kinematics.dyads.rrp import RRPDyad, RRPPose
+from linkage_ros.kinematics.rounding import SMALLEST
 from linkage_ros.tuples import new
 import numpy as np
 

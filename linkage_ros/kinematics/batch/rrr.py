@@ -24,8 +24,9 @@ from __future__ import annotations
 from typing import Any
 
 from linkage_ros.kinematics.batch.arrays import Array, codes_of, States
-from linkage_ros.kinematics.diagonal import Diagonal, SMALLEST
+from linkage_ros.kinematics.diagonal import Diagonal
 from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose
+from linkage_ros.kinematics.rounding import SMALLEST
 from linkage_ros.tuples import new
 import numpy as np
 

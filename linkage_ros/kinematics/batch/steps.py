@@ -36,7 +36,7 @@ from linkage_ros.kinematics.batch.rail import CrankRailArrays, FreeRailArrays, U
 from linkage_ros.kinematics.batch.rpr import RPRArrays
 from linkage_ros.kinematics.batch.rrp import RRPArrays
 from linkage_ros.kinematics.batch.rrr import RRRArrays
-from linkage_ros.kinematics.diagonal import CrankDiagonal, FreeDiagonal, UnsignedDiagonal
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import DrivenRRRDyad
 from linkage_ros.kinematics.dyads.prp import PRPDyad
@@ -44,6 +44,7 @@ from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad
 from linkage_ros.kinematics.dyads.rrp import RRPDyad
 from linkage_ros.kinematics.dyads.rrr import RRRDyad
+from linkage_ros.kinematics.free_diagonal import FreeDiagonal
 from linkage_ros.kinematics.iteration import Iteration
 from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
 from linkage_ros.kinematics.rail import CrankRail, FreeRail, UnsignedRail

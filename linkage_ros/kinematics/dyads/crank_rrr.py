@@ -25,13 +25,10 @@ from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
 
-from linkage_ros.kinematics.diagonal import (
-    CrankDiagonal,
-    Diagonal,
-    ROUNDING,
-    SMALLEST,
-)
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
+from linkage_ros.kinematics.diagonal import Diagonal
 from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose, sums
+from linkage_ros.kinematics.rounding import ROUNDING, SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new

@@ -28,7 +28,7 @@ from __future__ import annotations
 from cmath import phase
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import folded, free_diagonal, Growth, GrowthChange
+from linkage_ros.kinematics.diagonal import Growth, GrowthChange
 from linkage_ros.kinematics.dyads.rrr import (
     close_triangle,
     RRRPose,
@@ -36,6 +36,8 @@ from linkage_ros.kinematics.dyads.rrr import (
     triangle_accelerations,
     triangle_rates,
 )
+from linkage_ros.kinematics.free_diagonal import free_diagonal
+from linkage_ros.kinematics.plane import folded
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import facing, State
 

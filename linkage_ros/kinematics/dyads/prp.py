@@ -33,7 +33,8 @@ from cmath import rect
 from math import atan2
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import cross, ROUNDING
+from linkage_ros.kinematics.plane import cross
+from linkage_ros.kinematics.rounding import ROUNDING
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new

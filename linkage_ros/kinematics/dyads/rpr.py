@@ -39,14 +39,9 @@ from __future__ import annotations
 from math import atan2, inf
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import (
-    AnyDiagonal,
-    CrankDiagonal,
-    Diagonal,
-    Growth,
-    margin,
-    UnsignedDiagonal,
-)
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
+from linkage_ros.kinematics.diagonal import AnyDiagonal, Diagonal, Growth
+from linkage_ros.kinematics.rounding import margin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new

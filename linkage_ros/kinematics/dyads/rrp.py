@@ -33,8 +33,8 @@ from __future__ import annotations
 from math import atan2
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import SMALLEST
 from linkage_ros.kinematics.rail import Rail, Sight
+from linkage_ros.kinematics.rounding import SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new

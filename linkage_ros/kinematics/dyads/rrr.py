@@ -52,17 +52,10 @@ from fractions import Fraction
 from math import atan2
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import (
-    AnyDiagonal,
-    CrankDiagonal,
-    Diagonal,
-    folded,
-    Growth,
-    GrowthChange,
-    margin,
-    SMALLEST,
-    UnsignedDiagonal,
-)
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
+from linkage_ros.kinematics.diagonal import AnyDiagonal, Diagonal, Growth, GrowthChange
+from linkage_ros.kinematics.plane import folded
+from linkage_ros.kinematics.rounding import margin, SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new

@@ -29,7 +29,7 @@ from math import degrees
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.batch.arrays import Complex
-from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
 from linkage_ros.synthesis.motion.pivots import fixed_pivots, Links, moving_pivots, TRUSTED
 from linkage_ros.synthesis.motion.poses import check_task, columns, Pose

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.batch.arrays import Array, Complex
-from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 import numpy as np
 
 SAME = 1e-12

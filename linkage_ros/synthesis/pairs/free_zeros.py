@@ -52,7 +52,7 @@ from math import cos, hypot, log10, pi, sin
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.diagonal import SMALLEST, UNIT_ROUNDOFF
+from linkage_ros.kinematics.rounding import SMALLEST, UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar
 from linkage_ros.synthesis.pairs.checks import check_pairs, wanted_of
 from linkage_ros.synthesis.pairs.freudenstein import TRUSTED

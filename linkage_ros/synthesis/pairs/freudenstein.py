@@ -36,7 +36,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar
 from linkage_ros.synthesis.double_double import Array
 from linkage_ros.synthesis.pairs.checks import centred, check_pairs, dependent, MOVE, wanted_of

@@ -31,7 +31,7 @@ from collections.abc import Sequence
 from math import pi
 from typing import Literal, NamedTuple
 
-from linkage_ros.kinematics.diagonal import UNIT_ROUNDOFF
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.synthesis.double_double import (
     minus,
     over,

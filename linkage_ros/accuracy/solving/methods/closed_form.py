@@ -29,9 +29,9 @@ from linkage_ros.accuracy.solving.methods.method import (
     RATE,
 )
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.groups import Iterated
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.structure import Iterated
 
 NAME, ITERATED = 'closed form', 'iteration from knots'
 NAMES = (NAME, ITERATED)

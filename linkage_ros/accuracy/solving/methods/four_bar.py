@@ -22,8 +22,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.four_bars import four_bars
-from linkage_ros.kinematics.groups import Driven, find_groups
+from linkage_ros.kinematics.groups import find_groups
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
+from linkage_ros.kinematics.structure import Driven
 
 
 class PlainFourBar(NamedTuple):

@@ -1,0 +1,191 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The diagonal between two links that are pinned together: crank pin to ground pivot."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import atan2, cos, fsum, inf, sin, sqrt
+
+from linkage_ros.kinematics.diagonal import Diagonal, Growth, GrowthChange
+from linkage_ros.kinematics.rounding import reach, root_of, SMALLEST
+from linkage_ros.kinematics.step import State
+from linkage_ros.tuples import new
+
+
+class CrankDiagonal:
+    """
+    The diagonal between two links that are pinned together at O.
+
+    With a = OA, d = OD and φ the angle from OD to OA, near = 2·√(ad)·sin(φ/2) and far =
+    2·√(ad)·cos(φ/2)::
+
+        s²  = (d − a)² + near²
+        dir = dir(OD) + atan2(−a·sin φ, (d − a) + 2a·sin²(φ/2))
+
+        s² − lower² = ((d − a)² − lower²) + near²
+        upper² − s² = (upper² − (a + d)²) + far² = (upper² − (d − a)²) − near²
+
+    Where a and d are long beside upper, so that no stretch can be near s = a + d, the last line is
+    taken: the one before it would cancel a + d. The brackets are constants of the linkage.
+
+    Parameters
+    ----------
+    a, d
+        Lengths of OA and OD, in one unit; at best near 1.
+    fold, stretch
+        The margins |d − a| − lower and upper − a − d, correctly rounded; stretch is infinite where
+        the dyad has no upper limit.
+    limits
+        lower and upper.
+    arms
+        Indices, among the coordinates, of the directions of OA and OD.
+    offset
+        φ less the difference of those two coordinates, in (−π, π] rad.
+
+    """
+
+    __slots__ = (
+        '_constants', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits', 'sides',
+        'stretch_margin',
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        a: float,
+        d: float,
+        fold: float,
+        stretch: float,
+        limits: tuple[float, float],
+        arms: tuple[int, int] = (1, 0),
+        offset: float = 0.0,
+    ) -> None:
+        lower, upper = limits
+        least = abs(d - a)
+        self.least = (Fraction(d) - Fraction(a)) ** 2
+        self.sides = (a, d)
+        self.limits = limits
+        self.fold_margin, self.stretch_margin = fold, stretch
+        self.brackets = (fold * (least + lower), stretch * (upper + a + d))
+        short_pair = a + d > 2.0 * upper
+        whole = (fsum((upper, -max(a, d), min(a, d)))) * (upper + least) if short_pair else 0.0
+        # Two roots, since a·d may underflow where the lengths differ by many decades.
+        self._constants = (a, d - a, 2.0 * sqrt(a) * sqrt(d), *self.brackets, short_pair, whole)
+        self.arms = (*arms, offset)
+        self.half_turn = (sin(0.5 * offset), cos(0.5 * offset))
+
+    def at(self, known: State) -> Diagonal:
+        """Return the diagonal."""
+        x = known[0]
+        a, difference, root, fold, stretch, short_pair, whole = self._constants
+        first, second, offset = self.arms
+        base = x[second]
+        half = 0.5 * (x[first] - base)
+        half_sine, half_cosine = sin(half), cos(half)
+        if offset:
+            # Not added to an angle that may have turned a thousand times.
+            sine, cosine = self.half_turn
+            half_sine, half_cosine = (
+                half_sine * cosine + half_cosine * sine,
+                half_cosine * cosine - half_sine * sine,
+            )
+        near, far = root * half_sine, root * half_cosine
+        excess = near * near
+        square = difference * difference + excess
+        lower, upper = self.limits
+        if square < SMALLEST:
+            return Diagonal(0.0, 0.0, 0.0, 0.0, lower, near, far, 0.0)
+        direction = base + atan2(
+            -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
+        )
+        root_fold, missing = reach(fold, near)
+        if missing:
+            gap = missing / (sqrt(square) + lower)
+            return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0)
+        if upper == inf:
+            return new(Diagonal, (square, direction, root_fold, inf, 0.0, near, far, excess))
+        if short_pair:
+            root_stretch, missing = root_of(whole - near * near, abs(whole) + near * near)
+        else:
+            root_stretch, missing = reach(stretch, far)
+        gap = missing / (sqrt(square) + upper) if missing else 0.0
+        return new(
+            Diagonal,
+            (square, direction, root_fold, root_stretch, gap, near, far, excess),
+        )
+
+    def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> Growth:
+        """
+        Return φ̇·(q − i·p), and what OD turns by.
+
+        With n̂ the diagonal's direction turned left::
+
+            p = OA·AD/s² = −d(direction)/dφ = (a·(d − a) − near²/2)/s²
+            q = OA·n̂/s   = (ds/dφ)/s        = near·far/(2s²)
+        """
+        v = speeds[0]
+        first, second, _ = self.arms
+        square, _, _, _, _, near, far, _ = diagonal
+        a, difference = self._constants[:2]
+        p = (a * difference - 0.5 * near * near) / square
+        q = 0.5 * near * far / square
+        base = v[second]
+        return new(Growth, (q - 1j * p, v[first] - base, base))
+
+    def accelerations(
+        self, diagonal: Diagonal, growth: Growth, _known: State, _speeds: State, changes: State
+    ) -> GrowthChange:
+        """
+        Return the derivative of `rates`.
+
+        By φ, p' = −q·(1 + 2p) with 1 + 2p = (d² − a²)/s², and q' = p + p² − q². The bend is::
+
+            ((d − a)² − lower²)·far²/(s² − lower²)/(4s²)
+              − (upper² − (a + d)²)·near²/(upper² − s²)/(4s²)
+
+        which is q' + q² − q²·cot(σβ)·cot(σγ') of an RRR dyad, and q' + q²·(1 − c²) of an RPR one,
+        with what cancels there taken out: at a change point one of the brackets is 0.
+        """
+        a = changes[0]
+        first, second, _ = self.arms
+        q, p = growth.unit.real, -growth.unit.imag
+        square, _, fold, stretch, _, near, far, _ = diagonal
+        (short, long), (fold_bracket, stretch_bracket) = self.sides, self.brackets
+        turn = p + (p - q) * (p + q) + 1j * (q * ((long - short) * (long + short) / square))
+        bend = 0.0
+        if fold_bracket:
+            bend = fold_bracket * (far / fold) * (far / fold)
+        if self.limits[1] == inf:
+            bend -= near * near
+        elif stretch_bracket:
+            bend -= stretch_bracket * (near / stretch) * (near / stretch)
+        return new(GrowthChange, (turn, a[first] - a[second], a[second], 0.25 * bend / square))
+
+
+class UnsignedDiagonal(CrankDiagonal):
+    """
+    The diagonal between two links neither of which an input turns against the ground.
+
+    Their angles are known but for whole turns, and with them the sign of a half angle. So a change
+    point is not passed: the assembly stays the one that is named.
+    """
+
+    __slots__ = ()
+
+    def at(self, known: State) -> Diagonal:
+        """Return the diagonal."""
+        found = super().at(known)
+        return found._replace(fold=abs(found.fold), stretch=abs(found.stretch))

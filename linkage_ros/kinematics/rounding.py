@@ -1,0 +1,70 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""When a sum that decides something is zero: what rounding does to lengths and to reaches."""
+
+from __future__ import annotations
+
+from math import fsum, sqrt
+
+UNIT_ROUNDOFF = 2.0**-53
+
+SMALLEST = 2.0**-1020
+"""What is smaller is taken for zero: its inverse would not be a number any more."""
+
+ROUNDING = 16.0 * UNIT_ROUNDOFF
+"""Bound of the error of a reach, relative to the size of its terms."""
+
+
+def margin(*lengths: float) -> float:
+    """
+    Return a sum of signed lengths that is a constant of a linkage, correctly rounded.
+
+    Lengths come from files, in decimals: what cancels but for their rounding was meant to cancel,
+    and is 0.
+    """
+    total = fsum(lengths)
+    return 0.0 if abs(total) <= 4.0 * UNIT_ROUNDOFF * fsum(map(abs, lengths)) else total
+
+
+def reach(constant: float, part: float) -> tuple[float, float]:
+    """
+    Return the root of ``constant + part²``, and that sum where it is negative.
+
+    A dyad that folds or stretches does so where such a sum, its reach, goes to zero. The constant
+    is a bracket of the linkage; the part is signed by the half angle. Where the constant is zero,
+    the root is the part and has its sign. A sum within its own rounding error of zero is zero:
+    those are the last few floats on either side of a toggle, where the rate has no correct digit.
+
+    Returns
+    -------
+    root : float
+        0 at a toggle.
+    missing : float
+        0 where the dyad closes, else what is missing of the sum.
+
+    """
+    if constant == 0.0:
+        return part, 0.0
+    square = part * part
+    return root_of(constant + square, abs(constant) + square)
+
+
+def root_of(total: float, size: float) -> tuple[float, float]:
+    """Return root and what is missing as `reach` does, of a sum whose terms are of a size."""
+    rounding = ROUNDING * size
+    if total > rounding:
+        return sqrt(total), 0.0
+    return 0.0, (0.0 if total >= -rounding else -total)
