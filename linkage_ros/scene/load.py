@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, replace
+from dataclasses import replace
 from importlib import import_module
 from os.path import isfile
 from pathlib import Path
@@ -26,28 +26,24 @@ from typing import Any, Literal
 
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS, in_order, module_of
-from linkage_ros.errors import DefinitionError, did_you_mean, quoted
-from linkage_ros.faults.fault import Fault, FAULTS
+from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.parameters import declared
+from linkage_ros.scene.faults import read_faults
 from linkage_ros.scene.linkage_file import looks_like_linkage, read_linkage
 from linkage_ros.scene.loads import read_loads
-from linkage_ros.scene.read import Parts, parts_of, read_parameters
+from linkage_ros.scene.read import parts_of, read_parameters
 from linkage_ros.scene.scene import Member, RecordParameters, Scene
 from linkage_ros.scene.section import Section
+from linkage_ros.scene.solving import read_solver, read_solving
 from linkage_ros.scene.storage import read_storage
 from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
-from linkage_ros.solvers.registry import SOLVERS
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
 """Names of the files of a scene where a bag carries them; further linkages are numbered."""
 
 LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
 """Ticks a second, in [Hz]: of these the higher is what a core was measured to hold."""
-
-FINEST_ACCURACY, COARSEST_ACCURACY = 1e-12, 1e-2
-"""What `accuracy` may be, in [rad] or [m]."""
 
 Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
@@ -182,7 +178,7 @@ def _as_chosen(member: Member, solvers: Mapping[str, Any]) -> Member:
     if member.accuracy is None or member.name not in solvers:
         return member
     where = Section(member.content.file, '', {'solver': solvers[member.name]})
-    return replace(member, solver=_solver(where, {}), accuracy=None)
+    return replace(member, solver=read_solver(where, {}), accuracy=None)
 
 
 def _scene(
@@ -210,7 +206,7 @@ def _scene(
         rate=_rate(content),
         wrapped=content.choice('angles', ('continuous', 'wrapped'), 'continuous') == 'wrapped',
         seed=content.whole('seed', 0, least=0, most=2**53),
-        faults=_faults(content, members),
+        faults=read_faults(content, members),
         record=_record(content.section('record')) if 'record' in content else None,
         files=files,
         folder=folder,
@@ -283,7 +279,7 @@ def _member(
         loads=read_loads(loads) if loads is not None else None,
         content=own,
         linkage_content=linkage_content,
-        **_solving(own, scene, parts),
+        **read_solving(own, scene, parts),
     )
     effects.finish(tuple(EFFECTS))
     return member
@@ -296,52 +292,6 @@ def _effects(effects: Section) -> dict[str, Any]:
         return {name: module_of(name).PARAMETERS for name in named}
     except DefinitionError as error:
         raise effects.error(error.where, error.reason, error.remedy) from None
-
-
-def _solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
-    """Return what closes the loops, or how well that is to be done."""
-    # What a linkage says for itself stands for both of the scene's.
-    where = own if 'solver' in own or 'accuracy' in own else scene
-    if 'accuracy' not in where:
-        return {'solver': _solver(where, parts) if 'solver' in where else None}
-    if 'solver' in where:
-        raise where.error('accuracy', 'stands beside solver', 'write one of the two')
-    bounds = {'least': FINEST_ACCURACY, 'most': COARSEST_ACCURACY}
-    return {'accuracy': where.number('accuracy', unit='rad or m', **bounds)}
-
-
-def _solver(where: Section, parts: Parts) -> tuple[str, Any]:
-    """Return a solver's name and parameters; a name may stand alone."""
-    if isinstance(where.mapping['solver'], str):
-        return _named_solver(where)
-    solvers = where.section('solver')
-    named = list(solvers)
-    if len(named) > 1:
-        raise solvers.error(named[1], 'is a second solver', f'leave it, or {named[0]}, out')
-    if not named or named[0] not in SOLVERS:
-        solvers.finish(tuple(SOLVERS))
-        raise solvers.error('', 'names none', f'write one of {", ".join(SOLVERS)}')
-    (name,) = named
-    parameters = import_module(SOLVERS[name]).PARAMETERS
-    return name, read_parameters(solvers.section(name), parameters, parts)
-
-
-def _named_solver(where: Section) -> tuple[str, Any]:
-    name = where.text('solver')
-    if name not in SOLVERS:
-        known = f'known: {", ".join(SOLVERS)}'
-        raise where.error(
-            'solver', f'there is no {quoted(name)}', did_you_mean(name, SOLVERS, known)
-        )
-    parameters = import_module(SOLVERS[name]).PARAMETERS
-    for entry, _ in declared(parameters):
-        if entry.default is MISSING:
-            raise where.error(
-                'solver',
-                f'{name} has no {entry.name}',
-                f'write solver: {{{name}: {{{entry.name}: …}}}}',
-            )
-    return name, parameters()
 
 
 def _with_inputs(linkage: Linkage, content: Section) -> Linkage:
@@ -358,37 +308,6 @@ def _with_inputs(linkage: Linkage, content: Section) -> Linkage:
     except DefinitionError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
     return changed
-
-
-def _faults(content: Section, members: list[Member]) -> dict[str, Fault]:
-    section = content.section('faults', required=False)
-    parts: dict[str, tuple[str, ...]] = {}
-    for member in members:
-        for kind, names in parts_of(member.linkage).items():
-            parts[kind] = (*parts.get(kind, ()), *(member.prefix + name for name in names))
-    return {section.ros_name(name): _fault(section.section(name), parts) for name in section}
-
-
-def _fault(content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
-    kinds = [key for key in content if key in FAULTS]
-    if len(kinds) != 1:
-        for key in content:
-            if key in (*_WHEN, *FAULTS):
-                content.taken(key)
-        content.finish((*_WHEN, *FAULTS))
-        raise content.error('', f'{len(kinds)} kinds', f'name one of {", ".join(FAULTS)}')
-    parameters: Any = read_parameters(
-        content.section(kinds[0]), import_module(FAULTS[kinds[0]]).PARAMETERS, parts
-    )
-    at = content.numbers('at', most=1e9) if 'at' in content else []
-    if any(time < 0.0 for time in at):
-        raise content.error('at', f'{at} begins before the first tick', 'write seconds from it on')
-    seconds = content.number('seconds', least=1e-6, most=1e9, unit='s') if at else 0.0
-    content.finish(_WHEN)
-    return Fault(kinds[0], parameters, tuple(at), seconds)
-
-
-_WHEN = ('at', 'seconds')
 
 
 def _rate(content: Section) -> float:

@@ -25,12 +25,7 @@ from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.faults.fault import FAULTS
 from linkage_ros.parameters import declared
-from linkage_ros.scene.load import (
-    COARSEST_ACCURACY,
-    FINEST_ACCURACY,
-    HIGHEST_RATE,
-    LOWEST_RATE,
-)
+from linkage_ros.scene.load import HIGHEST_RATE, LOWEST_RATE
 from linkage_ros.scene.schema import (
     CHARACTER,
     DIALECT,
@@ -45,6 +40,7 @@ from linkage_ros.scene.schema import (
     Schema,
     text,
 )
+from linkage_ros.scene.solving import COARSEST_ACCURACY, FINEST_ACCURACY
 from linkage_ros.scene.storage import AS_THE_RUN_GOES, LEASTS, SPLITS, StorageParameters
 from linkage_ros.solvers.registry import SOLVERS
 

@@ -82,7 +82,9 @@ def test_a_controller_moves_the_crank_of_a_scene_that_is_pushed(
     same, of = map(int, re.search(r'(\d+) of (\d+) joint states replay', answer.stdout).groups())
     assert same == of == counts['/joint_states']
     *_, last = re.findall(r'crank_joint ([+-]\d+\.\d+)', answer.stdout)
-    assert float(last) > 0.9  # it swings by 1 about 2.0; without commands it stands at 0.5
+    # It stands at 0.5 until the first command, which on a busy machine comes late; then it swings
+    # by 1 about 2.0.
+    assert float(last) > 0.6
     assert Path(f'{bag}.png').read_bytes().startswith(PNG)
 
 
