@@ -39,6 +39,8 @@ for needed in ('sphinx', 'myst_parser', 'furo', 'matplotlib'):
 DOCS = ROOT / 'docs'
 NOT_PAGES = ('website', 'pictures', 'synthesis_page')
 
+pytestmark = pytest.mark.timeout(300)  # the first of these builds the site
+
 
 class Page(HTMLParser):
     """What a page of the site has: addresses, places that can be addressed, headings, and text."""

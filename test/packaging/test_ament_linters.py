@@ -47,6 +47,7 @@ def sources(root, monkeypatch):
 
 
 @pytest.mark.linter
+@pytest.mark.timeout(300)  # it reads every file there is
 def test_flake8(sources):
     flake8 = pytest.importorskip('ament_flake8.main')
     failed, errors = flake8.main_with_errors(argv=sources)
