@@ -62,12 +62,14 @@ $(STAMP): setup.py
 demo: $(STAMP)
 	@$(BIN)/linkage demo $(if $(filter command,$(origin SECONDS)),--seconds $(SECONDS))
 
-# The tests run even when lint finds something, so that one run tells all.
+# The tests run even when lint finds something, so that one run tells all. Those that start nodes
+# have the processors, and the graph, to themselves.
 test: $(STAMP)
 	@status=0; \
 	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory lint || status=$$?; \
-	$(BIN)/python -m pytest || status=$$?; \
+	$(BIN)/python -m pytest -m 'not ros' --numprocesses auto --dist loadfile || status=$$?; \
+	$(BIN)/python -m pytest -m ros || status=$$?; \
 	exit $$status
 
 bench: $(STAMP)

@@ -66,6 +66,8 @@ DOCS = ['sphinx>=8', 'myst-parser>=4', 'furo', *REPORT]
 TEST = [
     'pytest',
     'pytest-timeout',
+    # On all processors: the tests that start no nodes.
+    'pytest-xdist>=3',
     'hypothesis',
     'jsonschema>=4',
     *REPORT,

@@ -22,6 +22,7 @@ import sys
 from threading import Event
 from typing import TypeVar
 
+from linkage_ros.stop import bounded_end
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 import rclpy
 from rclpy.node import Node
@@ -76,6 +77,7 @@ def run_companion(
         rclpy.try_shutdown()
         return 2
     run(node, stop)
-    node.destroy_node()
-    rclpy.try_shutdown()
+    with bounded_end():
+        node.destroy_node()
+        rclpy.try_shutdown()
     return 0

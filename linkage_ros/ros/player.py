@@ -30,6 +30,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.ros.cues import cues, Part, read_ahead
 from linkage_ros.ros.playback import Playback, SteadyClock, Ticks
+from linkage_ros.stop import bounded_end
 import rclpy
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -99,8 +100,9 @@ def player_node(arguments: Sequence[str]) -> Iterator[Node]:
     try:
         yield node
     finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+        with bounded_end():
+            node.destroy_node()
+            rclpy.try_shutdown()
 
 
 def play(

@@ -27,6 +27,7 @@ from time import monotonic
 from typing import Protocol
 
 from linkage_ros.ros.node import LinkageNode
+from linkage_ros.stop import bounded_end
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
@@ -107,9 +108,10 @@ def run_linkage_node(
         return code
     finally:
         node.end()
-        executor.shutdown()
-        node.destroy_node()
-        rclpy.try_shutdown()
+        with bounded_end():
+            executor.shutdown()
+            node.destroy_node()
+            rclpy.try_shutdown()
 
 
 def _spin(

@@ -65,6 +65,7 @@ def used(tmp_path_factory):
     return use_states(tmp_path_factory.mktemp('ticking'), linkage_of('parallelogram'), 50.0, 1.0)
 
 
+@pytest.mark.ros
 def test_states_are_used_in_both_motions(used):
     assert [each.motion for each in used] == [CHIRP, ACCELERATION]
     for each in used:
@@ -73,12 +74,14 @@ def test_states_are_used_in_both_motions(used):
         assert 0.0 <= each.cpu < 2.0
 
 
+@pytest.mark.ros
 def test_angles_that_run_on_are_compared_as_directions(tmp_path):
     # The first joints of a leg come out a turn away from where the closure alone has them.
     for each in use_states(tmp_path, linkage_of('jansen_leg'), 200.0, 0.5):
         assert median(each.errors[CARRIED]) < 0.5
 
 
+@pytest.mark.ros
 def test_what_is_held_is_behind_by_rate_times_age(used):
     accelerated = used[1]
     # ω grows from 0 to 10 rad/s; the crank that the node has is carried, and may be older still.
@@ -88,6 +91,7 @@ def test_what_is_held_is_behind_by_rate_times_age(used):
     assert 1.0 < median(behind) < 10.5
 
 
+@pytest.mark.ros
 def test_what_is_carried_forward_is_behind_by_the_square_of_the_age(used):
     accelerated = used[1]
     assert median(accelerated.errors[CARRIED]) < 0.1 * median(accelerated.errors[HELD])
@@ -98,6 +102,7 @@ def test_several_inputs_have_no_such_part():
     assert measure_ticking(scene, True, lambda *said: None) is None
 
 
+@pytest.mark.ros
 def test_the_part_says_what_a_rate_buys(monkeypatch):
     monkeypatch.setattr('linkage_ros.accuracy.ticking.measure.QUICK_RATES', (25, 250))
     part = measure_ticking(load_scene(shipped('scenes/demo.yaml')), True, lambda *said: None)

@@ -108,7 +108,10 @@ def tree_motion(closure, angle):
     return at(angle), RATE * first, PULL * first + RATE**2 * second, first
 
 
-@pytest.fixture(params=[(name, make) for name in TREES for make in (shipped, weighed)], ids=str)
+@pytest.fixture(
+    params=[(name, make) for name in TREES for make in (shipped, weighed)],
+    ids=lambda case: f'{case[0]} {case[1].__name__}',
+)
 def case(request):
     name, make = request.param
     linkage = make(name)

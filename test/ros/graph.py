@@ -21,7 +21,7 @@ Nothing of the package is used here: what a node says is seen as any other progr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import fcntl
 import os
@@ -181,13 +181,21 @@ class Graph:
 class NodeProcess:
     """`linkage_node`, as a process."""
 
-    def __init__(self, domain: int, folder: Path, *arguments: str, **popen: Any) -> None:
+    def __init__(
+        self,
+        domain: int,
+        folder: Path,
+        *arguments: str,
+        program: Sequence[str] = ('-m', 'linkage_ros.ros.linkage_node'),
+        **popen: Any,
+    ) -> None:
         self._log = folder / f'node_{time.monotonic_ns()}.log'
-        command = [sys.executable, '-m', 'linkage_ros.ros.linkage_node', '--ros-args', *arguments]
+        command = [sys.executable, *program, '--ros-args', *arguments]
         environment = os.environ | {
             'ROS_DOMAIN_ID': str(domain),
             'ROS_LOG_DIR': str(folder),
             'RCUTILS_COLORIZED_OUTPUT': '0',
+            'PYTHONFAULTHANDLER': '1',  # where it has to be aborted, its log says where it was
         }
         with self._log.open('wb') as log:
             self.process = subprocess.Popen(
@@ -205,7 +213,12 @@ class NodeProcess:
     def end(self, number: int = signal.SIGINT) -> int:
         """Send a signal, and return the exit code."""
         self.process.send_signal(number)
-        return self.process.wait(PATIENCE)
+        try:
+            return self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.send_signal(signal.SIGABRT)
+            self.process.wait(PATIENCE)
+            raise AssertionError(f'it did not end by signal {number}: {self.log}') from None
 
     def kill(self) -> None:
         if self.process.poll() is None:

@@ -29,6 +29,17 @@ from .graph import crank, wait_for
 
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
+# The node, on a middleware that never comes down: it has the interpreter's lock meanwhile, or the
+# interpreter is gone.
+STUCK = {
+    'node': 'node.LinkageNode.destroy_node = lambda _: ctypes.PyDLL(None).sleep(600)',
+    'library': 'c = ctypes.CDLL(None); c.__cxa_atexit(c.sleep, ctypes.c_void_p(600), None)',
+}
+PROGRAM = (
+    'import ctypes, sys; from linkage_ros.ros import linkage_node, node; {}; '
+    'sys.exit(linkage_node.main())'
+)
+
 
 @pytest.fixture
 def recorded(tmp_path, write_scene):
@@ -93,4 +104,13 @@ def test_an_impatient_user(start, recorded):
         node.process.send_signal(number)
         time.sleep(0.01)
     assert node.process.wait(20) == 0, node.log
+    assert len(closed_bags(runs)) == 1
+
+
+@pytest.mark.parametrize('where', STUCK)
+def test_a_middleware_that_hangs_does_not_keep_the_process(start, recorded, where):
+    scene, runs = recorded
+    node = start(scene, program=('-c', PROGRAM.format(STUCK[where])))
+    assert node.end() == -signal.SIGALRM, node.log
+    assert 'Traceback' not in node.log
     assert len(closed_bags(runs)) == 1
