@@ -18,8 +18,8 @@ Numbers that are known within a disc, by the thousand; and Taylor series of such
 
 A disc is a centre, real or complex, and a radius that bounds how far the number may be from it,
 rounding of the centre included (circular arithmetic: I. Gargantini and P. Henrici, Numer. Math.
-18, 1972). Everything is an array over the cells of a range; over- and underflow apart, what is
-said of a number holds for certain.
+18, 1972). Everything is an array over the cells of a range; overflow apart, what is said of a
+number holds for certain.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ import numpy as np
 
 _ROUNDING = 2.0**-50
 """Above what a centre is off by, of its size: a product of complex numbers, a sine of numpy's."""
+
+_LEAST = 2.0**-1020
+"""Above what a product is off by where it underflows."""
 
 _UP = 1.0 + 2.0**-48
 """What makes up for the rounding of a radius."""
@@ -65,13 +68,13 @@ def product(one: Disc, other: Disc) -> Disc:
     """Return the product."""
     a, b = np.abs(one.center), np.abs(other.center)
     radius = (a * other.radius + b * one.radius + one.radius * other.radius) * _UP
-    return Disc(one.center * other.center, radius + _ROUNDING * a * b)
+    return Disc(one.center * other.center, radius + _ROUNDING * a * b + _LEAST)
 
 
 def times(disc: Disc, factor: complex) -> Disc:
     """Return the product with a number that is a double."""
     size = abs(factor)
-    radius = disc.radius * size * _UP + _ROUNDING * size * np.abs(disc.center)
+    radius = disc.radius * size * _UP + _ROUNDING * size * np.abs(disc.center) + _LEAST
     return Disc(disc.center * factor, radius)
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from math import tau
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.solvers.cells import Cells, enclose
@@ -42,6 +42,8 @@ def within(disc: Disc, share: float, turn: float):
     return mpc(disc.center) + mpf(float(disc.radius)) * share * mp.expj(turn)
 
 
+@example(0.0, 0.5, 0.0, 5e-324, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # it underflows
+@example(1e-200, 0.0, 1e-200, 0.0, 1e-210, 1e-210, 1.0, 1.0, 0.0, 0.0)
 @given(reals, reals, reals, reals, radii, radii, shares, shares, reals, reals)
 def test_a_disc_holds_what_comes_of_its_numbers(a, b, c, d, r, s, p, q, t, u) -> None:
     one, other = Disc(complex(a, b), r), Disc(complex(c, d), s)
