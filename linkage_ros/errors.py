@@ -101,6 +101,11 @@ def did_you_mean(name: str, names: Iterable[str], otherwise: str) -> str:
 
 
 def quoted(value: Any) -> str:
-    """Return a value as an error message shows it: on one line, and not without end."""
+    """
+    Return a value as an error message shows it: on one line, and not without end.
+
+    What is too long loses its middle: a path ends with the name that matters.
+    """
     text = repr(value)
-    return text if len(text) <= _LONGEST_VALUE else f'{text[: _LONGEST_VALUE - 1]}…'
+    half = (_LONGEST_VALUE - 1) // 2
+    return text if len(text) <= _LONGEST_VALUE else f'{text[:half]}…{text[-half:]}'

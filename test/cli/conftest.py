@@ -33,12 +33,6 @@ if find_spec('rclpy') is None:
     collect_ignore_glob = ['test_*.py']
 
 
-def pytest_collection_modifyitems(items):
-    for item in items:
-        if Path(__file__).parent in item.path.parents:
-            item.add_marker(pytest.mark.ros)
-
-
 def environment(folder: Path) -> dict[str, str]:
     """Return what a process of the tests sees; `linkage demo` chooses its own ROS domain."""
     return os.environ | {

@@ -31,6 +31,8 @@ from rosbags.typesys import get_typestore, Stores
 
 from .conftest import environment, on_terminal, Run
 
+pytestmark = pytest.mark.ros
+
 PNG = b'\x89PNG\r\n\x1a\n'
 
 

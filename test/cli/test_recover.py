@@ -26,6 +26,8 @@ from rosbags.highlevel import AnyReader
 
 from .conftest import Run
 
+pytestmark = pytest.mark.ros
+
 SCENE = 'linkage: four.yaml\ndrive: {constant_rate: {rate: 3.0}}\nrecord: {name: run}\n'
 
 

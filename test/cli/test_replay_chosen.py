@@ -27,6 +27,8 @@ import pytest
 
 from .conftest import Run
 
+pytestmark = pytest.mark.ros
+
 
 def test_a_solver_that_was_chosen_is_not_chosen_again(
     linkage: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -30,6 +30,8 @@ import pytest
 
 from .conftest import environment, Run
 
+pytestmark = pytest.mark.ros
+
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:

@@ -65,6 +65,7 @@ def proof(text: str) -> list[list[str]]:
     return [line.split() for line in lines[: lines.index('')]]
 
 
+@pytest.mark.ros
 def test_three_pairs_end_in_a_linkage_that_check_and_run_take(linkage: Run) -> None:
     made = linkage('synthesize', *SOURCE_003, '-o', 'designed.yaml')
     assert made.returncode == 0, made.stderr

@@ -189,6 +189,14 @@ def test_a_linkage_that_is_no_file(build, named, shown):
     assert re.search(rf':2: linkage: .*{shown}.* is not a file; name one', str(caught.value))
 
 
+def test_the_name_of_a_file_far_down_is_told(tmp_path):
+    folder = tmp_path / 'a_folder_with_a_long_name' / 'that_is_in_one_of_its_kind' / 'and_so_on'
+    folder.mkdir(parents=True)
+    (folder / 'scene.yaml').write_bytes(b'linkage: nowhere.yaml')
+    with pytest.raises(FileError, match=r"….*nowhere\.yaml' is not a file"):
+        load_scene(folder / 'scene.yaml')
+
+
 @pytest.mark.parametrize('name', ['nowhere.yaml', '.', 'n' * 1000, 'nul\0', 'scene.yaml/x'])
 def test_a_scene_that_cannot_be_read(tmp_path, name):
     (tmp_path / 'scene.yaml').write_bytes(SCENE)
