@@ -58,9 +58,9 @@ def bounded_end() -> Iterator[None]:
     """
     Have SIGALRM end the process where what is done within, its end, does not come to its own.
 
-    Of some thousand nodes one was seen that stayed when all was done but for the middleware. Where
-    its threads wait for each other, they may do so with the interpreter's lock: then no thread of
-    Python ends that.
+    Of some thousand nodes one was seen that did not end by its signal; where it stayed is not
+    known. Where threads of the middleware wait for each other, they may do so with the
+    interpreter's lock: then no thread of Python ends that.
     """
     signal.alarm(_LONGEST_END)
     try:
