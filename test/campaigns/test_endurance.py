@@ -71,6 +71,7 @@ HELD = {
     'more and more': (series(lambda t: 30_000 + 1.1 * MOST_GROWTH * t / 75), False),
     'ever more, in steps': (series(lambda t: 30_000 + 100 * MOST_GROWTH * (t // 10)), False),
     'a file left open': (series(lambda t: 30_000, files=lambda t: 8 + (t > 50)), False),
+    'a file open for moments': (series(lambda t: 30_000, files=lambda t: 8 + t % 2), True),
     'a file open most of the time': (
         series(lambda t: 30_000, files=lambda t: 8 + (t % 3 > 0)),
         True,

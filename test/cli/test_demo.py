@@ -76,7 +76,7 @@ def test_the_demo_runs_records_proves_and_draws(linkage: Run, tmp_path: Path) ->
 def test_a_controller_moves_the_crank_of_a_scene_that_is_pushed(
     linkage: Run, tmp_path: Path
 ) -> None:
-    answer = linkage('demo', 'torque_crank', '--seconds', '3')
+    answer = linkage('demo', 'torque_crank', '--seconds', '4')  # a busy machine begins late
     assert answer.returncode == 0, answer.stderr
     bag = only_bag(tmp_path / 'runs')
     counts = messages(bag)
@@ -84,9 +84,7 @@ def test_a_controller_moves_the_crank_of_a_scene_that_is_pushed(
     same, of = map(int, re.search(r'(\d+) of (\d+) joint states replay', answer.stdout).groups())
     assert same == of == counts['/joint_states']
     *_, last = re.findall(r'crank_joint ([+-]\d+\.\d+)', answer.stdout)
-    # It stands at 0.5 until the first command, which on a busy machine comes late; then it swings
-    # by 1 about 2.0.
-    assert float(last) > 0.6
+    assert float(last) > 0.9  # it swings by 1 about 2.0; without commands it stands at 0.5
     assert Path(f'{bag}.png').read_bytes().startswith(PNG)
 
 
