@@ -46,7 +46,7 @@ class StorageParameters(Storage):
     """How the bag is stored."""
 
     flush_period: float = number(
-        'how often the disk is waited for: what a power cut may cost',
+        'what a power cut may cost: the disk is waited for a little more often',
         _DEFAULT.flush_period,
         unit='s',
         least=0.05,

@@ -82,14 +82,14 @@ def test_the_account_of_a_run_is_that_of_its_bag(run, tmp_path, storage):
         assert found.size > sum(size + 31 + 16 for _, size in messages)
 
 
-def test_a_run_is_as_long_as_asked_for_and_flushed_once_a_period(run):
+def test_a_run_is_as_long_as_asked_for_and_flushed_in_each_period(run):
     found = run(1000, FLUSHED_OFTEN, 0.3)
     assert found.seconds >= 0.3
-    assert 1 <= len(found.flushes) <= found.seconds / 0.05 + 1
+    assert 1 <= len(found.flushes) <= found.seconds / 0.045 + 1
     for flush in found.flushes:
         assert flush.end > flush.begin
         # By a clock that is read once more, a few microseconds later.
-        assert flush.stake >= 49 * MS
+        assert flush.stake >= 44 * MS
         assert 0 < flush.cpu < found.cpu
     for before, after in zip(found.flushes[:-1], found.flushes[1:], strict=True):
         assert after.stake == after.end - before.begin
@@ -106,7 +106,7 @@ def test_ticks_come_at_the_rate_of_the_scene_up_to_a_thousand(run, rate, ticked_
 def test_a_run_without_a_flush_goes_on_until_there_is_one(run):
     found = run(500, Storage(flush_period=0.25), 0.2)
     assert found.flushes
-    assert found.seconds >= 0.25
+    assert found.seconds >= 0.225
 
 
 def test_without_a_bag_there_are_ticks_only(run, tmp_path):
@@ -118,7 +118,7 @@ def test_without_a_bag_there_are_ticks_only(run, tmp_path):
 
 def test_costs_by_hand():
     # 1000 messages in 2 s. Writing them took 8 ms, two flushes 1 ms each and 3 ms with the wait:
-    # a flush comes every 0.4 s, which is 200 messages.
+    # a flush comes every 0.36 s, which is 180 messages.
     flush = Flush(0, 3 * MS, 1 * MS, 410 * MS)
     run = Recorded(
         seconds=2.0,
@@ -132,8 +132,8 @@ def test_costs_by_hand():
         size=99_000,
     )
     cost = cost_of(Storage(flush_period=0.4), [run, run])
-    assert cost.cpu.middle == pytest.approx(8.0 + 1000 / 200)
-    assert cost.waited.middle == pytest.approx((2.0 + 4.0) / 2 / 0.4)
+    assert cost.cpu.middle == pytest.approx(8.0 + 1000 / 180)
+    assert cost.waited.middle == pytest.approx((2.0 + 4.0) / 2 / 0.36)
     assert cost.waits == pytest.approx((3.0, 4.0))
     assert cost.stake == pytest.approx((430.0, 430.0, 430.0))
     assert cost.stake_messages == pytest.approx(0.43 * 500)
@@ -225,7 +225,7 @@ def test_a_part_of_the_page(scene_at, tmp_path, monkeypatch):
     *plain, lz4, zstd = (row['in the bag [bytes/message]'].high for row in rows)
     assert min(plain) > max(lz4, zstd), 'half of a message is names and zeros'
     stakes = [row['a power cut may take [ms]'].low for row in rows]
-    assert all(at >= 1e3 * p for at, p in zip(stakes, (0.05, 0.2, 0.2, 0.2), strict=True))
+    assert all(at >= 900 * p for at, p in zip(stakes, (0.05, 0.2, 0.2, 0.2), strict=True))
     for diagram in part.diagrams:
         assert [(c.name, len(c.points)) for c in diagram.curves] == [
             ('not packed', 2),

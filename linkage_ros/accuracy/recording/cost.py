@@ -31,7 +31,7 @@ from typing import NamedTuple
 from linkage_ros.accuracy.recording.recorded_run import record_run, Recorded
 from linkage_ros.accuracy.spread import Spread, spread_of
 from linkage_ros.bag.writing.packing import compression_type
-from linkage_ros.bag.writing.storage import COMPRESSIONS, NONE, Storage
+from linkage_ros.bag.writing.storage import COMPRESSIONS, FLUSH_AFTER, NONE, Storage
 from linkage_ros.errors import RecordingError
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
@@ -179,14 +179,14 @@ def _cpu(run: Recorded, setting: Storage | None) -> float:
     Return what a message costs the recorder's thread, in [µs].
 
     A run has one flush or a few: how many fall into it would show. So the flushes count with
-    what one costs, once a period.
+    what one costs, as often as they come.
     """
     if setting is None or not run.received:
         return 0.0
     flushing = sum(flush.cpu for flush in run.flushes)
-    period_messages = setting.flush_period * run.received / run.seconds
+    between = FLUSH_AFTER * setting.flush_period * run.received / run.seconds
     writing = (run.cpu - flushing) / run.received
-    return (writing + flushing / len(run.flushes) / period_messages) * 1e-3
+    return (writing + flushing / len(run.flushes) / between) * 1e-3
 
 
 def _waited(run: Recorded, setting: Storage | None) -> float:
@@ -194,7 +194,7 @@ def _waited(run: Recorded, setting: Storage | None) -> float:
     if setting is None:
         return 0.0
     waits = sum(flush.end - flush.begin - flush.cpu for flush in run.flushes)
-    return waits / len(run.flushes) / setting.flush_period * 1e-6
+    return waits / len(run.flushes) / (FLUSH_AFTER * setting.flush_period) * 1e-6
 
 
 def _is_here(name: str, folder: Path) -> bool:

@@ -33,6 +33,7 @@ import time
 from linkage_ros.bag.account import Account
 from linkage_ros.bag.metadata import BagSummary
 from linkage_ros.bag.writing.handover import BATCH, NAP, POLL, Tally
+from linkage_ros.bag.writing.storage import FLUSH_AFTER
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
 
@@ -90,7 +91,7 @@ class Recorder:
     capacity
         Messages that may wait. The default is 16 s of two topics at 2 kHz, about 25 MB.
     flush_period
-        What a power cut may cost [s].
+        What a power cut may cost [s], as long as the disk answers within a tenth of it.
 
     """
 
@@ -101,7 +102,7 @@ class Recorder:
         self.folder = writer.folder
         self._writer = writer
         self._capacity = capacity
-        self._flush_period = flush_period
+        self._flush_after = FLUSH_AFTER * flush_period
         self._queue: deque[tuple[int, int, int, bytes]] = deque()
         self._open = True
         self._received = [Tally() for _ in writer.topics]
@@ -202,7 +203,7 @@ class Recorder:
 
     def _run(self) -> None:
         try:
-            due = time.monotonic() + self._flush_period
+            due = time.monotonic() + self._flush_after
             stopping = False
             while not stopping:
                 # Asked before the queue is emptied: what was offered until then is written.
@@ -212,11 +213,11 @@ class Recorder:
                     more = self._write_batch()
                     now = time.monotonic()
                     # A backlog first, lest a slow disk leave time for nothing but flushes.
-                    if now >= due + self._flush_period * more:
+                    if now >= due + self._flush_after * more:
                         self._writer.flush()
                         self._safe = tuple(self._done[0])
                         # What came while it lasted is not with the system yet.
-                        due = max(now + self._flush_period, time.monotonic())
+                        due = max(now + self._flush_after, time.monotonic())
                     if more:
                         time.sleep(NAP)
             self._writer.close(self._custom)

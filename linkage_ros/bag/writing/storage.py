@@ -24,6 +24,12 @@ from pathlib import Path
 NONE = 'none'
 COMPRESSIONS = (NONE, 'lz4', 'zstd')
 
+FLUSH_AFTER = 0.9
+"""
+The part of the flush period after which the next flush begins: to wake, to write and to wait for
+the disk take time too, and what is older than the period shall be on the disk.
+"""
+
 # What is written between two looks, a chunk and what a flush adds [bytes]: with it there is never
 # less than was asked for.
 _ON_ITS_WAY = 256 * 1024
@@ -40,7 +46,7 @@ class Storage:
     Attributes
     ----------
     flush_period
-        How often the disk is waited for [s]: what a power cut may cost.
+        What a power cut may cost [s]: how often the disk is waited for, and a tenth more.
     split_bytes
         Size at which the next file begins [bytes]; 0 for never.
     split_seconds
