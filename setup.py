@@ -86,8 +86,8 @@ TEST = [
     *DASK,
     *EXPORT,
 ]
-# What the speed of the kinematics is measured against.
-BENCH = ['pylinkage[numba]>=1.3,<1.4']
+# What the speed of the kinematics is measured against. Pinocchio (pin) walks robot models too.
+BENCH = ['pylinkage[numba]>=1.3,<1.4', 'casadi', 'pin']
 STYLE = [
     'mypy',
     'ruff',

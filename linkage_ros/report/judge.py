@@ -32,6 +32,7 @@ from linkage_ros.replay import read_change, turn
 from linkage_ros.report.arrays import Flags
 from linkage_ros.report.own_rows import Rows
 from linkage_ros.report.spans import Lane
+from linkage_ros.report.words import short
 from linkage_ros.scene.scene import Scene
 import numpy as np
 
@@ -46,6 +47,8 @@ class Judge:
         The bag.
     scene
         Its scene.
+    from_beginning
+        Whether the bag holds the run from its beginning: where not, faults may be on already.
 
     Attributes
     ----------
@@ -56,8 +59,10 @@ class Judge:
 
     """
 
-    def __init__(self, bag: Bag, scene: Scene) -> None:
+    def __init__(self, bag: Bag, scene: Scene, from_beginning: bool = True) -> None:
         self._bag, self._scene = bag, scene
+        # Of the others it is not known yet whether they were on as the bag began.
+        self._known = {*(scene.faults if from_beginning else ())}
         self._pipeline = Pipeline(scene)
         self._last = 0
         self.listens = bool(self._pipeline.topic)
@@ -103,6 +108,15 @@ class Judge:
                     lanes['rejected'].add(time, time, rejection.value)
         return good
 
+    def hear(self, said: Mapping[tuple[str, str], str]) -> None:
+        """Take from what the diagnostics say, by task and key, which faults were on before."""
+        for name in [name for name in self._scene.faults if name not in self._known]:
+            state = said.get(('faults', short(self._fault(name))))
+            if state:
+                self._known.add(name)
+            if state == 'injected':
+                self._faults[name] = 0
+
     def end(self, time: int, lane: Lane) -> None:
         """Put the faults that are still on onto their lane, to the end of the run."""
         for name, begun in self._faults.items():
@@ -136,6 +150,9 @@ class Judge:
             self._faults.setdefault(name, time)
         elif name in self._faults:
             lane.add(self._faults.pop(name), time, self._fault(name))
+        elif name not in self._known:
+            lane.add(0, time, self._fault(name))
+        self._known.add(name)
 
     def _fault(self, name: str) -> str:
         return f'{name} ({self._scene.faults[name].kind})'

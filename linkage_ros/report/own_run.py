@@ -71,7 +71,8 @@ class OwnRun:
     """
 
     def __init__(self, bag: Bag, run: RunAccount, scene: Scene, window: Window) -> None:
-        self._judge = Judge(bag, scene)
+        from_beginning = not lost_beginning(bag, run)
+        self._judge = Judge(bag, scene, from_beginning)
         pipeline = self._judge.pipeline
         self._rate, self._window, self._clock = scene.rate, window, RunClock()
         self._lanes = {
@@ -110,7 +111,7 @@ class OwnRun:
         }
         self._first_joints = [scene.joints.index(linkage.joints[0]) for linkage in self._linkages]
         self._tells_toggles = len(scene.members) == 1 and 'velocity' in scene.members[0].effects
-        self._health = Health(self._lanes, not lost_beginning(bag, run))
+        self._health = Health(self._lanes, from_beginning)
         bodies = sum(len(each.closure.structure.links) for each in self._linkages[:MOST_LINKAGES])
         topics = run.joint_states_topic, run.crank_topic
         self._curves = OwnCurves(scene, topics, bodies, window)
@@ -139,6 +140,7 @@ class OwnRun:
         self._curves.add_ticks(np.union1d(states.passed[read.good], withheld.passed))
         for time, message in zip(health.passed.tolist(), health.data, strict=True):
             self._health.take(message, time)
+            self._judge.hear(self._health.said)
 
     def end(self, contents: Contents) -> Run:
         """Return what there is to tell; with the counts of all messages."""

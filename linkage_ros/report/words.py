@@ -24,7 +24,7 @@ LONGEST_NAME = 80
 """Letters of what others have named: topics and joints of bags, keys of diagnostics."""
 
 LANES = {
-    'fault': ('fault injected', 'from its begin to its end, as the faults topic says'),
+    'fault': ('fault injected', 'from its begin to its end, as its topic and the diagnostics say'),
     'open': ('loop open', 'a good sample at which the loop does not close; nothing is published'),
     'told_open': ('no pose, by diagnostics', 'as the diagnostics count, once a period'),
     'toggle': ('at a toggle', 'joint states without rates'),

@@ -24,12 +24,14 @@ from typing import Any
 
 from linkage_ros.accuracy.reference.reference import Reference, Truth
 from linkage_ros.accuracy.solving.loop_errors import off
+from linkage_ros.accuracy.solving.methods.casadi_peer import casadi
 from linkage_ros.accuracy.solving.methods.closed_form import closed_form, ITERATED, NAME
 from linkage_ros.accuracy.solving.methods.extended import extended
 from linkage_ros.accuracy.solving.methods.four_bar import plain_four_bar
 from linkage_ros.accuracy.solving.methods.integration import integration
 from linkage_ros.accuracy.solving.methods.method import ACCELERATION, Method, RATE
 from linkage_ros.accuracy.solving.methods.mujoco_peer import mujoco
+from linkage_ros.accuracy.solving.methods.pinocchio_peer import pinocchio
 from linkage_ros.accuracy.solving.methods.pylinkage_peer import pylinkage
 from linkage_ros.accuracy.solving.methods.single_precision import single_precision
 from linkage_ros.accuracy.solving.methods.textbook import textbook
@@ -93,6 +95,8 @@ def truth_at(linkage: Linkage, *inputs: float) -> Truth:
     return Reference(linkage).solve(inputs, [RATE] * driven, [ACCELERATION] * driven)
 
 
+PEERS = (pylinkage, casadi, mujoco, pinocchio)
+
 MADE: dict[str, tuple[Callable[[Linkage], Method | None], float]] = {
     'closed form': (closed_form, 2e-15),
     'closed form, float32': (single_precision, 2e-6),
@@ -121,11 +125,11 @@ def test_a_four_bar_is_solved_to_the_digits_of_the_method(name: str, made: str) 
 
 
 @pytest.mark.parametrize('name', [*FOUR_BARS, 'turned about', 'crank too'])
-@pytest.mark.parametrize(('make', 'package'), [(pylinkage, 'pylinkage'), (mujoco, 'mujoco')])
+@pytest.mark.parametrize('make', PEERS)
 def test_peers_solve_the_same_four_bars(
-    name: str, make: Callable[[Linkage], Method | None], package: str
+    name: str, make: Callable[[Linkage], Method | None]
 ) -> None:
-    pytest.importorskip(package)
+    pytest.importorskip(make.__name__)
     linkage = linkage_of(name)
     method = make(linkage)
     assert method is not None
@@ -136,7 +140,7 @@ def test_peers_solve_the_same_four_bars(
         assert off(linkage, found, truth_at(linkage, first + 0.02 * k)) < 1e-11
 
 
-@pytest.mark.parametrize('make', [single_precision, textbook, pylinkage, mujoco])
+@pytest.mark.parametrize('make', [single_precision, textbook, *PEERS])
 @pytest.mark.parametrize('name', ['jansen_leg', 'slider_crank', 'class_3', 'five_bar', 'watt_1'])
 def test_what_is_no_four_bar_is_not_taken_for_one(
     name: str, make: Callable[[Linkage], Method | None]

@@ -112,6 +112,19 @@ def with_more(bag: Bag, folder: Path, more: Sequence[tuple[int, BagMessage]]) ->
     return read_bag(writer.folder)
 
 
+def from_then_on(bag: Bag, folder: Path, begin: float) -> Bag:
+    """Return a bag that says that it begins in mid-run, at a time of the whole one in [ms]."""
+    numbers = {each.name: number for number, each in enumerate(bag.topics)}
+    attached = {name: ('', data) for name, data in bag.attachments.items()}
+    attached['run.json'] = ('', attached['run.json'][1].replace(b'{', b'{"begun": "mid-run", ', 1))
+    writer = BagWriter(folder, bag.topics, attached)
+    for message in bag.messages():
+        if message.log_time >= BEGIN + round(begin * MS):
+            writer.write(numbers[message.topic], *message[1:])
+    writer.close()
+    return read_bag(writer.folder)
+
+
 def read(bag: Bag, window: Window | None = None) -> Run:
     """Return what a report reads of a bag of a scene."""
     found, scene, missing = read_run(bag, window or Window(), Progress())

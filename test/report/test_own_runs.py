@@ -23,7 +23,7 @@ from linkage_ros.report.run import Window
 import numpy as np
 import pytest
 
-from .runs import but, curve, MS, on_lanes, read, recorded, Said, sample
+from .runs import but, curve, from_then_on, MS, on_lanes, read, recorded, Said, sample
 from ..ros.ticked import Moment  # noqa: TID252
 
 QUIET = 'faults: {quiet: {silence: {}}, worn: {stuck: {joint: rocker_joint}}}\n'
@@ -212,6 +212,58 @@ def both(tick, moment):
     else:
         message = JointStateWriter(joints).write(time, [0.007 * tick] * 2, [7.0] * 2)
     return moment._replace(messages=(message,))
+
+
+INJECTED = Said(350.5, 'faults', {'quiet (silence)': 'injected', 'worn (stuck)': 'off'})
+OFF = Said(350.5, 'faults', {'quiet (silence)': 'off', 'worn (stuck)': 'off'})
+
+# Of a bag that begins at 300 ms: what was turned on and off and said in the run, and its faults.
+BEGUN_LATER = {
+    'on before, and turned off': (
+        asking(tick_200=('quiet', True), tick_500=('quiet', False)),
+        (),
+        [(0, 200, 1, 'quiet (silence)')],
+    ),
+    'on before, as the diagnostics say': (
+        asking(tick_200=('quiet', True)),
+        (INJECTED,),
+        [(0, 699, 1, 'quiet (silence)')],
+    ),
+    'on before, as both say': (
+        asking(tick_200=('quiet', True), tick_500=('quiet', False)),
+        (INJECTED,),
+        [(0, 200, 1, 'quiet (silence)')],
+    ),
+    'on before, off, and on again': (
+        asking(tick_200=('quiet', True), tick_400=('quiet', False), tick_600=('quiet', True)),
+        (INJECTED,),
+        [(0, 100, 1, 'quiet (silence)'), (300, 699, 1, 'quiet (silence)')],
+    ),
+    'off before': (asking(tick_200=('quiet', True), tick_250=('quiet', False)), (OFF,), []),
+    'on before, and nothing says so': (asking(tick_200=('quiet', True)), (), []),
+    'on before the diagnostics say so, and not before the bag': (
+        asking(tick_340=('quiet', True)),
+        (INJECTED,),
+        [(40, 699, 1, 'quiet (silence)')],
+    ),
+}
+
+
+@pytest.mark.parametrize('block', [8192, 1])
+@pytest.mark.parametrize('name', BEGUN_LATER)
+def test_a_fault_that_was_on_before_the_bag_is_on_from_its_begin(
+    tmp_path, monkeypatch, name, block
+):
+    monkeypatch.setattr('linkage_ros.report.blocks._MOST_MESSAGES', block)
+    changed, said, expected = BEGUN_LATER[name]
+    bag = recorded(tmp_path, QUIET, but(1000, changed), said=said)
+    found = on_lanes(read(from_then_on(bag, tmp_path / 'later', 300.0)))
+    assert found.get('fault', []) == expected
+
+
+def test_of_a_whole_run_no_fault_was_on_before(tmp_path):
+    moments = but(1000, asking(tick_500=('quiet', False)))
+    assert 'fault' not in on_lanes(read(recorded(tmp_path, QUIET, moments)))
 
 
 def test_of_several_linkages_each_has_its_own_silence(tmp_path):

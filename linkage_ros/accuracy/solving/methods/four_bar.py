@@ -17,8 +17,9 @@
 
 from __future__ import annotations
 
-from cmath import phase
+from cmath import phase, rect
 from collections.abc import Callable, Sequence
+from math import sqrt
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.four_bars import four_bars
@@ -64,6 +65,20 @@ class PlainFourBar(NamedTuple):
     def changes(self, directions: Sequence[Any]) -> tuple[Any, ...]:
         """Return what the published joints' derivatives are, of those of the directions."""
         return tuple(directions[i] - directions[j] for i, j, _ in self.terms)
+
+    def closed_at(self, theta: float) -> tuple[float, float]:
+        """
+        Return the directions of coupler and rocker at one of the crank, all in [rad].
+
+        By the textbook: good enough to tell a peer once which of the two assemblies is meant.
+        """
+        crank_pin = rect(self.a, theta)
+        across = self.d - crank_pin
+        s = abs(across)
+        along = 0.5 * (s + (self.b - self.c) * (self.b + self.c) / s)
+        aside = self.side * sqrt(max(self.b * self.b - along * along, 0.0))
+        coupler = complex(along, aside) * (across / s)
+        return phase(coupler), phase(crank_pin + coupler - self.d)
 
 
 def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:

@@ -19,11 +19,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from linkage_ros.accuracy.solving.methods.casadi_peer import casadi
 from linkage_ros.accuracy.solving.methods.closed_form import closed_form, ITERATED
 from linkage_ros.accuracy.solving.methods.extended import extended
 from linkage_ros.accuracy.solving.methods.method import Method
 from linkage_ros.accuracy.solving.methods.mujoco_peer import mujoco
 from linkage_ros.accuracy.solving.methods.newton import COLD, FROM_KNOTS, newton, STARTS, WARM
+from linkage_ros.accuracy.solving.methods.pinocchio_peer import pinocchio
 from linkage_ros.accuracy.solving.methods.pylinkage_peer import pylinkage
 from linkage_ros.accuracy.solving.methods.single_precision import single_precision
 from linkage_ros.accuracy.solving.methods.table import table
@@ -59,7 +61,7 @@ def methods_for(linkage: Linkage, key: str, quick: bool) -> Iterator[Method]:
 
     """
     yield closed_form(linkage)
-    for made in (single_precision, textbook, pylinkage, mujoco):
+    for made in (single_precision, textbook, pylinkage, casadi, mujoco, pinocchio):
         method = made(linkage)
         if method is not None:
             yield method

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.util import find_spec
-from math import atan2, cos, sin, sqrt
+from math import atan2, cos, sin
 
 from linkage_ros.accuracy.solving.methods.four_bar import plain_four_bar
 from linkage_ros.accuracy.solving.methods.method import Joints, Method
@@ -40,7 +40,7 @@ def pylinkage(linkage: Linkage) -> Method | None:
     components = import_module('pylinkage.components')
     actuators, dyads = import_module('pylinkage.actuators'), import_module('pylinkage.dyads')
     failure = import_module('pylinkage.exceptions').UnbuildableError
-    a, b, c, d, side, turn, offset, _ = shape
+    a, b, c, d, _, turn, offset, _ = shape
     crank = actuators.Crank(anchor=components.Ground(0.0, 0.0), radius=a)
     other = components.Ground(d, 0.0)
     pin = dyads.RRRDyad(crank.output, other, b, c, x=0.0, y=0.0)
@@ -53,13 +53,8 @@ def pylinkage(linkage: Linkage) -> Method | None:
         x, y = a * cos(theta), a * sin(theta)
         crank.x, crank.y = x, y
         if not told:
-            across = complex(d - x, -y)
-            s = abs(across)
-            along = 0.5 * (s + (b - c) * (b + c) / s)
-            place = complex(x, y) + complex(
-                along, side * sqrt(max(b * b - along * along, 0.0))
-            ) * (across / s)
-            pin.x, pin.y = place.real, place.imag
+            _, rocker = shape.closed_at(theta)
+            pin.x, pin.y = d + c * cos(rocker), c * sin(rocker)
             told = True
         try:
             pin.reload(0)
