@@ -56,7 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FOLDER',
         help='where the page goes; nothing is overwritten (here accuracy_SCENE)',
     )
-    parser.add_argument('--quick', action='store_true', help='in some 15 s, with fewer points')
+    parser.add_argument(
+        '--quick',
+        action='store_true',
+        help='in some 15 s, with fewer points and no other packages',
+    )
     parser.add_argument(
         '--only',
         default=','.join(PARTS),

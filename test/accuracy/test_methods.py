@@ -24,15 +24,12 @@ from typing import Any
 
 from linkage_ros.accuracy.reference.reference import Reference, Truth
 from linkage_ros.accuracy.solving.loop_errors import off
-from linkage_ros.accuracy.solving.methods.casadi_peer import casadi
 from linkage_ros.accuracy.solving.methods.closed_form import closed_form, ITERATED, NAME
 from linkage_ros.accuracy.solving.methods.extended import extended
 from linkage_ros.accuracy.solving.methods.four_bar import plain_four_bar
 from linkage_ros.accuracy.solving.methods.integration import integration
+from linkage_ros.accuracy.solving.methods.ladder import PEERS
 from linkage_ros.accuracy.solving.methods.method import ACCELERATION, Method, RATE
-from linkage_ros.accuracy.solving.methods.mujoco_peer import mujoco
-from linkage_ros.accuracy.solving.methods.pinocchio_peer import pinocchio
-from linkage_ros.accuracy.solving.methods.pylinkage_peer import pylinkage
 from linkage_ros.accuracy.solving.methods.single_precision import single_precision
 from linkage_ros.accuracy.solving.methods.textbook import textbook
 from linkage_ros.accuracy.solving.poses import easy, path, Poses, shipped_linkage
@@ -94,8 +91,6 @@ def truth_at(linkage: Linkage, *inputs: float) -> Truth:
     driven = len(inputs)
     return Reference(linkage).solve(inputs, [RATE] * driven, [ACCELERATION] * driven)
 
-
-PEERS = (pylinkage, casadi, mujoco, pinocchio)
 
 MADE: dict[str, tuple[Callable[[Linkage], Method | None], float]] = {
     'closed form': (closed_form, 2e-15),

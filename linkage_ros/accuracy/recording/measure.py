@@ -33,8 +33,8 @@ FLUSH_PERIODS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 PACKED_AT = 1.0
 """The flush period at which the compressions are compared, in [s]."""
 
-QUICK_PERIODS = (0.05, 0.2, 0.5)
-QUICK_PACKED_AT = 0.5
+QUICK_PERIODS = (0.05, 0.2)
+QUICK_PACKED_AT = 0.2
 
 _WANTED = (0.1, 1.0, 5.0)
 _NEAR = 0.9
@@ -69,7 +69,7 @@ def measure_recording(
     """
     periods, packed_at = (QUICK_PERIODS, QUICK_PACKED_AT) if quick else (FLUSH_PERIODS, PACKED_AT)
     costs = measure_costs(
-        scene, folder, settings(periods, packed_at, folder), 0.6 if quick else 1.3,
+        scene, folder, settings(periods, packed_at, folder), 0.4 if quick else 1.3,
         1 if quick else 3, told,
     )  # fmt: skip
     return part_of(scene, costs, quick=quick)

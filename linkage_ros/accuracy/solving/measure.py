@@ -73,12 +73,12 @@ def measure_solving(scene: Scene, quick: bool, told: Callable[[str, float], None
 
     """
     member = scene.members[0]
-    sets = pose_sets(member.name or scene.name, member.linkage, 48 if quick else 128)
+    sets = pose_sets(member.name or scene.name, member.linkage, 24 if quick else 128)
     found: list[Measured] = []
     for number, poses in enumerate(sets):
         told('solving', 0.3 * number / len(sets))
         found += judge(poses, quick)
-    take_times(found, 2.0 if quick else 40.0, lambda part: told('solving', 0.3 + 0.7 * part))
+    take_times(found, 1.0 if quick else 40.0, lambda part: told('solving', 0.3 + 0.7 * part))
     return part_of(found, quick)
 
 

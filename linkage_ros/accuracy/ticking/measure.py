@@ -73,7 +73,7 @@ def measure_ticking(scene: Scene, quick: bool, told: Callable[[str, float], None
     if find_spec('rclpy') is None or len(linkage.inputs) > 1:
         return None
     rates = QUICK_RATES if quick else RATES
-    seconds = 1.0 if quick else 2.0
+    seconds = 0.6 if quick else 2.0
     closure = Closure(linkage)
     found: list[Used] = []
     with tempfile.TemporaryDirectory(prefix='linkage_ticking_') as folder:

@@ -36,6 +36,9 @@ from linkage_ros.solvers.table import ORDERS
 TOLERANCES = tuple(10.0**-k for k in range(2, 16))
 KNOTS = tuple(2**k for k in range(4, 21))
 
+PEERS = (pylinkage, casadi, mujoco, pinocchio)
+"""Other packages, where they are installed; to import some of them takes a second."""
+
 _FEW = {FROM_KNOTS: (1e-8,), WARM: (1e-2, 1e-8, 1e-14), COLD: (1e-8,)}
 """Tolerances by where Newton's method starts."""
 
@@ -57,11 +60,11 @@ def methods_for(linkage: Linkage, key: str, quick: bool) -> Iterator[Method]:
     key
         Of the poses: all settings for easy ones, a few for the others.
     quick
-        Whether a few settings are to do everywhere.
+        Whether a few settings are to do everywhere, and no other packages.
 
     """
     yield closed_form(linkage)
-    for made in (single_precision, textbook, pylinkage, casadi, mujoco, pinocchio):
+    for made in (single_precision, textbook, *(() if quick else PEERS)):
         method = made(linkage)
         if method is not None:
             yield method
@@ -78,10 +81,10 @@ def methods_for(linkage: Linkage, key: str, quick: bool) -> Iterator[Method]:
 
 
 def _knots_of(linkage: Linkage, key: str, quick: bool) -> Sequence[int]:
+    iterated = closed_form(linkage).name == ITERATED
     if quick and key != 'easy':
-        return KNOTS[6:7]
+        return KNOTS[4:5] if iterated else KNOTS[6:7]
     if quick or key != 'easy':
         return KNOTS[2:11:4]
-    iterated = closed_form(linkage).name == ITERATED
     largest = _LARGEST_ITERATED if iterated else _LARGEST // len(linkage.joints)
     return [knots for knots in KNOTS if knots <= largest]
