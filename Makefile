@@ -30,7 +30,7 @@ help:
 	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (9 min)'
 	@echo 'make synthesis compute and draw what docs/synthesis.md says'
 	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
-	@echo 'make damage    cut a bag at every byte and flip every bit of it (30 min)'
+	@echo 'make damage    cut a bag at every byte, flip every bit of it, into docs/recordings (30 min)'
 	@echo 'make kills     kill recordings at 1,400 instants, into docs/recordings (10 min)'
 	@echo 'make disk      let every call of a recording fail, disks fill and stall (10 min)'
 	@echo 'make endurance run 24 h in minutes and 10 min over DDS, into docs/recordings (25 min)'
@@ -88,7 +88,7 @@ round_trips: $(STAMP)
 	@$(BIN)/python -m campaigns.synthesis
 
 damage: $(STAMP)
-	@$(BIN)/python -m campaigns.damage
+	@$(BIN)/python -m campaigns.damage --write
 
 kills: $(STAMP)
 	@$(BIN)/python -m campaigns.kills --write

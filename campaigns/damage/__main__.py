@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
+from pathlib import Path
 import sys
 import time
 
@@ -32,7 +33,22 @@ from bench.report import say, show, Table
 from campaigns.damage.judge import FAULT
 from campaigns.damage.run import JUDGES, parts, run, Tally
 from campaigns.damage.subject import KINDS
+from campaigns.page import write_page
 from linkage_ros.accuracy.machine import describe_machine
+
+PAGE = Path('docs/recordings/damage.md')
+
+INTRO = """
+Made by `make damage`: a bag of ours of about 100 kB is cut at every byte, and every bit of it is
+flipped, each time from the whole bag; bags by other writers, packed and not, are cut and flipped
+at random places. Each is read as a bag that has to be whole, read as far as it goes, and looked
+through for what can be recovered. What is given has to be true messages in their order, with
+topics and attachments as they were, and where something is missing, that has to be said.
+
+A row is a verdict, how much was given and whether something was said; the numbers are damages.
+*all messages* are all of them without all of the attachments. A verdict that must not be begins
+with FAULT: a false message, topic or attachment, a loss that is not said, an error of Python.
+"""
 
 
 def main() -> int:
@@ -45,6 +61,7 @@ def main() -> int:
     )
     parser.add_argument('--jobs', type=int, default=2, help='processes')
     parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--write', action='store_true', help=f'keep the outcome in {PAGE}')
     arguments = parser.parse_args()
     started = told = time.monotonic()
     work = parts(['own'], arguments.seed, arguments.size, arguments.sample)
@@ -64,30 +81,31 @@ def main() -> int:
     except KeyboardInterrupt:
         say('stopped')
         return 130
-    for kind in KINDS:
-        for damage in ('cut', 'flip'):
-            _show(tally, kind, damage)
+    tables = [_table(tally, kind, damage) for kind in KINDS for damage in ('cut', 'flip')]
+    tables = [table for table in tables if table.rows]
     for kind, damage, place, name, verdict in tally.faults:
         say(f'{name}, {kind}, {damage} {place}: {verdict}')
     machine = Table('Machine', ('', ''), [*describe_machine()])
     machine.rows.append(('seed', str(arguments.seed)))
     seconds = time.monotonic() - started
     machine.rows.append(('damages', f'{of:,} in {seconds:.0f} s, {arguments.jobs} processes'))
-    show(machine)
+    tables.append(machine)
+    for table in tables:
+        show(table)
+    if arguments.write:
+        write_page(PAGE, 'Damaged bags', INTRO, tables)
     return int(bool(tally.faults))
 
 
-def _show(tally: Tally, kind: str, damage: str) -> None:
+def _table(tally: Tally, kind: str, damage: str) -> Table:
     counts: dict[str, Counter[str]] = {}
     for (of_kind, of_damage, judge, verdict), count in tally.verdicts.items():
         if (of_kind, of_damage) == (kind, damage):
             counts.setdefault(verdict, Counter())[judge] += count
-    if not counts:
-        return
     table = Table(f'{kind}: {damage}', ('verdict', *JUDGES))
     for verdict in sorted(counts, key=lambda v: (not v.startswith(FAULT), v)):
         table.rows.append([verdict, *(f'{counts[verdict][judge]:,}' for judge in JUDGES)])
-    show(table)
+    return table
 
 
 if __name__ == '__main__':
