@@ -40,10 +40,11 @@ PAGE = Path('docs/recordings/damage.md')
 
 INTRO = """
 Made by `make damage`: a bag of ours of about 100 kB is cut at every byte, and every bit of it is
-flipped, each time from the whole bag; bags by other writers, packed and not, are cut and flipped
-at random places. Each is read as a bag that has to be whole, read as far as it goes, and looked
-through for what can be recovered. What is given has to be true messages in their order, with
-topics and attachments as they were, and where something is missing, that has to be said.
+flipped, each time from the whole bag; one that was killed, and bags by other writers, packed and
+not, are cut and flipped at random places. Each is read as a bag that has to be whole, read as far
+as it goes, and looked through for what can be recovered. What is given has to be true messages in
+their order, with topics and attachments as they were, and where something is missing, that has to
+be said.
 
 A row is a verdict, how much was given and whether something was said; the numbers are damages.
 *all messages* are all of them without all of the attachments. A verdict that must not be begins

@@ -19,15 +19,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+import os
 from pathlib import Path
 from random import Random
 
 from linkage_ros.bag.reading.reader import BagMessage, read_bag
 from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.bag.writing.writer import BagWriter
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 START = 1_700_000_000_000_000_000
+KILLED = 'own, killed'
 TYPE = 'sensor_msgs/msg/JointState'
 DEFINITION = 'std_msgs/Header header\nstring[] name\nfloat64[] position\n' + '# text\n' * 100
 ATTACHMENTS = {
@@ -63,7 +66,8 @@ def make(kind: str, folder: Path, seed: int, size: int) -> Subject:
         Topic('/arm/joint_states', TYPE, DEFINITION, 'RIHS01_' + '0a' * 32),
     )
     file = KINDS[kind](folder, topics, messages)
-    bag = read_bag(folder if (folder / 'metadata.yaml').exists() else file)
+    named = folder if (folder / 'metadata.yaml').exists() else file
+    bag = read_bag(named, allow_truncated=kind == KILLED)
     expected = [BagMessage(topics[topic].name, *rest) for topic, *rest in messages]
     assert list(bag.messages()) == expected, 'undamaged, it is not what was written'
     return Subject(folder, file, file.read_bytes(), expected, bag.topics, bag.attachments)
@@ -77,6 +81,15 @@ def _own(folder: Path, topics: tuple[Topic, ...], messages: list[tuple[int, int,
             writer.flush()
     writer.close({'seed': '7'})
     return folder / f'{folder.name}_0.mcap'
+
+
+def _killed(folder: Path, topics: tuple[Topic, ...], messages: list[tuple[int, int, int, bytes]]):
+    """Write one that ends behind its last chunk, where a kill after a flush leaves it."""
+    file = _own(folder, topics, messages)
+    with file.open('rb') as stream:
+        last = make_reader(stream).get_summary().chunk_indexes[-1]
+    os.truncate(file, last.chunk_start_offset + last.chunk_length + last.message_index_length)
+    return file
 
 
 def _by_mcap(**options: object) -> Callable[..., Path]:
@@ -102,6 +115,7 @@ def _by_mcap(**options: object) -> Callable[..., Path]:
 
 KINDS: dict[str, Callable[..., Path]] = {
     'own': _own,
+    KILLED: _killed,
     'lz4': _by_mcap(compression=CompressionType.LZ4),
     'zstd': _by_mcap(compression=CompressionType.ZSTD),
     'no index': _by_mcap(

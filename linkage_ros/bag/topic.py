@@ -21,6 +21,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+CHANNELS_FILE = 'channels.mcap'
+"""Attached to each of our files under this name: an MCAP file with its topics and no messages."""
+
 INFINITE = 2**63 - 1
 """The duration [ns] that rmw takes as 'no limit'; rosbag2 writes 9223372036 s 854775807 ns."""
 

@@ -143,6 +143,7 @@ SOME_LOSS = {
     'cut before its end': (cut_at_chunk(3, -1), range(300, 600)),
     'length of a chunk, and cut': (cut_with(2, 3), range(0)),
     'kind of a chunk, and cut': (cut_with(2, 0), range(200, 300)),
+    'the first chunk with the topics, and cut': (cut_with(0, 500), range(100)),
     'packing of a chunk, and cut': (cut_with(2, 37), range(200, 300)),
     'length of the data, and cut': (cut_with(2, 43), range(200, 300)),
     'a hole': (hole, range(200, 300)),
@@ -179,10 +180,17 @@ def test_without_an_index_the_metadata_tells_what_was_promised(run):
     assert recovery.folder == run / 'run_0_recovered'
 
 
+def test_a_damaged_copy_of_the_topics_is_no_loss(run, messages):
+    recovery = recover(damaged(run, lambda c: flip(c.index(b'channels.mcap') + 500)(c)))
+    assert recovery.whole
+    assert 'what marks and describes' in '\n'.join(recovery.repaired)
+    assert data_of(recovery.folder) == without(messages, range(0))
+
+
 def test_without_a_description_messages_are_lost_too(run):
     def change(content):
-        in_chunk(0, 500)(content)
-        return content[: chunks_of(content)[5][1]]
+        flip(content.index(b'channels.mcap') + 500)(content)
+        return cut_with(0, 500)(content)
 
     recovery = recover(damaged(run, change))
     assert [topic.saved for topic in recovery.topics if topic.saved] == []

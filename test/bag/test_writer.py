@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from itertools import groupby
 import os
 import subprocess
@@ -26,7 +27,7 @@ from linkage_ros.bag.metadata import qos_text
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
 from mcap.reader import make_reader
-from mcap.records import Chunk
+from mcap.records import Channel, Chunk, Schema
 from mcap.stream_reader import StreamReader
 import pytest
 import yaml
@@ -100,8 +101,13 @@ def test_the_file_has_what_rosbag2_puts_there(bag, topics):
     assert inner == text['rosbag2_bagfile_information']
     assert inner['message_count'] == 12_000
     assert inner['custom_data'] == {'seed': '7'}
+    media_type, spare = attachments.pop('channels.mcap')
     assert attachments == ATTACHMENTS
-    assert summary.statistics.attachment_count == 3
+    assert summary.statistics.attachment_count == 4
+    assert media_type == 'application/mcap'
+    records = [*StreamReader(BytesIO(spare)).records]
+    assert [r for r in records if isinstance(r, Schema)] == [schema]
+    assert [r for r in records if isinstance(r, Channel)] == [*summary.channels.values()]
 
 
 def test_chunks_are_small_uncompressed_and_checked(bag):

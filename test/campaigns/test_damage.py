@@ -23,7 +23,7 @@ from pathlib import Path
 from campaigns.damage import judge as judge_module
 from campaigns.damage.judge import FAULT, judge_reading, judge_salvage
 from campaigns.damage.run import JUDGES, parts, run, Tally
-from campaigns.damage.subject import KINDS, make
+from campaigns.damage.subject import KILLED, KINDS, make
 from linkage_ros.bag.reading.reader import Bag, BagMessage
 import pytest
 
@@ -31,7 +31,7 @@ SEED = 20261121
 """Not the campaign's own: its findings went into the code."""
 
 SAMPLE = 250
-SIZE = 30_000
+SIZE = 40_000
 
 
 @pytest.fixture(scope='module')
@@ -57,6 +57,16 @@ def test_the_sample_has_seen_all_there_is_to_see(tally: Tally) -> None:
     assert own['flip', 'read', 'a part, says so'] > SAMPLE / 4
     assert own['flip', 'recover', 'a part, says so'] > SAMPLE / 4
     assert own['flip', 'recover', 'all, says nothing'] > SAMPLE / 50
+
+
+def test_no_single_bit_takes_all_of_a_killed_bag(tally: Tally) -> None:
+    found = {
+        verdict: count
+        for (kind, damage, judge, verdict), count in tally.verdicts.items()
+        if (kind, damage, judge) == (KILLED, 'flip', 'recover')
+    }
+    assert sum(found.values()) == SAMPLE
+    assert 'none, says so' not in found
 
 
 FALSE = {

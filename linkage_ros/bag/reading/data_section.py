@@ -18,6 +18,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
+from io import BytesIO
 from struct import Struct
 from zlib import crc32
 
@@ -219,3 +221,13 @@ class DataSection:
             raise DamagedError('is not as long as it says')
         self.misfits.append(at)
         return False
+
+
+def definitions_in(content: bytes) -> Definitions:
+    """Return the schemas and channels that stand in a small MCAP file, as far as it is one."""
+    definitions = Definitions()
+    data, at = DataSection(Source(BytesIO(content)), definitions), len(MCAP0_MAGIC)
+    with suppress(DamagedError):
+        while not data.finished:
+            _, at = data.take(at)
+    return definitions

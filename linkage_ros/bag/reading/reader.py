@@ -38,7 +38,7 @@ from linkage_ros.bag.reading.folder import (
     unreadable,
 )
 from linkage_ros.bag.reading.records import attachment_at, Definitions, Message, Source
-from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
 from linkage_ros.errors import BagError
 from mcap.records import Attachment, Channel, Schema
 from mcap.writer import MCAP0_MAGIC
@@ -157,7 +157,8 @@ def read_bag(
             topic = topic_of(channel, definitions.schema_of(channel))
             topics.setdefault(topic.name, topic)
         for attachment in attached:
-            attachments.setdefault(attachment.name, attachment.data)
+            if attachment.name != CHANNELS_FILE:
+                attachments.setdefault(attachment.name, attachment.data)
     ending = ending_of(files[-1])
     custom = custom_of(information) if information else ending.custom
     # Where the account is there, nothing is missing but the last words of the metadata.

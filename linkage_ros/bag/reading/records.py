@@ -129,6 +129,11 @@ class Definitions:
             if self.channels.setdefault(channel.id, channel) != channel:
                 raise DamagedError(f'makes channel {channel.id} another one')
 
+    def complete(self, others: Definitions) -> None:
+        """Take over what is not known yet."""
+        self.schemas = others.schemas | self.schemas
+        self.channels = others.channels | self.channels
+
     def schema_of(self, channel: Channel) -> Schema | None:
         """Return a channel's schema; nothing where it has none, or it is lost."""
         return self.schemas.get(channel.schema_id)

@@ -31,7 +31,7 @@ from struct import Struct
 from typing import NamedTuple
 
 from linkage_ros.bag.reading.compression import DamagedError
-from linkage_ros.bag.reading.data_section import DataSection, Found
+from linkage_ros.bag.reading.data_section import DataSection, definitions_in, Found
 from linkage_ros.bag.reading.file_index import FileIndex, index_of
 from linkage_ros.bag.reading.records import (
     attachment_at,
@@ -43,8 +43,9 @@ from linkage_ros.bag.reading.records import (
     Source,
 )
 from linkage_ros.bag.recovering.search import next_whole
+from linkage_ros.bag.topic import CHANNELS_FILE
 from mcap.opcode import Opcode
-from mcap.records import AttachmentIndex, ChunkIndex, MetadataIndex
+from mcap.records import Attachment, AttachmentIndex, ChunkIndex, MetadataIndex
 from mcap.writer import MCAP0_MAGIC
 
 _INT = Struct('<I')
@@ -54,6 +55,7 @@ _KINDS = {
     AttachmentIndex: Opcode.ATTACHMENT,
     MetadataIndex: Opcode.METADATA,
 }
+_MADE_ANEW = {(MetadataIndex, 'rosbag2'), (AttachmentIndex, CHANNELS_FILE)}
 _IN_DATA = {*_KINDS.values(), Opcode.MESSAGE_INDEX, Opcode.DATA_END}
 
 BEGINNING = 'the beginning, which is not that of an MCAP file'
@@ -108,6 +110,7 @@ class Salvage:
         # With all places known there is nothing to search for, and nothing else to lose.
         self._all_known = self.index is not None and _is_complete(self.index)
         self._end = self.index.start if self.index else source.size
+        self._spare = Definitions()
         self._messages = 0
         self._indexes_end = 0  # of the messages of the chunk before
 
@@ -126,7 +129,7 @@ class Salvage:
                 if self.data.unknown[-1:] == [(at, end)]:
                     self._lose(at, end, 'is of a kind that nobody has defined')
                 try:
-                    yield from self._counted(records, end)
+                    yield from self._wanted(self._counted(records, end))
                 except DamagedError as error:
                     self._lose(at, end, str(error))
             at = end
@@ -179,6 +182,14 @@ class Salvage:
             self._messages += counts.total()
             self._indexes_end = end + sum(15 + 16 * count for count in counts.values())
 
+    def _wanted(self, found: Iterable[Found]) -> Iterator[Found]:
+        """Pass on what is found, but keep what is there for us only."""
+        for one in found:
+            if isinstance(one, Attachment) and one.name == CHANNELS_FILE:
+                self._spare = definitions_in(one.data)
+            else:
+                yield one
+
     def _resume(self, at: int) -> int:
         """Return where to go on behind a record that is damaged."""
         self.data.loose = False
@@ -214,8 +225,10 @@ class Salvage:
         return True
 
     def _lose(self, start: int, end: int, reason: str) -> None:
+        # Schemas and channels may be among it.
+        self.data.definitions.complete(self._spare)
         promised = self._promised.get(start)
-        ours = isinstance(promised, MetadataIndex) and promised.name == 'rosbag2'
+        ours = (type(promised), getattr(promised, 'name', '')) in _MADE_ANEW
         if (self._all_known and not promised) or ours or end <= self._indexes_end:
             self.repaired.append(f'what marks and describes, at byte {start:,}: {reason}')
         else:

@@ -28,9 +28,9 @@ from pathlib import Path
 import time
 from typing import cast, IO
 
-from linkage_ros import __version__
-from linkage_ros.bag.metadata import BagSummary, NO_START, qos_text
-from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.metadata import BagSummary, NO_START
+from linkage_ros.bag.topic import CHANNELS_FILE, Topic
+from linkage_ros.bag.writing.channels import channels_file, register, start
 from linkage_ros.bag.writing.disk import CHUNK_SIZE, FIRST_RESERVE, RecordFile, Reserve
 from mcap.records import Statistics
 from mcap.writer import CompressionType, Writer
@@ -208,22 +208,11 @@ class BagFile:
         self._mcap = Writer(
             cast('IO[bytes]', self._file), chunk_size=CHUNK_SIZE, compression=compression
         )
-        self._mcap.start(profile='ros2', library=f'linkage_ros {__version__}')
-        for name, (media_type, content) in attachments.items():
+        start(self._mcap)
+        spare = {CHANNELS_FILE: ('application/mcap', channels_file(topics))}
+        for name, (media_type, content) in {**attachments, **spare}.items():
             self._mcap.add_attachment(0, time.time_ns(), name, media_type, content)
-        schemas: dict[str, int] = {}
-        self._channels: list[int] = []
-        for topic in topics:
-            if topic.type not in schemas:
-                definition = topic.definition.encode()
-                schemas[topic.type] = self._mcap.register_schema(topic.type, 'ros2msg', definition)
-            description = {
-                'offered_qos_profiles': qos_text(topic.qos),
-                'topic_type_hash': topic.type_hash,
-            }
-            self._channels.append(
-                self._mcap.register_channel(topic.name, 'cdr', schemas[topic.type], description)
-            )
+        self._channels = register(self._mcap, topics)
         if self._file.error:
             raise self._file.error
         self._begun = self._file.position
