@@ -277,7 +277,7 @@ said = False
 for message in messages:
     recorder.offer(*message)
     time.sleep(0.001)
-    if not said and recorder._safe[0] >= 100:
+    if not said and sum(recorder._safe) >= 200:
         said = True
         print('flushed', flush=True)
 time.sleep(60)
