@@ -35,9 +35,11 @@ from ..bag.foreign_reader.agreement import (  # noqa: TID252
 SCENE = """
 rate: 200
 effects: {acceleration: {}, noise: {joints: {rocker_joint: {white: 1.0e-4}}}}
-faults: {cable: {silence: {}, at: [0.2], seconds: 0.2}}
+faults: {cable: {silence: {}, at: %s, seconds: 0.2}}
 record: {directory: %s, name: bag, compression: zstd, flush_period: 0.1}
 """
+# However late the node is found: in the time of 150 joint states there is one.
+SILENCES = [0.5 * number for number in range(60)]
 TOPICS = {'/joint_states', '/crank_states', '/diagnostics', '/linkage_node/motion'}
 
 
@@ -49,7 +51,7 @@ def _reader():
 @pytest.fixture
 def running(graph, tmp_path, write_scene, start):
     """Return a node that has recorded for a second, and is fed no more."""
-    node = start(write_scene(tmp_path.name, SCENE % tmp_path))
+    node = start(write_scene(tmp_path.name, SCENE % (SILENCES, tmp_path)))
     publisher = graph.publisher(JointState, '/crank_states')
     heard = graph.listen(JointState, '/joint_states')
     wait_for(publisher.get_subscription_count, 'the node')

@@ -67,9 +67,10 @@ def test_a_ring_of_packed_files(graph, tmp_path, write_scene, start, compression
     with AnyReader([tmp_path / 'bag']) as reader:
         found = {name: topic.msgcount for name, topic in reader.topics.items()}
         assert sum(1 for _ in reader.messages()) == sum(found.values())
-    for name in names:
+    # The last has been written since the last second was full, which may be just now.
+    for name, least in zip(names, (100, 1), strict=True):
         with AnyReader([tmp_path / 'bag' / name]) as reader:
-            assert sum(1 for _ in reader.messages()) > 100
+            assert sum(1 for _ in reader.messages()) >= least
     with (tmp_path / 'bag' / names[-1]).open('rb') as stream:
         records = {record.name: record.metadata for record in make_reader(stream).iter_metadata()}
         account = {word: json.loads(text) for word, text in records['linkage_ros.account'].items()}
