@@ -80,6 +80,7 @@ class BagSummary:
     let_go: tuple[int, ...] = ()
 
 
+@lru_cache
 def qos_text(qos: QosProfile) -> str:
     """Return an MCAP channel's ``offered_qos_profiles``: YAML, a list of the one profile."""
     return _dump([qos.to_mapping()]).strip()
