@@ -116,4 +116,7 @@ def test_the_part_says_what_a_rate_buys(monkeypatch):
             f'{motion}, {way}' for motion in (CHIRP, ACCELERATION) for way in (HELD, CARRIED)
         ]
         assert {len(curve.points) for curve in diagram.curves} == {2}
+        # A mark is the median, between the quartiles of its arms.
+        for point in (point for curve in diagram.curves for point in curve.points):
+            assert point.y_spread.low <= point.y <= point.y_spread.high
     assert len(part.advice) == 4

@@ -114,15 +114,12 @@ def _diagram(
     curves = []
     for motion in dict.fromkeys(used.motion for used in found):
         for way in (HELD, CARRIED):
+            chosen = [
+                (used, spread_of(used.errors[way])) for used in found if used.motion == motion
+            ]
             points = [
-                Point(
-                    place(used),
-                    rms(used.errors[way]),
-                    y_spread=spread_of(used.errors[way]),
-                    setting=f'{used.rate:g} Hz',
-                )
-                for used in found
-                if used.motion == motion
+                Point(place(used), spread.middle, y_spread=spread, setting=f'{used.rate:g} Hz')
+                for used, spread in chosen
             ]
             curves.append(Curve(f'{motion}, {way}', points))
     return Diagram(key, title, axis, Axis('error of a joint when used', unit), curves)
