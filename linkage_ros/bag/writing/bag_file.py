@@ -29,8 +29,8 @@ import time
 from typing import cast, IO
 
 from linkage_ros.bag.metadata import BagSummary, NO_START
-from linkage_ros.bag.topic import CHANNELS_FILE, Topic
-from linkage_ros.bag.writing.channels import channels_file, register, start
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.channels import register, start
 from linkage_ros.bag.writing.disk import CHUNK_SIZE, FIRST_RESERVE, RecordFile, Reserve
 from mcap.records import Statistics
 from mcap.writer import CompressionType, Writer
@@ -209,8 +209,7 @@ class BagFile:
             cast('IO[bytes]', self._file), chunk_size=CHUNK_SIZE, compression=compression
         )
         start(self._mcap)
-        spare = {CHANNELS_FILE: ('application/mcap', channels_file(topics))}
-        for name, (media_type, content) in {**attachments, **spare}.items():
+        for name, (media_type, content) in attachments.items():
             self._mcap.add_attachment(0, time.time_ns(), name, media_type, content)
         self._channels = register(self._mcap, topics)
         if self._file.error:

@@ -38,8 +38,9 @@ from linkage_ros.bag.account import (
     UNFINISHED_DATA,
 )
 from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_metadata
-from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.topic import CHANNELS_FILE, Topic
 from linkage_ros.bag.writing.bag_file import BagFile
+from linkage_ros.bag.writing.channels import channels_file
 from linkage_ros.bag.writing.disk import NO_ROOM
 from linkage_ros.bag.writing.packing import compression_type
 from linkage_ros.bag.writing.storage import scarcity, Storage
@@ -63,7 +64,8 @@ class BagWriter:
     topics
         What will be written; a topic's number is its place in this sequence.
     attachments
-        Name to (media type, content); each file has them, so that each explains itself.
+        Name to (media type, content); each file has them, and its topics, so that each explains
+        itself.
     storage
         How it is stored; its ``flush_period`` is for whoever calls `flush`.
 
@@ -94,7 +96,8 @@ class BagWriter:
         self.storage = storage or Storage()
         self.let_go = (0,) * len(self.topics)
         self.account: Callable[[BagSummary], Account | None] = lambda summary: None
-        self._attachments = dict(attachments or {})
+        channels = 'application/mcap', channels_file(self.topics)
+        self._attachments = {**(attachments or {}), CHANNELS_FILE: channels}
         self._split_time = round(self.storage.split_seconds * 1e9)  # [ns]
         self._splits = self.storage.split_bytes > 0 or self._split_time > 0
         self._paths = (self.folder / f'{self.folder.name}_{number}.mcap' for number in count())
