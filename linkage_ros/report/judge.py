@@ -59,7 +59,7 @@ class Judge:
 
     """
 
-    def __init__(self, bag: Bag, scene: Scene, from_beginning: bool = True) -> None:
+    def __init__(self, bag: Bag, scene: Scene, from_beginning: bool) -> None:
         self._bag, self._scene = bag, scene
         # Of the others it is not known yet whether they were on as the bag began.
         self._known = {*(scene.faults if from_beginning else ())}

@@ -63,7 +63,8 @@ def methods_for(linkage: Linkage, key: str, quick: bool) -> Iterator[Method]:
         Whether a few settings are to do everywhere, and no other packages.
 
     """
-    yield closed_form(linkage)
+    closed = closed_form(linkage)
+    yield closed
     for made in (single_precision, textbook, *(() if quick else PEERS)):
         method = made(linkage)
         if method is not None:
@@ -74,14 +75,14 @@ def methods_for(linkage: Linkage, key: str, quick: bool) -> Iterator[Method]:
         for tolerance in many if whole else _FEW[start]:
             yield newton(linkage, tolerance, start)
     if len(linkage.inputs) == 1:
+        many_knots = _knots_of(linkage, closed.name == ITERATED, key, quick)
         for order in ORDERS:
-            for knots in _knots_of(linkage, key, quick):
+            for knots in many_knots:
                 yield table(linkage, knots, order)
     yield extended(linkage)
 
 
-def _knots_of(linkage: Linkage, key: str, quick: bool) -> Sequence[int]:
-    iterated = closed_form(linkage).name == ITERATED
+def _knots_of(linkage: Linkage, iterated: bool, key: str, quick: bool) -> Sequence[int]:
     if quick and key != 'easy':
         return KNOTS[4:5] if iterated else KNOTS[6:7]
     if quick or key != 'easy':
