@@ -36,7 +36,6 @@ from linkage_ros.cli.linkage_file import add_at, fixed, inputs, open_linkage, va
 from linkage_ros.cli.tables import show, Table, text
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.survey import Way
 
 _STEPS = 36
@@ -263,7 +262,7 @@ def _row(closure: Closure, question: Question, state: State) -> list[Any]:
         row += _xy(points[link, point])
     if question.rates is None:
         return row
-    if position.status is not Status.CLOSED:  # at a toggle there are no rates
+    if not position.status.has_rates:
         return row + [None] * (count * (len(_orders(question)) - 1))
     velocity = closure.velocity(position, *question.rates)
     # Rates of points come with accelerations; unknown ones are taken for none.

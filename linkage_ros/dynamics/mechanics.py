@@ -44,10 +44,7 @@ from typing import NamedTuple
 from linkage_ros.dynamics.loads import check_loads, check_masses, Friction, Loads
 from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.status import Status
 from linkage_ros.tuples import new
-
-_CLOSED = Status.CLOSED
 
 
 class Terms(NamedTuple):
@@ -148,7 +145,7 @@ class Mechanics:
         There is none where no rates exist, as at a toggle, where the linkage does not close, and
         within floats of a toggle, where the terms are beyond a double.
         """
-        if position[0] is not _CLOSED:
+        if not position[0].has_rates:
             return None
         velocity = self.closure.velocity(position, 1.0)
         acceleration = self.closure.acceleration(position, velocity, 0.0)

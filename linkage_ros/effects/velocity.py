@@ -26,7 +26,6 @@ from dataclasses import dataclass
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects.stage import Begin, Motion
 from linkage_ros.kinematics.closure import Position
-from linkage_ros.kinematics.status import Status
 from linkage_ros.tuples import new
 
 
@@ -40,10 +39,10 @@ PARAMETERS = VelocityParameters
 
 def begin(_parameters: VelocityParameters, context: Context) -> Begin:
     """Build what begins a motion."""
-    toggle, velocity_of = Status.TOGGLE, context.closure.velocity
+    velocity_of = context.closure.velocity
 
     def velocity(crank: CrankState, position: Position) -> Motion:
-        found = None if position[0] is toggle else velocity_of(position, *crank[1])
+        found = velocity_of(position, *crank[1]) if position[0].has_rates else None
         return new(Motion, (crank, position, found, None, (), (), ()))
 
     return velocity

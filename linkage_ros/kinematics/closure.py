@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.follower import Follower
     from numpy.typing import ArrayLike
 
-_CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
+_CLOSED = Status.CLOSED
 
 
 class Position(NamedTuple):
@@ -180,9 +180,10 @@ class Closure:
             poses.append(pose)
             found = pose[0]
             if found is not _CLOSED:
-                if found is not _TOGGLE:
+                if not found.has_pose:
                     return Position(found, pose[1] * self.scale, (), state, poses)
-                status = _TOGGLE
+                if status.has_rates:
+                    status = found
         joints: tuple[float, ...] = ()
         for i, j, factor, constant in self._terms:
             joints += (factor * (x[i] - x[j]) + constant,)

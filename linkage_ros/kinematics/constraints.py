@@ -33,7 +33,6 @@ from linkage_ros.kinematics.equations import (
 from linkage_ros.kinematics.iteration import Iteration
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.starting_pose import starting_pose
-from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State, Step
 from linkage_ros.kinematics.structure import Joint
 
@@ -87,7 +86,7 @@ class Constraints:
         ) -> tuple[dict[str, complex], dict[str, float]]:
             known = State([0.0, *inputs], [])
             for step in before:
-                if step.close(known)[0] is not Status.CLOSED:
+                if not step.close(known)[0].has_pose:
                     raise DefinitionError(
                         'pose.inputs',
                         'what comes before the iterated links does not close there',

@@ -18,12 +18,15 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from math import atan2, cos, fsum, inf, sin, sqrt
+from math import atan2, cos, fsum, inf, pi, sin, sqrt
 
 from linkage_ros.kinematics.diagonal import Diagonal, Growth, GrowthChange
-from linkage_ros.kinematics.rounding import reach, root_of, SMALLEST
+from linkage_ros.kinematics.rounding import passes_zero, reach, root_of, SMALLEST
+from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new
+
+_CLOSED = Status.CLOSED
 
 
 class CrankDiagonal:
@@ -62,6 +65,8 @@ class CrankDiagonal:
         '_constants', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits', 'sides',
         'stretch_margin',
     )  # fmt: skip
+
+    _at_change_point = Status.CHANGE_POINT
 
     def __init__(
         self,
@@ -107,24 +112,33 @@ class CrankDiagonal:
         square = difference * difference + excess
         lower, upper = self.limits
         if square < SMALLEST:
-            return Diagonal(0.0, 0.0, 0.0, 0.0, lower, near, far, 0.0)
+            status = Status.OPEN if lower else Status.INDETERMINATE
+            return Diagonal(0.0, 0.0, 0.0, 0.0, lower, near, far, 0.0, status)
         direction = base + atan2(
             -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
         )
         root_fold, missing = reach(fold, near)
         if missing:
             gap = missing / (sqrt(square) + lower)
-            return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0)
-        if upper == inf:
-            return new(Diagonal, (square, direction, root_fold, inf, 0.0, near, far, excess))
+            return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
+        root_stretch = 1.0
         if short_pair:
             root_stretch, missing = root_of(whole - near * near, abs(whole) + near * near)
-        else:
+        elif upper != inf:
             root_stretch, missing = reach(stretch, far)
-        gap = missing / (sqrt(square) + upper) if missing else 0.0
+        if missing:
+            gap = missing / (sqrt(square) + upper)
+            return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
+        status = _CLOSED
+        if (root_fold == 0.0 and fold) or (root_stretch == 0.0 and stretch):
+            status = Status.TOGGLE
+        elif (not fold and difference and passes_zero(half_sine, half)) or (
+            not stretch and passes_zero(half_cosine, half)
+        ):
+            status = self._at_change_point
         return new(
             Diagonal,
-            (square, direction, root_fold, root_stretch, gap, near, far, excess),
+            (square, direction, root_fold, root_stretch, 0.0, near, far, excess, status),
         )
 
     def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> Growth:
@@ -135,15 +149,28 @@ class CrankDiagonal:
 
             p = OA·AD/s² = −d(direction)/dφ = (a·(d − a) − near²/2)/s²
             q = OA·n̂/s   = (ds/dφ)/s        = near·far/(2s²)
+
+        The lean is q by the roots fold and stretch, of which at a change point one is near or far
+        itself.
         """
         v = speeds[0]
         first, second, _ = self.arms
-        square, _, _, _, _, near, far, _ = diagonal
+        square, _, fold, stretch, _, near, far, _, _ = diagonal
         a, difference = self._constants[:2]
         p = (a * difference - 0.5 * near * near) / square
         q = 0.5 * near * far / square
+        fold_ratio, stretch_ratio = self._ratios(near, far, fold, stretch)
         base = v[second]
-        return new(Growth, (q - 1j * p, v[first] - base, base))
+        lean = 0.5 * fold_ratio * stretch_ratio / square
+        return new(Growth, (q - 1j * p, v[first] - base, base, lean))
+
+    def _ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
+        """Return near by fold and far by stretch; where one is the other the ratio is 1."""
+        _, _, _, fold_bracket, stretch_bracket, _, _ = self._constants
+        return (
+            near / fold if fold_bracket else 1.0,
+            far / stretch if stretch_bracket else 1.0,
+        )
 
     def accelerations(
         self, diagonal: Diagonal, growth: Growth, _known: State, _speeds: State, changes: State
@@ -156,23 +183,31 @@ class CrankDiagonal:
             ((d − a)² − lower²)·far²/(s² − lower²)/(4s²)
               − (upper² − (a + d)²)·near²/(upper² − s²)/(4s²)
 
-        which is q' + q² − q²·cot(σβ)·cot(σγ') of an RRR dyad, and q' + q²·(1 − c²) of an RPR one,
-        with what cancels there taken out: at a change point one of the brackets is 0.
+        by fold and stretch, which is q' + q² − q²·cot(σβ)·cot(σγ') of an RRR dyad, and
+        q' + q²·(1 − c²) of an RPR one, with what cancels there taken out: at a change point one of
+        the brackets is 0, and near by fold, or far by stretch, is 1.
         """
         a = changes[0]
         first, second, _ = self.arms
         q, p = growth.unit.real, -growth.unit.imag
-        square, _, fold, stretch, _, near, far, _ = diagonal
+        square, _, fold, stretch, _, near, far, _, _ = diagonal
         (short, long), (fold_bracket, stretch_bracket) = self.sides, self.brackets
         turn = p + (p - q) * (p + q) + 1j * (q * ((long - short) * (long + short) / square))
+        fold_ratio, stretch_ratio = self._ratios(near, far, fold, stretch)
         bend = 0.0
         if fold_bracket:
-            bend = fold_bracket * (far / fold) * (far / fold)
+            bend = fold_bracket * (far / fold) / fold * (stretch_ratio / fold)
         if self.limits[1] == inf:
-            bend -= near * near
+            bend -= near * fold_ratio
         elif stretch_bracket:
-            bend -= stretch_bracket * (near / stretch) * (near / stretch)
+            bend -= stretch_bracket * (near / stretch) / stretch * (fold_ratio / stretch)
         return new(GrowthChange, (turn, a[first] - a[second], a[second], 0.25 * bend / square))
+
+    @property
+    def change_points(self) -> tuple[float, ...]:
+        """Differences of the two coordinates at which all links lie in one line, in [rad]."""
+        margins = ((self.fold_margin, 0.0), (self.stretch_margin, pi))
+        return tuple(phi - self.arms[2] for margin, phi in margins if margin == 0.0)
 
 
 class UnsignedDiagonal(CrankDiagonal):
@@ -180,12 +215,19 @@ class UnsignedDiagonal(CrankDiagonal):
     The diagonal between two links neither of which an input turns against the ground.
 
     Their angles are known but for whole turns, and with them the sign of a half angle. So a change
-    point is not passed: the assembly stays the one that is named.
+    point is not passed: the assembly stays the one that is named, and the links turn back there as
+    at a toggle.
     """
 
     __slots__ = ()
+
+    _at_change_point = Status.TOGGLE
 
     def at(self, known: State) -> Diagonal:
         """Return the diagonal."""
         found = super().at(known)
         return found._replace(fold=abs(found.fold), stretch=abs(found.stretch))
+
+    def _ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
+        """Return near by fold and far by stretch."""
+        return near / fold, far / stretch

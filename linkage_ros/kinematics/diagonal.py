@@ -27,6 +27,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import NamedTuple, Protocol
 
+from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 
 
@@ -42,13 +43,15 @@ class Diagonal(NamedTuple):
         Of AD, in [rad].
     fold, stretch
         √(s² − lower²) and √(upper² − s²): how far the dyad is from its limits. Signed at a change
-        point; the latter is infinite where the dyad has no upper limit.
+        point; the latter is 1 where the dyad has no upper limit.
     gap
         What A and D are too near or too far by; 0 where the dyad closes.
     near, far
         2·√(ad)·sin(φ/2) and 2·√(ad)·cos(φ/2) of a `CrankDiagonal`, else 0.
     excess
         What s² has beyond the diagonal's ``least``, its constant part.
+    status
+        Of the dyad, as far as the diagonal decides it.
 
     """
 
@@ -60,6 +63,7 @@ class Diagonal(NamedTuple):
     near: float
     far: float
     excess: float
+    status: Status
 
 
 class Growth(NamedTuple):
@@ -67,12 +71,14 @@ class Growth(NamedTuple):
     The rates of a diagonal: ṡ/s + i·(rate of the direction) = swing·unit + i·base.
 
     The unit may be huge where A is next to D. What it is multiplied by in a dyad is as small then:
-    that product comes first.
+    that product comes first. ``lean`` is the unit's real part by fold and stretch: at a change
+    point all three are 0, and it is not.
     """
 
     unit: complex
     swing: float
     base: float
+    lean: float
 
 
 class GrowthChange(NamedTuple):
@@ -80,8 +86,8 @@ class GrowthChange(NamedTuple):
     The derivative of a `Growth`: change·unit + swing²·square + i·base.
 
     The bend is what the square's real part leaves of a dyad's own second derivative (each dyad
-    says what): near a change point a difference of large numbers, so a `CrankDiagonal` tells it,
-    where all others leave it to the dyad.
+    says what), by fold and stretch: near a change point a difference of large numbers, so a
+    `CrankDiagonal` tells it, where all others leave it to the dyad.
     """
 
     square: complex

@@ -23,8 +23,11 @@ from math import inf
 
 from linkage_ros.kinematics.diagonal import Diagonal, Growth, GrowthChange
 from linkage_ros.kinematics.rounding import root_of, SMALLEST
+from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new
+
+_CLOSED = Status.CLOSED
 
 
 class FreeDiagonal:
@@ -55,12 +58,12 @@ class FreeDiagonal:
         start, end = pins[first], pins[second]
         return free_diagonal(end - start, abs(start) + abs(end), *self._limits)
 
-    def rates(self, _diagonal: Diagonal, known: State, speeds: State) -> Growth:
+    def rates(self, diagonal: Diagonal, known: State, speeds: State) -> Growth:
         """Return the velocity of D against A, divided by AD."""
         first, second = self._ends
         pins, velocities = known[1], speeds[1]
         unit = (velocities[second] - velocities[first]) / (pins[second] - pins[first])
-        return new(Growth, (unit, 1.0, 0.0))
+        return new(Growth, (unit, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch))
 
     def accelerations(
         self, _diagonal: Diagonal, growth: Growth, known: State, _speeds: State, changes: State
@@ -78,13 +81,17 @@ def free_diagonal(vector: complex, size: float, lower: float, upper: float) -> D
     s = abs(vector)
     square = s * s
     if square < SMALLEST:
-        return Diagonal(0.0, 0.0, 0.0, 0.0, lower, 0.0, 0.0, 0.0)
+        status = Status.OPEN if lower else Status.INDETERMINATE
+        return Diagonal(0.0, 0.0, 0.0, 0.0, lower, 0.0, 0.0, 0.0, status)
     root_fold, missing = root_of((s - lower) * (s + lower), (size + lower) * (s + lower))
-    if missing:
-        return Diagonal(square, 0.0, 0.0, 0.0, missing / (s + lower), 0.0, 0.0, 0.0)
-    root_stretch, gap = inf, 0.0
-    if upper != inf:
+    gap, root_stretch = missing / (s + lower), 1.0
+    if upper != inf and not gap:
         root_stretch, missing = root_of((upper - s) * (upper + s), (size + upper) * (upper + s))
         gap = missing / (upper + s)
-    direction = phase(vector)
-    return new(Diagonal, (square, direction, root_fold, root_stretch, gap, 0.0, 0.0, square))
+    if gap:
+        return Diagonal(square, 0.0, 0.0, 0.0, gap, 0.0, 0.0, 0.0, Status.OPEN)
+    status = _CLOSED if root_fold and root_stretch else Status.TOGGLE
+    return new(
+        Diagonal,
+        (square, phase(vector), root_fold, root_stretch, 0.0, 0.0, 0.0, square, status),
+    )

@@ -189,7 +189,7 @@ class Iteration:
         known = State([0.0, *inputs], [])
         for step in self._before:
             status = step.close(known)[0]
-            if status is not Status.CLOSED and status is not Status.TOGGLE:
+            if not status.has_pose:
                 return None
         return known
 

@@ -28,9 +28,12 @@ from cmath import phase, rect
 from math import inf, pi, sqrt
 from typing import NamedTuple, Protocol
 
-from linkage_ros.kinematics.rounding import margin, reach, root_of
+from linkage_ros.kinematics.rounding import margin, passes_zero, reach, root_of
+from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import facing, State
 from linkage_ros.tuples import new
+
+_CLOSED = Status.CLOSED
 
 
 class Sight(NamedTuple):
@@ -50,6 +53,11 @@ class Sight(NamedTuple):
         Coordinate of the link that carries the rail, in [rad].
     arm
         From O to A in the frame of a `CrankRail`, else 0.
+    lean
+        Of a `CrankRail` with a change point, dy/dψ by below and above, else 0: at the change point
+        both are 0, and it is not.
+    status
+        Of the link, as far as the rail decides it: not whether it stands across the line.
 
     """
 
@@ -59,6 +67,8 @@ class Sight(NamedTuple):
     gap: float
     base: float
     arm: complex
+    lean: float
+    status: Status
 
 
 class Rail(Protocol):
@@ -81,17 +91,13 @@ class Rail(Protocol):
     ) -> tuple[complex, float]:
         """Return the pin's acceleration in that frame, and that of the frame, in [rad/s²]."""
 
+    def climb(self, sight: Sight, rise: float, speeds: State, /) -> float:
+        """Return the rate of y, the rise, by below and above."""
+
     def across(
-        self,
-        sight: Sight,
-        pull: complex,
-        along: float,
-        link_rate: float,
-        speeds: State,
-        changes: State,
-        /,
+        self, sight: Sight, pull: complex, link_rate: float, speeds: State, changes: State, /
     ) -> float:
-        """Return ÿ + y·λ̇², of a link at the rate λ̇ whose part along the line is w."""
+        """Return ÿ + y·λ̇², of a link at the rate λ̇, by below and above."""
 
 
 class CrankRail:
@@ -105,7 +111,7 @@ class CrankRail:
         b − y = (b − e − a) + 2a·sin²η        b + y = (b + e − a) + 2a·cos²η
 
     The brackets are constants of the linkage. Where one is zero, the root has the sign of its sine
-    or cosine, and passes the change point with it.
+    or cosine, and passes the change point with it; so does dy/dψ = a·cos ψ = 2a·sin η·cos η.
 
     Parameters
     ----------
@@ -120,7 +126,9 @@ class CrankRail:
 
     """
 
-    __slots__ = ('_arm', '_arms', '_constants', '_half_turn', '_link')
+    __slots__ = ('_arm', '_constants', '_half_turn', '_link', 'arms')
+
+    _at_change_point = Status.CHANGE_POINT
 
     def __init__(self, arm: complex, pivot: complex, link: float, arms: tuple[int, int]) -> None:
         a = abs(arm)
@@ -133,29 +141,48 @@ class CrankRail:
         self._arm = arm
         self._half_turn = rect(1.0, 0.25 * pi - 0.5 * phase(arm))
         self._link = link
-        self._arms = arms
+        self.arms = arms
+
+    @property
+    def change_points(self) -> tuple[float, ...]:
+        """Differences of the two coordinates at which all links lie across the line, in [rad]."""
+        _, _, below, above, _, _ = self._constants
+        across = ((below, 0.5 * pi), (above, -0.5 * pi))
+        return tuple(psi - phase(self._arm) for bracket, psi in across if bracket == 0.0)
 
     def at(self, known: State) -> Sight:
         """Return the pin in the frame of the rail."""
         a, pivot, below, above, root, changes_over = self._constants
-        first, second = self._arms
+        first, second = self.arms
         x, link = known[0], self._link
         base = x[second]
         swing = x[first] - base
         arm = rect(1.0, swing) * self._arm
         place = pivot + arm
         if link == inf:
-            return new(Sight, (place, inf, inf, 0.0, base, arm))
+            return new(Sight, (place, inf, inf, 0.0, base, arm, 0.0, _CLOSED))
         eta = rect(1.0, -0.5 * swing) * self._half_turn
         sine, cosine = eta.imag, eta.real
         root_below, gap = self._root(below, root * sine, link, -place.imag)
         root_above = 0.0
         if not gap:
             root_above, gap = self._root(above, root * cosine, link, place.imag)
+        if gap:
+            return Sight(place, 0.0, 0.0, gap, base, arm, 0.0, Status.OPEN)
+        lean, status = 0.0, _CLOSED
         if changes_over:
             # Of the rate, which is 0 where the root is; two forms of one zero would not cancel.
             arm = complex(2.0 * a * sine * cosine, arm.imag)
-        return new(Sight, (place, root_below, root_above, gap, base, arm))
+            lean = 1.0
+            if above:
+                lean = root * cosine / root_above
+            elif below:
+                lean = root * sine / root_below
+            if (not below and passes_zero(sine, 0.5 * swing)) or (
+                not above and passes_zero(cosine, 0.5 * swing)
+            ):
+                status = self._at_change_point
+        return new(Sight, (place, root_below, root_above, 0.0, base, arm, lean, status))
 
     def _root(self, bracket: float, part: float, link: float, side: float) -> tuple[float, float]:
         """Return the root of the link's length less what it has to reach, and the gap."""
@@ -165,7 +192,7 @@ class CrankRail:
 
     def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
         """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
-        first, second = self._arms
+        first, second = self.arms
         v = speeds[0]
         swing, arm = v[first] - v[second], sight.arm
         return 1j * (swing * arm.real) - swing * arm.imag, v[second]
@@ -179,22 +206,24 @@ class CrankRail:
         changes: State,
     ) -> tuple[complex, float]:
         """Return the pin's acceleration in the frame of the rail, and that of the frame."""
-        first, second = self._arms
+        first, second = self.arms
         v, a = speeds[0], changes[0]
         swing = v[first] - v[second]
         return (1j * (a[first] - a[second]) - swing * swing) * sight.arm, a[second]
 
+    def climb(self, sight: Sight, rise: float, speeds: State) -> float:
+        """Return the rate of y, the rise, by below and above."""
+        if not self._constants[-1]:
+            return rise / (sight.below * sight.above)
+        first, second = self.arms
+        v = speeds[0]
+        return (v[first] - v[second]) * sight.lean
+
     def across(
-        self,
-        sight: Sight,
-        _pull: complex,
-        along: float,
-        link_rate: float,
-        speeds: State,
-        changes: State,
+        self, sight: Sight, _pull: complex, link_rate: float, speeds: State, changes: State
     ) -> float:
         """
-        Return ÿ + y·λ̇².
+        Return ÿ + y·λ̇² by below and above.
 
         The two cancel at a change point. What remains of their ψ̇² is also::
 
@@ -202,24 +231,31 @@ class CrankRail:
               = (e·(b + y)² − y·(b + e − a)·(a + b + e))/w²
 
         where the brackets b ∓ e − a are constants of the linkage. Of the forms the one of smaller
-        terms is taken.
+        terms is taken; with a change point the one whose bracket is 0, which no other does.
         """
-        first, second = self._arms
+        first, second = self.arms
         v, changed = speeds[0], changes[0]
-        a, pivot, below, above = self._constants[:4]
+        a, pivot, below, above, _, changes_over = self._constants
         link, e, y = self._link, pivot.imag, sight.place.imag
-        swing = v[first] - v[second]
+        swing, change = v[first] - v[second], changed[first] - changed[second]
+        if changes_over:
+            if not below:
+                bent = e * sight.below / sight.above**3 if above else 0.0
+            else:
+                bent = e * sight.above / sight.below**3
+            return change * sight.lean + swing * swing * bent
         if y > 0.0:
             terms = e * sight.below**4, y * below * (a + link - e)
         else:
             terms = e * sight.above**4, y * above * (a + link + e)
         parts = -swing * swing * sight.arm.imag, y * link_rate * link_rate
+        along = sight.below * sight.above
         square = (swing / along) ** 2
         if (abs(terms[0]) + abs(terms[1])) * square < abs(parts[0]) + abs(parts[1]):
             rest = (terms[0] - terms[1]) * square
         else:
             rest = parts[0] + parts[1]
-        return (changed[first] - changed[second]) * sight.arm.real + rest
+        return (change * sight.arm.real + rest) / along
 
 
 class UnsignedRail(CrankRail):
@@ -227,10 +263,14 @@ class UnsignedRail(CrankRail):
 
     __slots__ = ()
 
+    _at_change_point = Status.TOGGLE
+
     def at(self, known: State) -> Sight:
         """Return the pin in the frame of the rail."""
         found = super().at(known)
-        return found._replace(below=abs(found.below), above=abs(found.above))
+        opposite = (found.below < 0.0) != (found.above < 0.0)
+        lean = found.lean * (1.0 - 2.0 * opposite)
+        return found._replace(below=abs(found.below), above=abs(found.above), lean=lean)
 
 
 class FreeRail:
@@ -268,13 +308,14 @@ class FreeRail:
         place = (end - start) * (self._facing(-base) * self._back)
         link = self._link
         if link == inf:
-            return new(Sight, (place, inf, inf, 0.0, base, 0j))
+            return new(Sight, (place, inf, inf, 0.0, base, 0j, 0.0, _CLOSED))
         size = abs(start) + abs(end) + link
         below, gap = root_of(link - place.imag, size)
         above = 0.0
         if not gap:
             above, gap = root_of(link + place.imag, size)
-        return new(Sight, (place, below, above, gap, base, 0j))
+        status = Status.OPEN if gap else _CLOSED
+        return new(Sight, (place, below, above, gap, base, 0j, 0.0, status))
 
     def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
         """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
@@ -299,19 +340,16 @@ class FreeRail:
         change = a[self._arm]
         back = self._facing(-sight.base) * self._back
         # Coriolis, Euler and centrifugal terms of a frame that turns.
-        apparent = (
-            complex(0.0, 2.0 * turn) * velocity + complex(-turn * turn, change) * sight.place
-        )
+        apparent = 2j * turn * velocity + (1j * change - turn * turn) * sight.place
         return (end - start) * back - apparent, change
 
+    def climb(self, sight: Sight, rise: float, _speeds: State) -> float:
+        """Return the rate of y, the rise, by below and above."""
+        return rise / (sight.below * sight.above)
+
     def across(
-        self,
-        sight: Sight,
-        pull: complex,
-        _along: float,
-        link_rate: float,
-        _speeds: State,
-        _changes: State,
+        self, sight: Sight, pull: complex, link_rate: float, _speeds: State, _changes: State
     ) -> float:
-        """Return ÿ + y·λ̇²."""
-        return pull.imag + sight.place.imag * link_rate * link_rate
+        """Return ÿ + y·λ̇² by below and above."""
+        across = pull.imag + sight.place.imag * link_rate * link_rate
+        return across / (sight.below * sight.above)

@@ -29,7 +29,6 @@ from typing import NamedTuple, TYPE_CHECKING
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
-from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure
@@ -161,7 +160,7 @@ def search(
 
 def _closes(closure: Closure) -> Callable[[float], bool]:
     """Return whether the loops close at a value of the single input."""
-    return lambda value: closure.position(value).status in (Status.CLOSED, Status.TOGGLE)
+    return lambda value: closure.position(value).status.has_pose
 
 
 def _limit(closes: Callable[[float], bool], inside: float, outside: float) -> float:

@@ -62,6 +62,16 @@ def reach(constant: float, part: float) -> tuple[float, float]:
     return root_of(constant + square, abs(constant) + square)
 
 
+def passes_zero(part: float, half_angle: float) -> bool:
+    """
+    Return whether the sine or cosine of a half angle is zero but for the rounding of the angle.
+
+    An angle is rounded at its own size, and π is no double: at the double next to it the cosine of
+    the half angle is 6e-17.
+    """
+    return abs(part) <= ROUNDING * max(1.0, abs(half_angle))
+
+
 def root_of(total: float, size: float) -> tuple[float, float]:
     """Return root and what is missing as `reach` does, of a sum whose terms are of a size."""
     rounding = ROUNDING * size

@@ -21,10 +21,32 @@ from enum import Enum
 
 
 class Status(Enum):
-    """What a dyad found at one crank angle."""
+    """
+    What was found at one state of the inputs, from the best answer to the worst.
+
+    The status of a linkage is the worst of its dyads.
+
+    Attributes
+    ----------
+    has_pose
+        Whether positions are valid.
+    has_rates
+        Whether velocities and accelerations are valid, too.
+
+    """
 
     CLOSED = 'closed'
     """The loop closes; position and rates are valid."""
+
+    CHANGE_POINT = 'change point'
+    """
+    All links of a loop lie in one line, and its two assemblies meet.
+
+    Position and rates are valid: they are those of the motion that passes through.
+    """
+
+    LIMITED = 'limited'
+    """The loop closes with valid rates, but a joint is beyond the limits that the file names."""
 
     TOGGLE = 'toggle'
     """The dyad is stretched or folded: the position is valid, its rate is not."""
@@ -34,3 +56,11 @@ class Status(Enum):
 
     INDETERMINATE = 'indeterminate'
     """Two pins coincide, and with them every direction is a solution: no pose can be told."""
+
+    has_pose: bool
+    has_rates: bool
+
+
+for _status in Status:
+    _status.has_pose = _status not in (Status.OPEN, Status.INDETERMINATE)
+    _status.has_rates = _status.has_pose and _status is not Status.TOGGLE

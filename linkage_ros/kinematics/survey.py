@@ -100,7 +100,7 @@ class Way:
 
     def closes(self, value: float) -> bool:
         """Return whether every loop closes there."""
-        return self.position(value).status in (Status.CLOSED, Status.TOGGLE)
+        return self.position(value).status.has_pose
 
     @cached_property
     def ranges(self) -> tuple[InputRange, ...]:

@@ -64,7 +64,7 @@ class Met(NamedTuple):
     @property
     def closed(self) -> bool:
         """Whether the position exists at all."""
-        return self.status in (Status.CLOSED, Status.TOGGLE)
+        return self.status.has_pose
 
 
 def prove(design: Design) -> tuple[Met, ...]:

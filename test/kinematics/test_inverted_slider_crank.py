@@ -117,11 +117,11 @@ def test_a_straight_rod_behind_is_the_one_ahead_turned_round(
 
 
 @pytest.mark.parametrize(('a', 'd', 'h'), [(1.0, 2.0, 1.0), (2.0, 1.0, -1.0), (0.75, 2.0, 1.25)])
-def test_a_bent_rod_that_just_reaches_its_swivel_is_at_a_toggle(
+def test_a_bent_rod_that_just_reaches_its_swivel_is_at_a_change_point(
     a: float, d: float, h: float
 ) -> None:
     # At φ = 0 the pin is |d − a| = |h| from the swivel: the rod stands across the ground.
     pose = InvertedSliderCrank(a, d, h, 1).close(0.0)
-    assert (pose.status, pose.gap, pose.slide) == (Status.TOGGLE, 0.0, 0.0)
+    assert (pose.status, pose.gap, pose.slide) == (Status.CHANGE_POINT, 0.0, 0.0)
     across = a * 1.0 - h * sin(pose.rail) - d
     assert across == pytest.approx(0.0, abs=1e-15)

@@ -38,9 +38,14 @@ BLOCK = 8192
 """States of a block: as many as stay in the cache."""
 
 CODES = {status: code for code, status in enumerate(Status)}
-"""How an array says a status: closed is 0."""
+"""
+How an array says a status: closed is 0, and the greater the worse.
 
-CLOSED, TOGGLE = CODES[Status.CLOSED], CODES[Status.TOGGLE]
+Below the toggle there are rates, up to it a pose.
+"""
+
+CLOSED, CHANGE_POINT = CODES[Status.CLOSED], CODES[Status.CHANGE_POINT]
+LIMITED, TOGGLE = CODES[Status.LIMITED], CODES[Status.TOGGLE]
 OPEN, INDETERMINATE = CODES[Status.OPEN], CODES[Status.INDETERMINATE]
 
 _Step = TypeVar('_Step')
@@ -57,7 +62,7 @@ class Block(NamedTuple):
     speeds, changes
         Likewise; None where they are not asked for, the changes with the speeds.
     status
-        The code of each state: that of the first step that fails, else whether one toggles.
+        The code of each state: that of the first step that fails, else the worst of the steps.
     scratch
         Rows to work in, as long as a block; a step may use them until it returns.
     places
@@ -99,11 +104,20 @@ def remade(kind: type[_Step], step: _Step, **changed: object) -> _Step:
     return made
 
 
-def codes_of(gap: Array | float, lost: Mask | bool, toggle: Mask | bool) -> Codes:
-    """Return the status: open where there is a gap, else indeterminate, toggle or closed."""
-    codes = np.where(toggle, np.uint8(TOGGLE), np.uint8(CLOSED))
+def codes_of(
+    gap: Array | float, lost: Mask | bool, toggle: Mask | bool, change_point: Mask | bool = False
+) -> Codes:
+    """Return the status: open where there is a gap, else the worst of what else there is."""
+    codes = np.where(change_point, np.uint8(CHANGE_POINT), np.uint8(CLOSED))
+    codes = np.where(toggle, np.uint8(TOGGLE), codes)
     codes = np.where(lost, np.uint8(INDETERMINATE), codes)
     return np.where(gap > 0.0, np.uint8(OPEN), codes)
+
+
+def passes_zeros(parts: Array, half_angles: Array) -> Mask:
+    """Return where a sine or cosine of a half angle is zero, as `passes_zero` does of one."""
+    found: Mask = np.abs(parts) <= ROUNDING * np.maximum(1.0, np.abs(half_angles))
+    return found
 
 
 def joined(real: Array | float, imaginary: Array | float) -> Complex:

@@ -33,7 +33,7 @@ blocks where a state is not closed.
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import sqrt
 from operator import attrgetter
 from typing import NamedTuple, TypeAlias
 
@@ -47,7 +47,7 @@ from linkage_ros.kinematics.batch.arrays import (
     sine_cosine,
     TOGGLE,
 )
-from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
 from linkage_ros.kinematics.dyads.rrr import RRRDyad
 from linkage_ros.kinematics.rounding import ROUNDING, SMALLEST
 import numpy as np
@@ -62,7 +62,7 @@ class Scratch(NamedTuple):
     Attributes
     ----------
     near, far, s, x, y, cross
-        ½·near², ½·far², ½·s², ½·X, ½·Y, ½·K. At a change point x or y is the signed root.
+        ½·near², ½·far², ½·s², ½·X, ½·Y, ½·K.
     plus, minus
         ½·(D + s²), ½·(D − s²).
     turn
@@ -110,7 +110,7 @@ class CrankRRRArrays:
     def __init__(self, dyad: RRRDyad) -> None:
         diagonal = dyad.diagonal
         assert isinstance(diagonal, CrankDiagonal)
-        (more, less, sign), difference = attrgetter('_constants', '_difference')(dyad)
+        (more, less), sign, difference = attrgetter('_sums', '_sign', '_difference')(dyad)
         *_, short_pair, whole = attrgetter('_constants')(diagonal)
         fold, stretch = diagonal.brackets
         a, d = diagonal.sides
@@ -126,15 +126,12 @@ class CrankRRRArrays:
         self._lost = OPEN if diagonal.limits[0] else INDETERMINATE
         # A state whose X·Y is above this is further inside its limits than any rounding goes.
         sizes = [2.0 * a * d + 0.5 * abs(bracket) for bracket in (fold, stretch)]
-        self._tolerance = 8.0 * ROUNDING * sizes[0] * sizes[1] if fold and stretch else inf
+        self._tolerance = 8.0 * ROUNDING * sizes[0] * sizes[1]
 
     @staticmethod
     def fits(dyad: RRRDyad) -> bool:
-        """Return whether it solves a dyad: no change point whose side is unsigned."""
-        diagonal = dyad.diagonal
-        if isinstance(diagonal, UnsignedDiagonal):
-            return all(diagonal.brackets)
-        return isinstance(diagonal, CrankDiagonal)
+        """Return whether it solves a dyad: one without a change point."""
+        return isinstance(dyad.diagonal, CrankDiagonal) and all(dyad.diagonal.brackets)
 
     def solve(self, block: Block) -> None:
         """Append the directions of both links, and what is asked for of their motion."""
@@ -183,10 +180,6 @@ class CrankRRRArrays:
         a, d, root, fold, stretch, more, less, _ = self._constants
         near, far = w.x, w.y
         sine_cosine(phi, near, far, w.p, 0.5)
-        if not stretch:
-            # A change point at half a turn, where the tangent leaves no digits of the cosine.
-            np.multiply(phi, 0.5, out=w.p)
-            np.cos(w.p, out=far)
         np.multiply(near, 2.0 * root, out=near)
         np.multiply(far, root, out=far)
         if self._arms[2]:
@@ -198,11 +191,10 @@ class CrankRRRArrays:
         np.add(w.near, 0.5 * (d - a) * (d - a), out=w.s)
         np.add(w.near, more, out=w.plus)
         np.subtract(less, w.near, out=w.minus)
-        if fold:
-            np.add(w.near, fold, out=w.x)
+        np.add(w.near, fold, out=w.x)
         if self._pair:
             np.subtract(self._pair, w.near, out=w.y)
-        elif stretch:
+        else:
             np.add(w.far, stretch, out=w.y)
         np.multiply(w.x, w.y, out=w.cross)
 
@@ -224,18 +216,10 @@ class CrankRRRArrays:
         """
         _, _, _, fold, stretch, *_ = self._constants
         codes: Codes = np.full(len(w.s), CLOSED, np.uint8)
-        root_x = np.sqrt(np.maximum(w.x, 0.0)) if fold else w.x
-        root_y = np.sqrt(np.maximum(w.y, 0.0)) if stretch else w.y
-        np.multiply(root_x, root_y, out=w.cross)
+        np.multiply(np.sqrt(np.maximum(w.x, 0.0)), np.sqrt(np.maximum(w.y, 0.0)), out=w.cross)
         np.multiply(w.cross, self._assembly, out=w.cross)
-        reaches = []
-        if fold:
-            reaches.append((w.x, fold, w.near))
-        if self._pair:
-            reaches.append((w.y, self._pair, w.near))
-        elif stretch:
-            reaches.append((w.y, stretch, w.far))
-        for total, constant, part in reaches:
+        upper = (self._pair, w.near) if self._pair else (stretch, w.far)
+        for total, constant, part in ((w.x, fold, w.near), (w.y, *upper)):
             rounding = ROUNDING * (abs(constant) + part)
             codes[total < -rounding] = OPEN
             w.cross[np.abs(total) <= rounding] = 0.0
@@ -269,15 +253,11 @@ class CrankRRRArrays:
     ) -> None:
         """Write α3 and α4; what the scratch held is used up."""
         a, d, _, fold, stretch, _, _, difference = self._constants
-        if fold:
-            np.multiply(w.far, 0.5 * fold, out=w.far)
-            np.divide(w.far, w.x, out=w.far)
-        else:
-            w.far.fill(0.0)
-        if stretch:
-            np.multiply(w.near, 0.5 * stretch, out=w.near)
-            np.divide(w.near, w.y, out=w.near)
-            np.subtract(w.far, w.near, out=w.far)
+        np.multiply(w.far, 0.5 * fold, out=w.far)
+        np.divide(w.far, w.x, out=w.far)
+        np.multiply(w.near, 0.5 * stretch, out=w.near)
+        np.divide(w.near, w.y, out=w.near)
+        np.subtract(w.far, w.near, out=w.far)
         np.divide(w.far, w.s, out=w.far)
         np.divide(w.far, w.cross, out=w.far)
 

@@ -26,17 +26,22 @@ from typing import Any
 
 from linkage_ros.kinematics.batch.arrays import (
     Array,
+    CHANGE_POINT,
+    codes_of,
     Complex,
+    passes_zeros,
     phases,
     reaches,
     roots_of,
     sine_cosine,
     States,
+    TOGGLE,
 )
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.diagonal import Diagonal
 from linkage_ros.kinematics.free_diagonal import FreeDiagonal
 from linkage_ros.kinematics.rounding import SMALLEST
+from linkage_ros.kinematics.status import Status
 from linkage_ros.tuples import new
 import numpy as np
 
@@ -64,16 +69,29 @@ class CrankDiagonalArrays(CrankDiagonal):
         )
         root_fold, missing = reaches(fold, near)
         gap = missing / (np.sqrt(square) + lower)
-        root_stretch: Any = inf
+        root_stretch: Any = 1.0
+        toggle = (root_fold == 0.0) & bool(fold)
+        flat: Any = False
         if upper != inf:
             if short_pair:
                 root_stretch, missing = roots_of(whole - excess, abs(whole) + excess)
             else:
                 root_stretch, missing = reaches(stretch, far)
             gap = np.where(gap > 0.0, gap, missing / (np.sqrt(square) + upper))
+            toggle |= (root_stretch == 0.0) & bool(stretch)
+        if not fold and difference:
+            flat = flat | passes_zeros(half_sine, half)
+        if not stretch:
+            flat = flat | passes_zeros(half_cosine, half)
         gap = np.where(met, lower, gap)
         square = np.where(met, 0.0, square)
-        return new(Diagonal, (square, direction, root_fold, root_stretch, gap, near, far, excess))
+        codes = codes_of(gap, met, toggle, flat)
+        if self._at_change_point is Status.TOGGLE:
+            codes = np.where(codes == CHANGE_POINT, np.uint8(TOGGLE), codes)
+        return new(
+            Diagonal,
+            (square, direction, root_fold, root_stretch, gap, near, far, excess, codes),
+        )
 
 
 class UnsignedDiagonalArrays(UnsignedDiagonal, CrankDiagonalArrays):
@@ -120,10 +138,14 @@ def free_diagonals(
     met = square < SMALLEST
     root_fold, missing = roots_of((s - lower) * (s + lower), (size + lower) * (s + lower))
     gap = missing / (s + lower)
-    root_stretch: Any = inf
+    root_stretch: Any = 1.0
     if not (isinstance(upper, float) and upper == inf):
         root_stretch, missing = roots_of((upper - s) * (upper + s), (size + upper) * (upper + s))
         gap = np.where(gap > 0.0, gap, missing / (upper + s))
     gap = np.where(met, lower, gap)
     square = np.where(met, 0.0, square)
-    return new(Diagonal, (square, phases(vector), root_fold, root_stretch, gap, 0.0, 0.0, square))
+    codes = codes_of(gap, met, (root_fold == 0.0) | (root_stretch == 0.0))
+    return new(
+        Diagonal,
+        (square, phases(vector), root_fold, root_stretch, gap, 0.0, 0.0, square, codes),
+    )

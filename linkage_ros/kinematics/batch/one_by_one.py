@@ -59,7 +59,7 @@ class OneByOne:
             if codes[k] > TOGGLE:
                 continue
             done = 1
-            if status[k] == codes[k] == CLOSED and len(states) > 1:
+            if max(status[k], codes[k]) < TOGGLE and len(states) > 1:
                 rates = self._step.rates(pose, *states[:2])
                 done = 2
                 if len(states) > 2:

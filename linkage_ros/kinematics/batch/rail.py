@@ -22,13 +22,17 @@ from typing import Any
 
 from linkage_ros.kinematics.batch.arrays import (
     Array,
+    CLOSED,
+    codes_of,
     joined,
+    passes_zeros,
     reaches,
     roots_of,
     States,
     turned,
 )
 from linkage_ros.kinematics.rail import CrankRail, FreeRail, Sight, UnsignedRail
+from linkage_ros.kinematics.status import Status
 from linkage_ros.tuples import new
 import numpy as np
 
@@ -41,22 +45,35 @@ class CrankRailArrays(CrankRail):
     def at(self, known: States) -> Sight:
         """Return the pins in the frame of the rail."""
         a, pivot, below, above, root, changes_over = self._constants
-        first, second = self._arms
+        first, second = self.arms
         x, link = known[0], self._link
         base = x[second]
         swing = x[first] - base
         arm = turned(swing) * self._arm
         place = pivot + arm
         if link == inf:
-            return new(Sight, (place, inf, inf, 0.0, base, arm))
+            return new(Sight, (place, inf, inf, 0.0, base, arm, 0.0, CLOSED))
         eta = turned(-0.5 * swing) * self._half_turn
         sine, cosine = eta.imag, eta.real
         root_below, gap = self._roots(below, root * sine, -place.imag)
         root_above, missing = self._roots(above, root * cosine, place.imag)
+        gap = np.where(gap > 0.0, gap, missing)
+        lean: Any = 0.0
+        flat: Any = False
         if changes_over:
             arm = joined(2.0 * a * sine * cosine, arm.imag)
-        gap = np.where(gap > 0.0, gap, missing)
-        return new(Sight, (place, root_below, root_above, gap, base, arm))
+            lean = np.ones_like(sine)
+            if above:
+                lean = root * cosine / root_above
+            elif below:
+                lean = root * sine / root_below
+            if not below:
+                flat = flat | passes_zeros(sine, 0.5 * swing)
+            if not above:
+                flat = flat | passes_zeros(cosine, 0.5 * swing)
+        at_change_point = self._at_change_point is Status.CHANGE_POINT
+        codes = codes_of(gap, False, False if at_change_point else flat, flat)
+        return new(Sight, (place, root_below, root_above, gap, base, arm, lean, codes))
 
     def _roots(self, bracket: float, part: Array, side: Array) -> tuple[Any, Any]:
         """Return the roots of the link's length less what it has to reach, and the gaps."""
@@ -71,20 +88,17 @@ class CrankRailArrays(CrankRail):
         )
 
     def across(
-        self,
-        sight: Sight,
-        _pull: Any,
-        along: Any,
-        link_rate: Any,
-        speeds: States,
-        changes: States,
+        self, sight: Sight, pull: Any, link_rate: Any, speeds: States, changes: States
     ) -> Any:
-        """Return ÿ + y·λ̇²."""
-        first, second = self._arms
+        """Return ÿ + y·λ̇² by below and above."""
+        first, second = self.arms
         v, changed = speeds[0], changes[0]
-        a, pivot, below, above = self._constants[:4]
+        a, pivot, below, above, _, changes_over = self._constants
+        if changes_over:
+            return super().across(sight, pull, link_rate, speeds, changes)
         link, e = self._link, pivot.imag
         y: Any = sight.place.imag
+        along = sight.below * sight.above
         swing = v[first] - v[second]
         left = y > 0.0
         square = np.where(left, sight.below, sight.above)
@@ -95,7 +109,7 @@ class CrankRailArrays(CrankRail):
         square = (swing / along) ** 2
         closed_form = (np.abs(term) + np.abs(other)) * square < abs(parts[0]) + abs(parts[1])
         rest = np.where(closed_form, (term - other) * square, parts[0] + parts[1])
-        return (changed[first] - changed[second]) * sight.arm.real + rest
+        return ((changed[first] - changed[second]) * sight.arm.real + rest) / along
 
 
 class UnsignedRailArrays(UnsignedRail, CrankRailArrays):
@@ -119,8 +133,10 @@ class FreeRailArrays(FreeRail):
         place = (end - start) * (turned(-base) * self._back)
         link = self._link
         if link == inf:
-            return new(Sight, (place, inf, inf, 0.0, base, 0j))
+            return new(Sight, (place, inf, inf, 0.0, base, 0j, 0.0, CLOSED))
         size = np.abs(start) + np.abs(end) + link
         below, gap = roots_of(link - place.imag, size)
         above, missing = roots_of(link + place.imag, size)
-        return new(Sight, (place, below, above, np.where(gap > 0.0, gap, missing), base, 0j))
+        gap = np.where(gap > 0.0, gap, missing)
+        codes = codes_of(gap, False, False)
+        return new(Sight, (place, below, above, gap, base, 0j, 0.0, codes))

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkage_ros.kinematics.batch.arrays import codes_of, States
+from linkage_ros.kinematics.batch.arrays import States
 from linkage_ros.kinematics.dyads.rpr import RPRDyad, RPRPose
 from linkage_ros.tuples import new
 import numpy as np
@@ -38,5 +38,4 @@ class RPRArrays(RPRDyad):
         rail = diagonal.direction - np.arctan2(offset, slide)
         known[0].append(rail)
         known[0].append(slide)
-        codes = codes_of(diagonal.gap, diagonal.square == 0.0, slide == 0.0)
-        return new(RPRPose, (codes, diagonal.gap, rail, slide, diagonal))
+        return new(RPRPose, (diagonal.status, diagonal.gap, rail, slide, diagonal))

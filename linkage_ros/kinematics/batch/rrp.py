@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkage_ros.kinematics.batch.arrays import codes_of, States
+from linkage_ros.kinematics.batch.arrays import CLOSED, States, TOGGLE
 from linkage_ros.kinematics.dyads.rrp import RRPDyad, RRPPose
 from linkage_ros.kinematics.rounding import SMALLEST
 from linkage_ros.tuples import new
@@ -33,12 +33,14 @@ class RRPArrays(RRPDyad):
 
     def close(self, known: States) -> RRPPose:
         """Append the direction of the link, as the rail's link has it, and the slide."""
-        sight: Any = self._rail.at(known)
-        place, below, above, gap, base, _ = sight
+        sight: Any = self.rail.at(known)
+        place, below, above, gap, base, _, _, codes = sight
         along = self._sign * below * above
-        along = np.where(np.abs(along) < SMALLEST, 0.0, along)
+        tiny = (codes == CLOSED) & (np.abs(along) < SMALLEST)
+        along = np.where(tiny, 0.0, along)
         link = base + np.arctan2(-place.imag, along)
         slide = place.real + along
         known[0].append(link)
         known[0].append(slide)
-        return new(RRPPose, (codes_of(gap, False, along == 0.0), gap, link, slide, along, sight))
+        codes = np.where(tiny, np.uint8(TOGGLE), codes)
+        return new(RRPPose, (codes, gap, link, slide, along, sight))

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkage_ros.kinematics.batch.arrays import Array, codes_of, States
+from linkage_ros.kinematics.batch.arrays import Array, CLOSED, States, TOGGLE
 from linkage_ros.kinematics.diagonal import Diagonal
 from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose
 from linkage_ros.kinematics.rounding import SMALLEST
@@ -38,7 +38,7 @@ class RRRArrays(RRRDyad):
 
     def close(self, known: States) -> RRRPose:
         """Append the directions of both links."""
-        pose = close_triangles(self.diagonal.at(known), *self._constants)
+        pose = close_triangles(self.diagonal.at(known), *self._sums, self._sign)
         known[0].append(pose.first)
         known[0].append(pose.second)
         return pose
@@ -48,12 +48,13 @@ def close_triangles(
     diagonal: Diagonal, more: Array | float, less: Array | float, sign: float
 ) -> RRRPose:
     """Return the poses over diagonals, as `close_triangle` does of one."""
-    square: Any
-    square, direction, fold, stretch, gap, _, _, excess = diagonal
+    codes: Any
+    _, direction, fold, stretch, gap, _, _, excess, codes = diagonal
     product = sign * fold * stretch
-    cross = np.where(np.abs(product) < SMALLEST, 0.0, product)
+    tiny = (codes == CLOSED) & (np.abs(product) < SMALLEST)
+    cross = np.where(tiny, 0.0, product)
     more, less = more + excess, less - excess
     first = direction + np.arctan2(cross, more)
     second = direction + np.arctan2(cross, less)
-    codes = codes_of(gap, square == 0.0, cross == 0.0)
+    codes = np.where(tiny, np.uint8(TOGGLE), codes)
     return new(RRRPose, (codes, gap, first, second, cross, diagonal, more, less))

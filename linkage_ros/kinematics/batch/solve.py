@@ -34,6 +34,7 @@ from linkage_ros.kinematics.batch.arrays import (
     CLOSED,
     Codes,
     INDETERMINATE,
+    OPEN,
     TOGGLE,
 )
 from linkage_ros.kinematics.batch.crank_rrr import ROWS
@@ -159,7 +160,7 @@ class Solver:
                 if constant and not order:
                     np.add(into, constant, out=into)
                 if failed:
-                    np.copyto(into, np.nan, where=status > (CLOSED if order else TOGGLE))
+                    np.copyto(into, np.nan, where=status >= (TOGGLE if order else OPEN))
 
 
 def _numbers(name: str, values: list[Any], driven: int, count: int | None) -> list[Array]:

@@ -97,7 +97,7 @@ def _rpr(dyad: RPRDyad) -> ArrayStep:
 
 
 def _on_rail(kind: type[Any]) -> Callable[[Any], ArrayStep]:
-    return lambda dyad: _Walked(remade(kind, dyad, _rail=_part(attrgetter('_rail')(dyad))))
+    return lambda dyad: _Walked(remade(kind, dyad, rail=_part(dyad.rail)))
 
 
 def _driven_rrr(dyad: DrivenRRRDyad) -> ArrayStep:

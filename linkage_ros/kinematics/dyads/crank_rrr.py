@@ -35,8 +35,8 @@ from linkage_ros.tuples import new
 
 _CLOSED = Status.CLOSED
 
-_Rates = tuple[float, float, float, float, float, float]
-"""q, φ̇, the cotangents of β and γ', and the rates of both links by φ."""
+_Rates = tuple[float, float, float, float, float]
+"""q, φ̇, q/K, and the rates of both links by φ."""
 
 
 class CrankRRRDyad(RRRDyad):
@@ -115,7 +115,7 @@ class CrankRRRDyad(RRRDyad):
         x += (first, second)
         diagonal = new(
             Diagonal,
-            (square, direction, fold_root, stretch_root, 0.0, near, far, near_square),
+            (square, direction, fold_root, stretch_root, 0.0, near, far, near_square, _CLOSED),
         )
         return new(RRRPose, (_CLOSED, 0.0, first, second, cross, diagonal, more, less))
 
@@ -124,31 +124,31 @@ class CrankRRRDyad(RRRDyad):
     ) -> _Rates:
         """Append the rates of both links."""
         i, j, along = self._moving
-        _, _, _, _, cross, (square, _, _, _, _, near, far, _), more, less = pose
+        _, _, _, _, _, (square, _, fold, stretch, _, near, far, _, _), more, less = pose
         p, q = (along - 0.5 * near * near) / square, 0.5 * near * far / square
-        cot_beta, cot_gamma = more / cross, less / cross
+        lean = 0.5 * (near / fold) * (far / stretch) / square * self._sign
         v = speeds[0]
         base = v[j]
         swing = v[i] - base
-        first, second = q * cot_gamma - p, q * cot_beta - p
+        first, second = less * lean - p, more * lean - p
         v += (base + swing * first, base + swing * second)
-        return q, swing, cot_beta, cot_gamma, first, second
+        return q, swing, lean, first, second
 
     def accelerations(  # type: ignore[override]  # of its own rates
         self, pose: RRRPose, rates: _Rates, _known: State, _speeds: State, changes: State
     ) -> None:
         """Append the accelerations of both links."""
         i, j, fold_bracket, stretch_bracket, lengths, difference = self._pulling
-        _, _, _, _, cross, (square, _, fold, stretch, _, near, far, _), _, _ = pose
-        q, swing, cot_beta, cot_gamma, first, second = rates
-        bend = fold_bracket * (far / fold) * (far / fold)
-        bend -= stretch_bracket * (near / stretch) * (near / stretch)
-        bend = 0.25 * bend / square
-        swirl = q * (lengths / square) - 2.0 * q * (q * (difference / cross))
+        _, _, _, _, _, (square, _, fold, stretch, _, near, far, _, _), more, less = pose
+        q, swing, lean, first, second = rates
+        bend = fold_bracket * (far / fold) / fold * (far / stretch / fold)
+        bend -= stretch_bracket * (near / stretch) / stretch * (near / fold / stretch)
+        bend = 0.25 * bend / square * self._sign
+        swirl = q * (lengths / square) - 2.0 * q * (lean * difference)
         a = changes[0]
         base = a[j]
         pull, whirl = a[i] - base, swing * swing
         a += (
-            base + pull * first + whirl * (swirl + cot_gamma * bend),
-            base + pull * second + whirl * (swirl + cot_beta * bend),
+            base + pull * first + whirl * (swirl + less * bend),
+            base + pull * second + whirl * (swirl + more * bend),
         )

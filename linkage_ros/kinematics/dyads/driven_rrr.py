@@ -32,7 +32,6 @@ from linkage_ros.kinematics.diagonal import Growth, GrowthChange
 from linkage_ros.kinematics.dyads.rrr import (
     close_triangle,
     RRRPose,
-    RRRRates,
     triangle_accelerations,
     triangle_rates,
 )
@@ -125,9 +124,9 @@ class DrivenRRRPose(NamedTuple):
 
 
 class DrivenRRRRates(NamedTuple):
-    """The triangle's rates, and those of both sides."""
+    """The growth of the diagonal, and the rates of both sides."""
 
-    triangle: RRRRates
+    growth: Growth
     sides: tuple[complex, complex]
 
 
@@ -174,9 +173,10 @@ class DrivenRRRDyad:
         one, other = (side.changes(x, v)[0] for side in self._sides)
         units = self._units(pose)
         between = velocities[end] + other * units[1] - velocities[start] - one * units[0]
-        growth = Growth(between / (pins[end] - pins[start]), 1.0, 0.0)
-        rates = triangle_rates(pose.triangle, growth, speeds)
-        return DrivenRRRRates(rates, (one, other))
+        unit, diagonal = between / (pins[end] - pins[start]), pose.triangle.diagonal
+        growth = Growth(unit, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch)
+        triangle_rates(pose.triangle, self._sign, growth, speeds)
+        return DrivenRRRRates(growth, (one, other))
 
     def accelerations(
         self,
@@ -190,9 +190,10 @@ class DrivenRRRDyad:
         x, pins = known
         v, (a, pulls) = speeds[0], changes
         start, end = self._ends
-        unit, cot_beta, cot_gamma = rates.triangle.growth.unit, *rates.triangle[1:]
+        growth, triangle = rates.growth, pose.triangle
+        unit, lean = growth.unit, self._sign * growth.lean
         # The rates of this dyad's own links, as `rates` has appended them.
-        turns = unit.imag + unit.real * cot_gamma, unit.imag + unit.real * cot_beta
+        turns = unit.imag + triangle.less * lean, unit.imag + triangle.more * lean
         one, other = (
             (side.changes(x, v, a)[1] + 2j * turn * rate) * unit_now
             for side, turn, rate, unit_now in zip(
@@ -203,7 +204,7 @@ class DrivenRRRDyad:
         square = between / (pins[end] - pins[start]) - unit * unit
         b, c = map(abs, pose.sides)
         change = GrowthChange(square, 0.0, 0.0, None)
-        triangle_accelerations(pose.triangle, (b - c) * (b + c), rates.triangle, change, changes)
+        triangle_accelerations(triangle, self._sign, (b - c) * (b + c), growth, change, changes)
 
     def transmission_angle(self, pose: DrivenRRRPose) -> float:
         """Return the angle between the two sides at B, folded into [0, π/2], in [rad]."""

@@ -75,10 +75,10 @@ class RPPDyad:
 
     """
 
-    __slots__ = ('_across', '_constant', '_inner', '_outer', '_rail')
+    __slots__ = ('_across', '_constant', '_inner', '_outer', 'rail')
 
     def __init__(self, rail: Rail, constant: complex, inner: complex, outer: complex) -> None:
-        self._rail = rail
+        self.rail = rail
         self._constant = constant
         self._inner = inner
         self._outer = outer
@@ -86,13 +86,13 @@ class RPPDyad:
 
     def close(self, known: State) -> RPPPose:
         """Append both slides."""
-        sight = self._rail.at(known)
+        sight = self.rail.at(known)
         first, second = self._slides(sight.place - self._constant, known)
         return new(RPPPose, (Status.CLOSED, 0.0, first, second, sight))
 
     def rates(self, pose: RPPPose, known: State, speeds: State) -> tuple[complex, float]:
         """Append the rates of both slides."""
-        rates = self._rail.rates(pose.sight, known, speeds)
+        rates = self.rail.rates(pose.sight, known, speeds)
         self._slides(rates[0], speeds)
         return rates
 
@@ -105,7 +105,7 @@ class RPPDyad:
         changes: State,
     ) -> None:
         """Append the accelerations of both slides."""
-        pull, _ = self._rail.accelerations(pose.sight, rates, known, speeds, changes)
+        pull, _ = self.rail.accelerations(pose.sight, rates, known, speeds, changes)
         self._slides(pull, changes)
 
     def transmission_angle(self, _pose: RPPPose) -> float:

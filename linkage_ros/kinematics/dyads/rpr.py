@@ -25,13 +25,14 @@ at the offset h: AD = r·û + h·n̂. With s = |AD|::
 ±s. Where |d − a| = |h| (a straight rod: the crank as long as the distance to the swivel), r passes
 zero with the sign of the half angle, as the rod itself does. At r = 0 a straight rod has no
 direction that could be told: the pose is indeterminate, not zero. A bent one (h ≠ 0) is at a
-toggle.
+change point where |d − a| = |h|, else at a toggle.
 
-Rates, where the diagonal grows by g = ṡ/s and turns by t, and with c = h/r, so that 1 + c² =
-s²/r²::
+Rates, where the diagonal grows by g = ṡ/s and turns by t, and with 1 + h²/r² = s²/r²::
 
-    ψ̇ = t + g·c                            ṙ = g·(r + h·c)
-    ψ̈ = ṫ + c·(e − 2g²)                    r̈ = (r + h·c)·e        e = ġ + g²·(1 − c²)
+    ψ̇ = t + h·(g/r)                        ṙ = s²·(g/r)
+    ψ̈ = ṫ + h·(e/r − 2g·(g/r))             r̈ = s²·(e/r)           e = ġ + g²·(1 − h²/r²)
+
+At a change point g, e and r are 0: the diagonal gives both quotients.
 """
 
 from __future__ import annotations
@@ -45,8 +46,6 @@ from linkage_ros.kinematics.rounding import margin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new
-
-_CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
 
 
 class RPRPose(NamedTuple):
@@ -101,44 +100,44 @@ class RPRDyad:
         """Append the direction of the rail, and the slide."""
         offset, sign = self._constants
         diagonal = self.diagonal.at(known)
-        square, direction, fold, _, gap, *_ = diagonal
-        if gap:
-            return RPRPose(Status.OPEN, gap, 0.0, 0.0, diagonal)
-        if not square:
-            return RPRPose(Status.INDETERMINATE, 0.0, 0.0, 0.0, diagonal)
+        _, direction, fold, _, gap, _, _, _, status = diagonal
+        if not status.has_pose:
+            return RPRPose(status, gap, 0.0, 0.0, diagonal)
         slide = sign * fold
         rail = direction - atan2(offset, slide)
         known[0].append(rail)
         known[0].append(slide)
-        return new(RPRPose, (_CLOSED if slide else _TOGGLE, 0.0, rail, slide, diagonal))
+        return new(RPRPose, (status, 0.0, rail, slide, diagonal))
 
     def rates(self, pose: RPRPose, known: State, speeds: State) -> Growth:
         """Append the rates of rail and slide."""
-        offset = self._constants[0]
+        offset, sign = self._constants
         growth = self.diagonal.rates(pose.diagonal, known, speeds)
-        unit, swing, base = growth
-        slope = offset / pose.slide
-        speeds[0].append(base + swing * (unit.imag + unit.real * slope))
-        speeds[0].append(swing * (unit.real * (pose.slide + offset * slope)))
+        unit, swing, base, unsigned = growth
+        lean = sign * unsigned
+        speeds[0].append(base + swing * (unit.imag + offset * lean))
+        speeds[0].append(swing * (pose.diagonal.square * lean))
         return growth
 
     def accelerations(
         self, pose: RPRPose, growth: Growth, known: State, speeds: State, changes: State
     ) -> None:
         """Append the accelerations of rail and slide."""
-        offset = self._constants[0]
-        square, pull, base, bend = self.diagonal.accelerations(
+        offset, sign = self._constants
+        square, pull, base, known_bend = self.diagonal.accelerations(
             pose.diagonal, growth, known, speeds, changes
         )
-        (unit, swing, _), slope = growth, offset / pose.slide
-        grown = unit.real * unit.real
-        if bend is None:
-            bend = square.real + grown * (1.0 - slope) * (1.0 + slope)
-        bent = square.imag + slope * (bend - 2.0 * grown)
-        changes[0].append(base + pull * (unit.imag + unit.real * slope) + swing * swing * bent)
-        changes[0].append(
-            (pose.slide + offset * slope) * (pull * unit.real + swing * swing * bend)
-        )
+        unit, swing, _, unsigned = growth
+        grown, lean = unit.real, sign * unsigned
+        if known_bend is None:
+            slope = offset / pose.slide
+            bend = square.real + grown * grown * (1.0 - slope) * (1.0 + slope)
+            bend = bend / pose.slide
+        else:
+            bend = sign * known_bend
+        bent = square.imag + offset * (bend - 2.0 * grown * lean)
+        changes[0].append(base + pull * (unit.imag + offset * lean) + swing * swing * bent)
+        changes[0].append(pose.diagonal.square * (pull * lean + swing * swing * bend))
 
     def transmission_angle(self, pose: RPRPose) -> float:
         """Return the angle between AD and the normal of the rail, in [0, π/2], in [rad]."""

@@ -22,7 +22,8 @@ ahead of A along the line, −1 where it lies behind::
     w = σ·√((b − y)·(b + y))        λ = atan2(−y, w)        r = x + w
 
 λ is the direction of the link in the frame of the rail, r the place of B along the line. Where the
-link stands across the line, w = 0: a toggle. Rates::
+link stands across the line, w = 0: a toggle, or a change point, where ẏ is 0 as well and the rail
+gives ẏ/w and the like. Rates::
 
     λ̇ = −ẏ/w                        ṙ = ẋ + y·λ̇
     λ̈ = −(ÿ + y·λ̇²)/w               r̈ = ẍ + ẏ·λ̇ + y·λ̈
@@ -92,32 +93,32 @@ class RRPDyad:
 
     """
 
-    __slots__ = ('_rail', '_sign')
+    __slots__ = ('_sign', 'rail')
 
     def __init__(self, rail: Rail, sign: int) -> None:
-        self._rail = rail
+        self.rail = rail
         self._sign = float(sign)
 
     def close(self, known: State) -> RRPPose:
         """Append the direction of the link, as the rail's link has it, and the slide."""
-        sight = self._rail.at(known)
-        place, below, above, gap, base, _ = sight
+        sight = self.rail.at(known)
+        place, below, above, gap, base, _, _, status = sight
         if gap:
-            return RRPPose(Status.OPEN, gap, 0.0, 0.0, 0.0, sight)
+            return RRPPose(status, gap, 0.0, 0.0, 0.0, sight)
         along = self._sign * below * above
-        if -SMALLEST < along < SMALLEST:
-            along = 0.0
+        if status is _CLOSED and -SMALLEST < along < SMALLEST:
+            along, status = 0.0, _TOGGLE
         link = base + atan2(-place.imag, along)
         slide = place.real + along
         known[0].append(link)
         known[0].append(slide)
-        return new(RRPPose, (_CLOSED if along else _TOGGLE, 0.0, link, slide, along, sight))
+        return new(RRPPose, (status, 0.0, link, slide, along, sight))
 
     def rates(self, pose: RRPPose, known: State, speeds: State) -> RRPRates:
         """Append the rates of link and slide."""
-        rail = self._rail.rates(pose.sight, known, speeds)
+        rail = self.rail.rates(pose.sight, known, speeds)
         velocity, turn = rail
-        link = -velocity.imag / pose.along
+        link = -self._sign * self.rail.climb(pose.sight, velocity.imag, speeds)
         speeds[0].append(turn + link)
         speeds[0].append(velocity.real + pose.sight.place.imag * link)
         return new(RRPRates, (rail, link))
@@ -127,10 +128,9 @@ class RRPDyad:
     ) -> None:
         """Append the accelerations of link and slide."""
         (velocity, _), link = rates
-        pull, turn = self._rail.accelerations(pose.sight, rates.rail, known, speeds, changes)
+        pull, turn = self.rail.accelerations(pose.sight, rates.rail, known, speeds, changes)
         y = pose.sight.place.imag
-        across = self._rail.across(pose.sight, pull, pose.along, link, speeds, changes)
-        change = -across / pose.along
+        change = -self._sign * self.rail.across(pose.sight, pull, link, speeds, changes)
         changes[0].append(turn + change)
         changes[0].append(pull.real + velocity.imag * link + y * change)
 

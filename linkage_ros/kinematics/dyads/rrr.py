@@ -28,18 +28,17 @@ constant of the linkage. At a change point their roots are signed, so that the m
 the linkage itself does, at any step and with no memory.
 
 Rates, from the closing equation multiplied by DB and by AB, where the diagonal grows by g = ṡ/s
-and turns by t::
+and turns by t. With β = θ3 − dir(AD) and γ' = θ4 − dir(AD) let M = (b² − c²) + s² = K·cot(β) and
+L = (b² − c²) − s² = K·cot(γ')::
 
-    ω3 = t + g·cot(γ')        cot(γ') = ((b² − c²) − s²)/K        γ' = θ4 − dir(AD)
-    ω4 = t + g·cot(β)         cot(β)  = ((b² − c²) + s²)/K        β  = θ3 − dir(AD)
+    ω3 = t + L·(g/K)        ω4 = t + M·(g/K)
 
 Since ω3 − t and ω4 − t are the rates of β and γ', these differentiate into::
 
-    α3 = ṫ + cot(γ')·(ġ + g² − g²·cot(β)·cot(γ')) − 2g²·(b² − c²)/K
-    α4 = ṫ + cot(β)·(ġ + g² − g²·cot(β)·cot(γ')) − 2g²·(b² − c²)/K
+    α3 = ṫ + L·(e/K) − 2g·(g/K)·(b² − c²)
+    α4 = ṫ + M·(e/K) − 2g·(g/K)·(b² − c²)        e = ġ + g² − L·M·(g/K)²
 
-At a change point the cotangents are infinite and the bracket is zero; `CrankDiagonal` gives what
-remains of it without the difference.
+At a change point g, e and K are 0: the diagonal gives both quotients.
 
 OA × DB = a·c·sin(θ4 − φ) says the same of a four-bar, but where crank and rocker are nearly
 parallel it takes the difference of two angles that were rounded at the size of a half-turn: 6,500
@@ -94,14 +93,6 @@ class RRRPose(NamedTuple):
     less: float
 
 
-class RRRRates(NamedTuple):
-    """The growth of the diagonal, and the cotangents of β and γ'."""
-
-    growth: Growth
-    cot_beta: float
-    cot_gamma: float
-
-
 class RRRDyad:
     """
     Two links pinned together.
@@ -118,31 +109,33 @@ class RRRDyad:
 
     """
 
-    __slots__ = ('_constants', '_difference', 'diagonal')
+    __slots__ = ('_difference', '_sign', '_sums', 'diagonal')
 
     def __init__(self, diagonal: AnyDiagonal, b: float, c: float, sign: int) -> None:
         self.diagonal = diagonal
-        self._constants = (*sums(b, c, diagonal.least), float(sign))
+        self._sums = sums(b, c, diagonal.least)
+        self._sign = float(sign)
         self._difference = (b - c) * (b + c)
 
     def close(self, known: State) -> RRRPose:
         """Append the directions of both links."""
-        pose = close_triangle(self.diagonal.at(known), *self._constants)
+        pose = close_triangle(self.diagonal.at(known), *self._sums, self._sign)
         known[0].append(pose[2])
         known[0].append(pose[3])
         return pose
 
-    def rates(self, pose: RRRPose, known: State, speeds: State) -> RRRRates:
+    def rates(self, pose: RRRPose, known: State, speeds: State) -> Growth:
         """Append the rates of both links."""
         growth = self.diagonal.rates(pose.diagonal, known, speeds)
-        return triangle_rates(pose, growth, speeds)
+        triangle_rates(pose, self._sign, growth, speeds)
+        return growth
 
     def accelerations(
-        self, pose: RRRPose, rates: RRRRates, known: State, speeds: State, changes: State
+        self, pose: RRRPose, growth: Growth, known: State, speeds: State, changes: State
     ) -> None:
         """Append the accelerations of both links."""
-        change = self.diagonal.accelerations(pose.diagonal, rates.growth, known, speeds, changes)
-        triangle_accelerations(pose, self._difference, rates, change, changes)
+        change = self.diagonal.accelerations(pose.diagonal, growth, known, speeds, changes)
+        triangle_accelerations(pose, self._sign, self._difference, growth, change, changes)
 
     def transmission_angle(self, pose: RRRPose) -> float:
         """Return the angle between the two links at B, folded into [0, π/2], in [rad]."""
@@ -177,41 +170,44 @@ def sums(b: float, c: float, least: Fraction) -> tuple[float, float]:
 
 def close_triangle(diagonal: Diagonal, more: float, less: float, sign: float) -> RRRPose:
     """Return the pose over a diagonal; more and less are the two `sums`."""
-    square, direction, fold, stretch, gap, _, _, excess = diagonal
-    if gap:
-        return RRRPose(Status.OPEN, gap, 0.0, 0.0, 0.0, diagonal, 0.0, 0.0)
-    if not square:
-        return RRRPose(Status.INDETERMINATE, 0.0, 0.0, 0.0, 0.0, diagonal, 0.0, 0.0)
+    _, direction, fold, stretch, gap, _, _, excess, status = diagonal
+    if not status.has_pose:
+        return RRRPose(status, gap, 0.0, 0.0, 0.0, diagonal, 0.0, 0.0)
     cross = sign * fold * stretch
-    if -SMALLEST < cross < SMALLEST:
-        cross = 0.0
+    if status is _CLOSED and -SMALLEST < cross < SMALLEST:
+        cross, status = 0.0, _TOGGLE
     more, less = more + excess, less - excess
     first = direction + atan2(cross, more)
     second = direction + atan2(cross, less)
-    status = _CLOSED if cross else _TOGGLE
     return new(RRRPose, (status, 0.0, first, second, cross, diagonal, more, less))
 
 
-def triangle_rates(pose: RRRPose, growth: Growth, speeds: State) -> RRRRates:
-    """Append ω3 and ω4 of a closed pose; return the cotangents."""
-    cot_beta, cot_gamma = pose.more / pose.cross, pose.less / pose.cross
-    unit, swing, base = growth
-    grown, turned = unit.real, unit.imag
-    speeds[0].append(base + swing * (turned + grown * cot_gamma))
-    speeds[0].append(base + swing * (turned + grown * cot_beta))
-    return new(RRRRates, (growth, cot_beta, cot_gamma))
+def triangle_rates(pose: RRRPose, sign: float, growth: Growth, speeds: State) -> None:
+    """Append ω3 and ω4 of a closed pose."""
+    unit, swing, base, unsigned = growth
+    lean = sign * unsigned
+    speeds[0].append(base + swing * (unit.imag + pose.less * lean))
+    speeds[0].append(base + swing * (unit.imag + pose.more * lean))
 
 
 def triangle_accelerations(
-    pose: RRRPose, difference: float, rates: RRRRates, change: GrowthChange, changes: State
+    pose: RRRPose,
+    sign: float,
+    difference: float,
+    growth: Growth,
+    change: GrowthChange,
+    changes: State,
 ) -> None:
     """Append α3 and α4."""
-    (unit, swing, _), cot_beta, cot_gamma = rates
-    turn, pull, base, bend = change
-    q = unit.real
-    if bend is None:
-        bend = turn.real + q * q - q * cot_beta * (q * cot_gamma)
-    swirl = turn.imag - 2.0 * q * (q * (difference / pose.cross))
-    for cot in (cot_gamma, cot_beta):
-        first = unit.imag + q * cot
-        changes[0].append(base + pull * first + swing * swing * (swirl + cot * bend))
+    unit, swing, _, unsigned = growth
+    turn, pull, base, known_bend = change
+    lean = sign * unsigned
+    if known_bend is None:
+        bend = turn.real + unit.real * unit.real - pose.more * lean * (pose.less * lean)
+        bend = bend / pose.cross
+    else:
+        bend = sign * known_bend
+    swirl = turn.imag - 2.0 * unit.real * (lean * difference)
+    for part in (pose.less, pose.more):
+        first = unit.imag + part * lean
+        changes[0].append(base + pull * first + swing * swing * (swirl + part * bend))
