@@ -19,13 +19,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from math import remainder, tau
+from math import tau
 from threading import Event
 
 from linkage_ros.cli.linkage_file import angle_text, open_linkage, value_text
 from linkage_ros.cli.tables import show, Table
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.four_bars import four_bars
+from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Driven, Dyad, Group
 from linkage_ros.kinematics.survey import (
     conditionings,
@@ -35,6 +36,13 @@ from linkage_ros.kinematics.survey import (
     Way,
     worst_residual,
 )
+
+_SINGULAR = (
+    ('toggles', Status.TOGGLE),
+    ('change points', Status.CHANGE_POINT),
+    ('without a pose', Status.INDETERMINATE),
+)
+"""What singular inputs are called, by what is met there."""
 
 _PLACES = 4
 """How many places of one extreme are named."""
@@ -137,7 +145,11 @@ def _facts(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
         )
         yield 'input', f'{given.joint}: {driven}'
     yield from _reach(closure, way)
-    worst, at, count = worst_residual(closure)
+    found = worst_residual(closure)
+    if found is None:
+        yield 'worst residual', 'none: the loops close nowhere on a grid over all inputs'
+        return
+    worst, at, count = found
     names = [not given.slider for given in linkage.inputs]
     place = ', '.join(value_text(value, turning) for value, turning in zip(at, names, strict=True))
     yield 'worst residual', f'{worst:.1e} m, of {count} positions, at {place}'
@@ -155,18 +167,12 @@ def _reach(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
             yield 'range', 'every angle; the motion repeats after two turns'
         else:
             yield 'range', 'every angle'
-    toggles = [end for one in way.ranges if not one.whole for end in one[:2]]
-    changes = [
-        value
-        for value in closure.critical_inputs
-        if not any(
-            abs(remainder(value - end, tau) if way.turning else value - end) < 1e-12
-            for end in toggles
-        )
-    ]
-    for name, places in (('toggles', toggles), ('change points', changes)):
-        said = ', '.join(value_text(value, way.turning) for value in places)
-        yield name, said or 'none'
+    places: dict[Status, list[str]] = {status: [] for _, status in _SINGULAR}
+    for singular in closure.singular_inputs:
+        places[singular.status].append(value_text(singular.value, way.turning))
+    for name, status in _SINGULAR:
+        if places[status] or status is not Status.INDETERMINATE:
+            yield name, ', '.join(places[status]) or 'none'
 
 
 def _groups(closure: Closure) -> list[tuple[str, ...]]:

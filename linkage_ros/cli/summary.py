@@ -54,7 +54,7 @@ def summary(node: LinkageNode) -> str:
         rows.append(('samples', samples))
     rows += [
         (status.value, f'{counts.unclosed[status]} ticks')
-        for status in (Status.TOGGLE, Status.OPEN, Status.INDETERMINATE)
+        for status in Status
         if counts.unclosed[status]
     ]
     for memory in node.recording.memories:

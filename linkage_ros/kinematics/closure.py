@@ -26,10 +26,16 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.errors import quoted
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.groups import find_groups
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.nearness import critical_inputs, Nearness, nearness
+from linkage_ros.kinematics.nearness import (
+    Nearness,
+    nearness,
+    singular_inputs,
+    SingularInput,
+)
 from linkage_ros.kinematics.ranges import input_ranges, InputRange
 from linkage_ros.kinematics.solution import Planner
 from linkage_ros.kinematics.status import Status
@@ -107,6 +113,12 @@ class Acceleration(NamedTuple):
     state: State
 
 
+def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
+    if not status.has_rates:
+        return ValueError(f'{what}: a linkage that is {status.value} has none; ask its status')
+    return ValueError(f'{what}: {list(given)} is not finite')
+
+
 class PointMotion(NamedTuple):
     """Place, velocity and acceleration of a point in the frame of the ground, in [m]."""
 
@@ -145,6 +157,8 @@ class Closure:
         self.turning = tuple(isinstance(j, RevoluteJoint) for j in linkage.joints.values())
         """For each published joint: whether it turns (an angle) or slides (a length)."""
         self.angles, self.slides = planner.angles, planner.slides
+        self.turns_with = planner.turns_with
+        """For each coordinate that is a sum of inputs, how often each input is in it."""
         self._terms = tuple(self._term(joint) for joint in linkage.joints.values())
         self._rate_terms = tuple((i, j, factor) for i, j, factor, _ in self._terms)
         self._point_index = {
@@ -158,6 +172,7 @@ class Closure:
         self._closing = tuple(step.close for step in steps)
         self._rating = tuple(step.rates for step in steps)
         self._accelerating = tuple(step.accelerations for step in steps)
+        self._driven = len(linkage.inputs)
         factors = [1.0 / self.scale if given.slider else 1.0 for given in linkage.inputs]
         self._factors = None if set(factors) == {1.0} else factors
 
@@ -168,10 +183,20 @@ class Closure:
         Parameters
         ----------
         *inputs
-            Values of the driven joints, in [rad] or [m], finite.
+            Values of the driven joints, in [rad] or [m]. Where one is not finite, the linkage is
+            indeterminate.
+
+        Raises
+        ------
+        ValueError
+            Where there is not one input for each driven joint.
+        TypeError
+            Where an input is no number.
 
         """
-        x = [0.0, *inputs] if self._factors is None else self._scaled(inputs)
+        x = self._coordinates('inputs', inputs)
+        if x is None:
+            return Position(Status.INDETERMINATE, 0.0, (), State([0.0, *inputs], []), [])
         state = new(State, (x, []))
         poses: list[Pose] = []
         status = _CLOSED
@@ -191,18 +216,28 @@ class Closure:
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
         """
-        Return the rates at a closed position; at a toggle there are none.
+        Return the rates at a position whose status has rates.
 
         Parameters
         ----------
         position
-            A closed position.
+            As this closure has found it.
         *rates
             Of the driven joints, in [rad/s] or [m/s].
 
+        Raises
+        ------
+        ValueError
+            Where the position has no rates, as at a toggle, a rate is not finite, or there is not
+            one for each driven joint.
+        TypeError
+            Where a rate is no number.
+
         """
-        v = [0.0, *rates] if self._factors is None else self._scaled(rates)
-        _, _, _, state, poses = position
+        status, _, _, state, poses = position
+        v = self._coordinates('rates', rates)
+        if v is None or not status.has_rates:
+            raise _no_motion('rates', rates, status)
         speeds = new(State, (v, []))
         found = []
         for rate, pose in zip(self._rating, poses, strict=True):
@@ -222,9 +257,16 @@ class Closure:
         *accelerations
             Of the driven joints, in [rad/s²] or [m/s²].
 
+        Raises
+        ------
+        ValueError, TypeError
+            As `velocity` raises them.
+
         """
-        a = [0.0, *accelerations] if self._factors is None else self._scaled(accelerations)
-        _, _, _, state, poses = position
+        status, _, _, state, poses = position
+        a = self._coordinates('accelerations', accelerations)
+        if a is None:
+            raise _no_motion('accelerations', accelerations, status)
         _, speeds, rates = velocity
         changes = new(State, (a, []))
         for accelerate, pose, rate in zip(self._accelerating, poses, rates, strict=True):
@@ -346,9 +388,9 @@ class Closure:
         return input_ranges(self)
 
     @cached_property
-    def critical_inputs(self) -> tuple[float, ...]:
-        """Values of a single input at which a toggle or a change point lies, in [rad] or [m]."""
-        return critical_inputs(self)
+    def singular_inputs(self) -> tuple[SingularInput, ...]:
+        """Where a single input meets toggles and change points; of several inputs, none."""
+        return singular_inputs(self)
 
     def nearness(self, position: Position) -> Nearness:
         """Return how near trouble a closed position is."""
@@ -361,8 +403,21 @@ class Closure:
             step.close(state)
         return state
 
-    def _scaled(self, values: tuple[float, ...]) -> list[float]:
-        assert self._factors is not None
+    def _coordinates(self, what: str, values: tuple[float, ...]) -> list[float] | None:
+        """Return the ground's coordinate and the inputs'; nothing where one is not finite."""
+        if len(values) != self._driven:
+            names = ', '.join(given.joint for given in self.linkage.inputs)
+            raise ValueError(f'{what}: {len(values)} given; give {self._driven}: {names}')
+        try:
+            for value in values:
+                # 0 of a finite number, which is false; NaN of all others, which is true.
+                if value - value:
+                    return None
+        except (TypeError, ValueError):
+            message = f'{what}: {quoted(value)} is not a number; solve() takes arrays'
+            raise TypeError(message) from None
+        if self._factors is None:
+            return [0.0, *values]
         return [0.0, *(v * factor for v, factor in zip(values, self._factors, strict=True))]
 
     def _joints(self, values: list[float]) -> tuple[float, ...]:

@@ -204,7 +204,7 @@ class CrankDiagonal:
         return new(GrowthChange, (turn, a[first] - a[second], a[second], 0.25 * bend / square))
 
     @property
-    def change_points(self) -> tuple[float, ...]:
+    def singular_angles(self) -> tuple[float, ...]:
         """Differences of the two coordinates at which all links lie in one line, in [rad]."""
         margins = ((self.fold_margin, 0.0), (self.stretch_margin, pi))
         return tuple(phi - self.arms[2] for margin, phi in margins if margin == 0.0)

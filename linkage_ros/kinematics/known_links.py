@@ -58,6 +58,9 @@ class KnownLinks:
         Of known links and sliders, in the coordinates.
     held
         Where each known link but the ground is held.
+    turns_with
+        For each coordinate that is a sum of inputs, how often each input is in it: +1, −1 or 0.
+        Such an angle is known with its whole turns; others are known but for these.
 
     """
 
@@ -77,7 +80,11 @@ class KnownLinks:
         self.slides: dict[str, Slide] = {}
         self.held: dict[str, Held] = {}
         self.group = 0
-        self.coordinate_count = 1 + len(linkage.inputs)
+        count = len(linkage.inputs)
+        self.coordinate_count = 1 + count
+        self.turns_with = {
+            k: tuple(float(i + 1 == k) for i in range(count)) for k in range(1 + count)
+        }
         self.pin_count = 0
         self._pins: dict[tuple[str, complex], int] = {}
 

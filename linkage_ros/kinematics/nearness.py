@@ -17,13 +17,42 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import inf, pi, remainder, sin, sqrt, tau
-from typing import NamedTuple, TYPE_CHECKING
+from operator import attrgetter
+from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
+from linkage_ros.kinematics.dyads.rpp import RPPDyad
+from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure, Position
+
+
+_SAME = 1e-9
+"""Singular inputs that are nearer to each other are one, in [rad] or [m]."""
+
+_BESIDE = 1e-6
+"""How far beside a singular input a dyad's side is looked at, in [rad] or [m]."""
+
+
+class SingularInput(NamedTuple):
+    """
+    An input at which the linkage is singular.
+
+    Attributes
+    ----------
+    value
+        In [rad] or [m].
+    status
+        ``TOGGLE`` where the linkage ends or turns back, ``CHANGE_POINT`` where it goes on, and
+        ``INDETERMINATE`` where it has no pose that could be told: two pins meet, or two lines are
+        parallel.
+
+    """
+
+    value: float
+    status: Status
 
 
 class Nearness(NamedTuple):
@@ -39,8 +68,8 @@ class Nearness(NamedTuple):
         transmission angle μ it is √2·sin(μ/2), from 0 at a toggle to 1. For an iterated group it
         is the smallest singular value divided by the largest.
     toggle_distance
-        How far the input is from the next toggle or change point, in [rad] or [m]; infinite where
-        there is none, and where there are several inputs.
+        How far the input is from the next singular one, in [rad] or [m]; infinite where there is
+        none, and where there are several inputs.
     group
         Number of the group whose conditioning that is; −1 where there is no dyad and none that is
         iterated.
@@ -72,28 +101,84 @@ def nearness(closure: Closure, position: Position) -> Nearness:
         sliding = bool(closure.linkage.inputs[0].slider)
         unit = closure.scale if sliding else 1.0
         value = position.state.coordinates[1] * unit
-        for critical in closure.critical_inputs:
-            away = value - critical
-            distance = min(distance, abs(away if sliding else remainder(away, tau)))
+        for singular in closure.singular_inputs:
+            distance = min(distance, abs(_away(value - singular.value, not sliding)))
     return Nearness(angle, conditioning, distance, weakest)
 
 
-def critical_inputs(closure: Closure) -> tuple[float, ...]:
+def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
     """
-    Return where a single input meets toggles and change points.
+    Return where a single input meets toggles and change points, in ascending order.
 
-    Toggles end the ranges of the input. A change point of a dyad on crank and ground is where its
-    margin is zero: the crank along the ground, outwards for the fold, inwards for the stretch.
+    Toggles end the ranges of the input. Where the links of a dyad's two outer pins turn with the
+    input, its constants tell at which angles its links lie in one line, or its lines are parallel.
+    Of all other dyads the transmission angle is searched over the ranges for where it is 0.
     """
-    found = []
-    for interval in closure.input_ranges:
-        if not interval.whole:
-            ends = interval.lowest, interval.highest
-            found += [end for end, is_one in zip(ends, interval.limited, strict=True) if is_one]
-    for step in closure.steps:
-        diagonal = getattr(step, 'diagonal', None)
-        if isinstance(diagonal, CrankDiagonal) and diagonal.arms[:2] == (1, 0):
-            for margin, phi in ((diagonal.fold_margin, 0.0), (diagonal.stretch_margin, pi)):
-                if margin == 0.0:
-                    found.append(remainder(phi - diagonal.arms[2], tau))
-    return tuple(sorted(found))
+    from linkage_ros.kinematics.survey import zeros  # local import: it needs the closure
+
+    given = closure.linkage.inputs
+    if len(given) > 1:
+        return ()
+    ends = [
+        end
+        for interval in closure.input_ranges
+        if not interval.whole
+        for end, limited in zip(interval[:2], interval.limited, strict=True)
+        if limited
+    ]
+    turning = not given[0].slider
+    found = [SingularInput(end, Status.TOGGLE) for end in ends]
+    for number, step in enumerate(closure.steps):
+        if not hasattr(step, 'transmission_angle') or isinstance(step, RPPDyad):
+            continue
+        places = _turned_by_input(closure, step)
+        if places is None:
+            places = zeros(partial(_transmission_angle, closure, number), closure.input_ranges)
+        for place in places:
+            status = _met(closure, number, place)
+            distances = (abs(_away(place - one.value, turning)) for one in found)
+            if status is not None and all(apart > _SAME for apart in distances):
+                found.append(SingularInput(place, status))
+    return tuple(sorted(found, key=attrgetter('value')))
+
+
+def _turned_by_input(closure: Closure, step: Any) -> list[float] | None:
+    """Return the singular angles of a dyad as inputs, if the input turns its outer pins' links."""
+    part = getattr(step, 'diagonal', None) or getattr(step, 'rail', step)
+    if not hasattr(part, 'singular_angles'):
+        return None
+    first, second = part.arms[:2]
+    turns = closure.turns_with
+    if first not in turns or second not in turns:
+        return None
+    factor = turns[first][0] - turns[second][0]
+    return [remainder(angle / factor, tau) for angle in part.singular_angles] if factor else []
+
+
+def _met(closure: Closure, number: int, place: float) -> Status | None:
+    """Return what a dyad meets where it is singular; nothing where no loops close next to it."""
+    status = closure.position(place).status
+    beside = [closure.position(place + step) for step in (-_BESIDE, _BESIDE)]
+    if not any(position.status.has_pose for position in beside):
+        return None
+    if not status.has_pose:
+        return Status.INDETERMINATE
+    if status is Status.CLOSED and all(position.status.has_pose for position in beside):
+        # The floats next to it, of a dyad that follows others: does it come out on its other side?
+        step: Any = closure.steps[number]
+        before, after = (step.side_of(position.poses[number]) for position in beside)
+        return Status.CHANGE_POINT if before * after < 0.0 else Status.TOGGLE
+    return status if status is Status.CHANGE_POINT else Status.TOGGLE
+
+
+def _transmission_angle(closure: Closure, number: int, value: float) -> float:
+    """Return the transmission angle of a dyad at an input; 0 where it has no pose."""
+    position = closure.position(value)
+    if len(position.poses) <= number or not position.status.has_pose:
+        return 0.0
+    step: Any = closure.steps[number]
+    return float(step.transmission_angle(position.poses[number]))
+
+
+def _away(difference: float, turning: bool) -> float:
+    return remainder(difference, tau) if turning else difference

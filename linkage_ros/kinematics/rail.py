@@ -144,7 +144,7 @@ class CrankRail:
         self.arms = arms
 
     @property
-    def change_points(self) -> tuple[float, ...]:
+    def singular_angles(self) -> tuple[float, ...]:
         """Differences of the two coordinates at which all links lie across the line, in [rad]."""
         _, _, below, above, _, _ = self._constants
         across = ((below, 0.5 * pi), (above, -0.5 * pi))
@@ -175,9 +175,9 @@ class CrankRail:
             arm = complex(2.0 * a * sine * cosine, arm.imag)
             lean = 1.0
             if above:
-                lean = root * cosine / root_above
+                lean = root * cosine / root_above if root_above else 0.0
             elif below:
-                lean = root * sine / root_below
+                lean = root * sine / root_below if root_below else 0.0
             if (not below and passes_zero(sine, 0.5 * swing)) or (
                 not above and passes_zero(cosine, 0.5 * swing)
             ):

@@ -19,9 +19,10 @@ from __future__ import annotations
 
 from cmath import phase, rect
 from math import inf
+from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, quoted
-from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
+from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.diagonal import AnyDiagonal
 from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import Carry, DrivenRRRDyad, Side
@@ -45,6 +46,41 @@ _SIDES['RPR'] = _SIDES['RRP']
 
 _LEVEL = Angle(0, 0.0, 1 + 0j)
 """What a direction in the frame of the ground is measured from."""
+
+
+class _Hinge(NamedTuple):
+    """
+    The pins A and D of a dyad on two links that are pinned together at O.
+
+    Attributes
+    ----------
+    a, d
+        OA and OD, in the unit of the lengths.
+    arms, offset
+        Coordinates of the two links, and what the angle from OD to OA is beyond their difference.
+    base
+        What a direction that a `CrankDiagonal` gives is measured from.
+    crank_first
+        Whether the link of A is the crank: of the two the one that is known later.
+
+    """
+
+    a: float
+    d: float
+    arms: tuple[int, int]
+    offset: float
+    base: Angle
+    crank_first: bool
+
+    def side_at_change_point(self, diagonal: CrankDiagonal, sign: int) -> int:
+        """
+        Return the sign of a dyad whose side holds for a crank between 0 and π from the ground.
+
+        A dyad that folds has the sign of the half angle from OD to OA. Where OD is the crank and
+        OA the ground, that is negative there.
+        """
+        folds = diagonal.fold_margin == 0.0 and not isinstance(diagonal, UnsignedDiagonal)
+        return -sign if folds and not self.crank_first else sign
 
 
 class Planner(KnownLinks):
@@ -88,6 +124,12 @@ class Planner(KnownLinks):
             if angle.coordinate or sign < 0.0:
                 self.add(Turned(angle.coordinate, index, sign))
                 coordinate = self.new_coordinates(1)
+                before = self.turns_with.get(angle.coordinate)
+                if before is not None:
+                    with_input = self.turns_with[index]
+                    self.turns_with[coordinate] = tuple(
+                        one + sign * other for one, other in zip(before, with_input, strict=True)
+                    )
             self.angles[joint.link] = Angle(coordinate, angle.constant, angle.unit)
             self.held[joint.link] = Held(
                 self.points[joint.link][joint.name],
@@ -126,8 +168,13 @@ class Planner(KnownLinks):
             ends = self.place_pin(first.name), self.place_pin(second.name)
             diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c)), _LEVEL
         else:
-            a, d, arms, offset, base = hinge
-            diagonal = crank_diagonal(a, b, c, d, arms, offset, self._driven_only(arms))
+            diagonal, base = (
+                crank_diagonal(
+                    hinge.a, b, c, hinge.d, hinge.arms, hinge.offset, self._driven_only(hinge.arms)
+                ),
+                hinge.base,
+            )
+            sign = hinge.side_at_change_point(diagonal, sign)
         written_out = type(diagonal) is CrankDiagonal and CrankRRRDyad.fits(diagonal)
         kind = CrankRRRDyad if written_out else RRRDyad
         self.add(kind(diagonal, b, c, sign))  # type: ignore[arg-type]  # as just asked
@@ -154,8 +201,18 @@ class Planner(KnownLinks):
             ends = self.place_pin(first.name), self.place_pin(second.name)
             diagonal, base = FreeDiagonal(ends, (abs(offset), inf)), _LEVEL
         else:
-            a, d, arms, angle, base = hinge
-            diagonal = swivel_diagonal(a, d, offset, arms, angle, self._driven_only(arms))
+            diagonal, base = (
+                swivel_diagonal(
+                    hinge.a,
+                    hinge.d,
+                    offset,
+                    hinge.arms,
+                    hinge.offset,
+                    self._driven_only(hinge.arms),
+                ),
+                hinge.base,
+            )
+            sign = hinge.side_at_change_point(diagonal, sign)
         self.add(RPRDyad(diagonal, offset, sign))
         k = self.new_coordinates(2)
         self.angles[rail] = _facing(k, base, line.direction)
@@ -280,14 +337,9 @@ class Planner(KnownLinks):
         sign = 1.0 if given.child == inner else -1.0
         return Carry(self.points[outer][pin], self.points[inner][pin], 0.0, index, -1, sign, 0j)
 
-    def _hinge(
-        self, first: str, second: str
-    ) -> tuple[float, float, tuple[int, int], float, Angle] | None:
-        """
-        Return OA, OD, the arms, their offset and the base, where two pins' links share a pin O.
-
-        The base is what a direction that a `CrankDiagonal` gives is measured from.
-        """
+    def _hinge(self, first: str, second: str) -> _Hinge | None:
+        """Return how two pins lie on links that share a pin O, if any two do."""
+        known = list(self.angles)
         for other in self.carriers(second):
             for one in self.carriers(first):
                 pivot = self.common(one, other, (first, second))
@@ -296,7 +348,8 @@ class Planner(KnownLinks):
                     angle, base = self.angles[one].along(a), self.angles[other].along(d)
                     offset = phase(angle.unit * base.unit.conjugate())
                     arms = angle.coordinate, base.coordinate
-                    return abs(a), abs(d), arms, offset, base
+                    later = known.index(one) > known.index(other)
+                    return _Hinge(abs(a), abs(d), arms, offset, base, later)
         return None
 
     def _rail(self, pin: str, on: str, line: Line, length: float) -> Rail:
@@ -315,8 +368,8 @@ class Planner(KnownLinks):
         return FreeRail(ends, length, base.coordinate, base.unit)
 
     def _driven_only(self, arms: tuple[int, int]) -> bool:
-        """Return whether two coordinates are inputs or the ground: known with their turns."""
-        return max(arms) <= len(self._linkage.inputs)
+        """Return whether two coordinates are sums of inputs, and so known with their turns."""
+        return set(arms) <= set(self.turns_with)
 
     def _sign(self, kind: str, closing: str, meaning: str) -> int:
         """Return the sign of the assembly of the pin or slider that closes a dyad."""

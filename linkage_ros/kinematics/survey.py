@@ -18,9 +18,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
-from math import cos, isfinite, pi, remainder, sqrt, tau
+from math import cos, isfinite, nan, pi, remainder, sqrt, tau
 from typing import NamedTuple
 
 from linkage_ros.kinematics.closure import Closure, Position
@@ -42,6 +42,9 @@ _APART = 1e-4
 _MANY = 12
 """At more places than these a value is the rule and no extreme; also the lines of a grid."""
 
+
+_NEAR_ZERO, _ZERO = 0.25, 1e-7
+"""What a sample next to a zero is below, and what a zero is below, in [rad]."""
 
 _EASY = 0.25
 """Conditioning of a pose that shows a linkage well: its transmission angle is above 20 degrees."""
@@ -272,6 +275,8 @@ def _lowest(
                 if result - lowest[0] > _NOISE:
                     found[-1] = lowest
     found = [(result, value) for result, value in found if isfinite(result)]
+    if not found:
+        return Extreme(nan, ())
     best = min(result for result, _ in found)
     places = sorted(value for result, value in found if result - best <= _SAME)
     if len(places) > _MANY:
@@ -302,49 +307,84 @@ def _golden(function: Callable[[float], float], low: float, high: float) -> tupl
     return min((at_one, one), (at_other, other))
 
 
+def zeros(function: Callable[[float], float], ranges: Sequence[InputRange]) -> list[float]:
+    """
+    Return where a function that is never negative is 0, within its ranges and not at their ends.
+
+    What is next to 0 by the roundings of a chain counts as 0.
+    """
+    found = []
+    for interval in ranges:
+        values = samples(interval)
+        results = [function(value) for value in values]
+        valleys = range(1, len(values) - 1)
+        if interval.whole:
+            # The ends of a full turn are one place.
+            step = values[1] - values[0]
+            values, results = [*values, values[-1] + step], [*results, results[1]]
+            valleys = range(1, len(values) - 1)
+        for i in valleys:
+            if results[i] <= min(results[i - 1], results[i + 1]) and results[i] < _NEAR_ZERO:
+                lowest, at = _golden(function, values[i - 1], values[i + 1])
+                if min(lowest, results[i]) < _ZERO:
+                    found.append(at if lowest <= results[i] else values[i])
+    return found
+
+
 def transmission_angles(way: Way) -> dict[int, Extremes]:
     """
     Return the extreme transmission angles of each group over the range, by its number, in [rad].
 
     They are folded into [0, π/2]. Groups that are iterated have none.
     """
-    found = {}
-    for i, step in enumerate(way.closure.steps):
-        if not hasattr(step, 'transmission_angle'):
-            continue
-
-        def angle(
-            value: float, i: int = i, of: Callable[..., float] = step.transmission_angle
-        ) -> float:
-            return of(way.position(value).poses[i])
-
-        found[way.closure.step_groups[i]] = extremes(angle, way.ranges)
-    return found
+    return _of_each_step(way, 'transmission_angle', _SAMPLES)
 
 
 def conditionings(way: Way) -> dict[int, Extremes]:
     """Return the extreme conditioning of each iterated group over the range, by its number."""
+    return _of_each_step(way, 'conditioning', _SAMPLES // 4)
+
+
+def _of_each_step(way: Way, name: str, count: int) -> dict[int, Extremes]:
+    """Return the extremes of what a method of the steps tells of their poses, by group."""
     found = {}
-    for i, step in enumerate(way.closure.steps):
-        if not hasattr(step, 'conditioning'):
-            continue
-
-        def value_of(
-            value: float, i: int = i, of: Callable[..., float] = step.conditioning
-        ) -> float:
-            return of(way.position(value).poses[i])
-
-        found[way.closure.step_groups[i]] = extremes(value_of, way.ranges, _SAMPLES // 4)
+    for number, step in enumerate(way.closure.steps):
+        method = getattr(step, name, None)
+        if method is not None:
+            function = partial(_of_pose, way, number, method)
+            found[way.closure.step_groups[number]] = extremes(function, way.ranges, count)
     return found
 
 
-def worst_residual(closure: Closure) -> tuple[float, tuple[float, ...], int]:
-    """Return the worst residual [m] over the range, the inputs there, and how many were tried."""
+def _of_pose(way: Way, number: int, method: Callable[..., float], value: float) -> float:
+    """Return what a method tells of a step's pose; no number where the loops do not close."""
+    position = way.position(value)
+    return method(position.poses[number]) if position.status.has_pose else nan
+
+
+def worst_residual(closure: Closure) -> tuple[float, tuple[float, ...], int] | None:
+    """
+    Return the worst residual over the range, or over a grid of several inputs.
+
+    Returns
+    -------
+    residual : float
+        In [m].
+    inputs : tuple[float, ...]
+        Where, in [rad] or [m].
+    count : int
+        How many poses were tried. None in place of all three where no loop closed.
+
+    """
     if len(closure.linkage.inputs) > 1:
-        tried = [found for found in grid(closure) if found[1].joints]
+        tried = grid(closure)
     else:
         way = Way(closure)
         values = [value for interval in way.ranges for value in samples(interval)]
-        tried = [((value,), way.position(value)) for value in values]
-    worst, at = max((closure.residual(position), inputs) for inputs, position in tried)
-    return worst, at, len(tried)
+        tried = (((value,), way.position(value)) for value in values)
+    found = [
+        (closure.residual(position), inputs)
+        for inputs, position in tried
+        if position.status.has_pose
+    ]
+    return (*max(found), len(found)) if found else None

@@ -218,6 +218,7 @@ class Health:
         values: dict[str, object] = {
             'Scene': self.scene,
             'Reachable': reachable,
+            'Ticks at a change point': counts.unclosed[Status.CHANGE_POINT],
             'Ticks at a toggle': counts.unclosed[Status.TOGGLE],
             'Ticks open': counts.unclosed[Status.OPEN],
             'Ticks indeterminate': counts.unclosed[Status.INDETERMINATE],

@@ -211,7 +211,7 @@ class LinkageNode(LifecycleNode):
         for closure in closures:
             # Found before the first tick, which would wait for it: iterated links are followed
             # there.
-            _ = closure.critical_inputs
+            _ = closure.singular_inputs
         return TickLoop(
             partial(Pipeline, scene, closures, injection),
             self._scene_topics.take,

@@ -68,7 +68,7 @@ class Counts:
     last: Tick | None = None
     unclosed: dict[Status, int] = field(default_factory=lambda: dict.fromkeys(Status, 0))
     last_unclosed: tuple[int, Position] | None = None
-    """Number of the linkage, and its position."""
+    """Number of the linkage, and its position, when it last had no rates."""
 
 
 Take = Callable[[], tuple[bytes, dict[str, Any]] | None]
@@ -257,7 +257,8 @@ class TickLoop:
                 counts.silent += 1
             elif position[0] is not _CLOSED:
                 counts.unclosed[position[0]] += 1
-                counts.last_unclosed = number, position
+                if not position[0].has_rates:
+                    counts.last_unclosed = number, position
             if reading is None and position is not None and position[2]:
                 counts.withheld += 1
 

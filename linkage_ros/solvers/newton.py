@@ -133,7 +133,9 @@ class NewtonClosure(Solver):
             Values of the driven joints, in [rad] or [m], finite.
 
         """
-        x = [0.0, *inputs] if self._factors is None else self._scaled(inputs)
+        x = self._coordinates('inputs', inputs)
+        if x is None:
+            return self._exact(inputs)
         knot, offsets = self._knots.near(x[1:])
         if knot is None:
             return self._exact(inputs)
@@ -181,7 +183,9 @@ class NewtonClosure(Solver):
         _, _, _, state, poses = position
         if not isinstance(poses, _Found):
             return self.closed.velocity(position, *rates)
-        v = [0.0, *rates] if self._factors is None else self._scaled(rates)
+        v = self._coordinates('rates', rates)
+        if v is None:
+            return self.closed.velocity(position, *rates)
         x, pins = state
         speeds = new(State, (v, []))
         others = iter(poses)
@@ -210,7 +214,9 @@ class NewtonClosure(Solver):
         _, _, _, state, poses = position
         if not isinstance(poses, _Found):
             return self.closed.acceleration(position, velocity, *accelerations)
-        a = [0.0, *accelerations] if self._factors is None else self._scaled(accelerations)
+        a = self._coordinates('accelerations', accelerations)
+        if a is None:
+            return self.closed.acceleration(position, velocity, *accelerations)
         _, speeds, rates = velocity
         changes = new(State, (a, []))
         others, moving = iter(poses), iter(rates)

@@ -33,7 +33,7 @@ from linkage_ros.kinematics.closure import (
     Position,
     Velocity,
 )
-from linkage_ros.kinematics.nearness import Nearness
+from linkage_ros.kinematics.nearness import Nearness, SingularInput
 from linkage_ros.kinematics.ranges import InputRange
 
 
@@ -115,9 +115,9 @@ class Solver(Closure):
         return self.closed.input_ranges
 
     @cached_property
-    def critical_inputs(self) -> tuple[float, ...]:
-        """Values of a single input at which a toggle or a change point lies, in [rad] or [m]."""
-        return self.closed.critical_inputs
+    def singular_inputs(self) -> tuple[SingularInput, ...]:
+        """Where a single input meets toggles and change points; of several inputs, none."""
+        return self.closed.singular_inputs
 
     def nearness(self, position: Position) -> Nearness:
         """Return how near trouble a closed position is."""

@@ -60,12 +60,13 @@ class Task(NamedTuple):
 def refuse_trouble(task: Task, ranges: Sequence[tuple[float, float]]) -> None:
     """Refuse where a toggle or a change point lies in a range: there is no bound."""
     for low, high in ranges:
-        for critical in task.closed.critical_inputs:
+        for singular in task.closed.singular_inputs:
             turning = not task.closed.linkage.inputs[0].slider
             nearest = 0.5 * (low + high)
-            nearest += remainder(critical - nearest, tau) if turning else critical - nearest
+            away = singular.value - nearest
+            nearest += remainder(away, tau) if turning else away
             if low <= nearest <= high:
-                raise refusal(task, f'cannot be proven near {place(task, critical)}')
+                raise refusal(task, f'cannot be proven near {place(task, singular.value)}')
 
 
 def place(task: Task, value: float) -> str:
@@ -73,7 +74,10 @@ def place(task: Task, value: float) -> str:
     if task.closed.linkage.inputs[0].slider:
         return f'{value:.6g} m'
     where = f'{degrees(remainder(value, tau)):.4g}°'
-    near = [x for x in task.closed.critical_inputs if abs(remainder(x - value, tau)) < _NEAR]
+    near = any(
+        abs(remainder(singular.value - value, tau)) < _NEAR
+        for singular in task.closed.singular_inputs
+    )
     return f'the toggle or change point at {where}' if near else where
 
 

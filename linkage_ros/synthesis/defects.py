@@ -165,9 +165,9 @@ def _branch(design: Design, met: tuple[Met, ...]) -> Defect:
         )
         if abs(remainder(crank - middle, tau)) <= half + SAME:
             between = [
-                critical
-                for critical in closure.critical_inputs
-                if abs(remainder(critical - middle, tau)) <= half + SAME
+                singular.value
+                for singular in closure.singular_inputs
+                if abs(remainder(singular.value - middle, tau)) <= half + SAME
             ]
     where = ' and '.join(sorted({_degrees(remainder(one, tau)) for one in between}))
     return Defect(

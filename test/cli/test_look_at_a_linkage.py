@@ -341,3 +341,21 @@ def test_a_full_turn_of_a_parallelogram_is_solved_by_continuity(linkage: Run) ->
     for state in json.loads(answer.stdout)['states']:
         crank = radians(state['crank_joint'])
         assert abs(remainder(radians(state['follower_joint']) - crank, tau)) < 1e-14 * pi
+
+
+@pytest.mark.parametrize(
+    ('name', 'said'),
+    [
+        ('inv1', 'without a pose      0.000° (0 rad)'),
+        ('straight_behind', 'without a pose      0.000° (0 rad)'),
+        ('isosceles', 'change points       -90.000° (-1.5708 rad), 90.000° (1.5708 rad)'),
+        ('inv_ahead', 'change points       0.000° (0 rad)'),
+        ('closes_nowhere', 'worst residual      none: the loops close nowhere on a grid'),
+    ],
+)
+def test_check_ends_in_a_sentence_where_no_pose_can_be_told(
+    linkage: Run, name: str, said: str
+) -> None:
+    answer = linkage('check', str(Path(__file__).parents[1] / f'kinematics/defects/{name}.yaml'))
+    assert (answer.returncode, answer.stderr) == (0, '')
+    assert said in answer.stdout

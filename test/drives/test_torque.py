@@ -23,7 +23,7 @@ the motor.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf, isfinite, nan
+from math import inf, isfinite, nan, pi
 import random
 
 from hypothesis import given, settings
@@ -43,6 +43,7 @@ import pytest
 
 from .contexts import two_inputs
 from ..dynamics.loaded import FOLDER, four_bar, shipped  # noqa: TID252
+from ..kinematics.defects import defect  # noqa: TID252
 from ..test_joint_effort import serialized  # noqa: TID252
 
 MS = 1_000_000
@@ -471,3 +472,16 @@ def test_what_is_wrong_in_a_scene_has_its_line():
 def test_it_reads_the_input_by_the_name_that_messages_have():
     context = replace(two_inputs(), prefix='left/')
     assert reader(context)(serialized(['left/left_crank'], [2.0])).effort == 2.0
+
+
+@pytest.mark.parametrize('start', [0.0, pi])
+def test_a_parallelogram_starts_on_its_change_point_and_passes_it(start):
+    # The rod does not turn: I = (0.01 + 1·0.1²) of crank and of follower and 1·0.3² of the rod.
+    inertia = 2 * (0.01 + 0.1**2) + 0.3**2
+    pushed = drive(defect('par'), start=start - 0.02 * (start > 0))
+    assert pushed.state(BEGIN).rates == (0.0,)
+    pushed.offer(command(0.5), BEGIN)
+    for ms in (1, 50, 99):
+        crank = pushed.state(BEGIN + ms * MS)
+        assert crank.accelerations[0] == pytest.approx(0.5 / inertia, rel=1e-9)
+        assert crank.rates[0] == pytest.approx(0.5 / inertia * ms / 1000, rel=1e-9)

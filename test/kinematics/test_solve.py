@@ -37,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
+from .defects import defect
 from .linkages import four_bar_linkage, Frame, inverted_slider_crank_linkage, placed, PLAIN
 from .test_gallery import closure_of, EXPECTED, KINDS
 
@@ -483,9 +484,10 @@ def test_nothing_makes_numpy_warn(name: str) -> None:
 @pytest.mark.parametrize(
     ('name', 'inputs', 'more', 'text'),
     [
-        ('four_bar', 2, {}, 'inputs: 2 given, 1 joints are driven'),
-        ('five_bar', 1, {}, 'rates: give one for each of the 2 driven joints'),
-        ('five_bar', 2, {'rates': 1.0}, 'rates: 1 given, 2 joints are driven'),
+        ('four_bar', 2, {}, 'inputs: 2 given; give 1, one for each driven joint'),
+        ('five_bar', 1, {}, 'inputs: 1 given; give 2, one for each driven joint'),
+        ('five_bar', 2, {}, 'rates: give one for each of the 2 driven joints'),
+        ('five_bar', 2, {'rates': 1.0}, 'rates: 1 given; give 2, one for each driven joint'),
         ('four_bar', 1, {'rates': [1.0, 2.0]}, 'rates: shapes (2,) do not broadcast to (5,)'),
         ('four_bar', 1, {'accelerations': np.ones(4)},
          'accelerations: shapes (4,) do not broadcast to (5,)'),
@@ -529,3 +531,10 @@ def test_memory_does_not_grow_with_the_states() -> None:
             tracemalloc.stop()
         # Of 18 blocks more, an array of each would be 1.2 MB.
         assert peaks[1] < peaks[0] + 100_000
+
+
+@pytest.mark.parametrize('name', ['rail_on_coupler', 'standing_rpr'])
+def test_rails_on_links_that_follow_and_links_that_never_turn(name: str) -> None:
+    closure = defect(name)
+    (interval,) = closure.input_ranges
+    check(closure, [np.linspace(interval.lowest, interval.highest, 97)[1:-1]])

@@ -38,18 +38,13 @@ from linkage_ros.kinematics.survey import (
     Way,
     worst_residual,
 )
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
 import pytest
 
 from .linkages import four_bar_linkage
+from .test_gallery import closure_of as shipped
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 FILES = sorted(LINKAGES.glob('*.yaml'))
-
-
-def shipped(name: str) -> Closure:
-    return Closure(read_linkage(read_yaml(LINKAGES / f'{name}.yaml')[0]))
 
 
 def four_bar(a: float, b: float, c: float, d: float) -> Way:
@@ -87,7 +82,9 @@ def test_every_shipped_linkage_has_a_usual_pose_inside_its_range(file: Path) -> 
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_every_shipped_linkage_closes_to_rounding_all_over_its_range(file: Path) -> None:
     closure = shipped(file.stem)
-    worst, at, count = worst_residual(closure)
+    found = worst_residual(closure)
+    assert found is not None
+    worst, at, count = found
     assert worst < 1e-14 * closure.scale
     assert closure.residual(closure.position(*at)) == worst
     assert count > 400

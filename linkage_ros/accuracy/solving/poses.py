@@ -189,10 +189,11 @@ def near_change_point(closure: Closure) -> tuple[tuple[tuple[float, ...], ...], 
     """Return inputs on both sides of a change point, on the way through it, and how far off."""
     if len(closure.linkage.inputs) > 1:
         return (), ()
-    ends = {
-        end for one in closure.input_ranges if not one.whole for end in (one.lowest, one.highest)
-    }
-    inner = [critical for critical in closure.critical_inputs if critical not in ends]
+    inner = [
+        singular.value
+        for singular in closure.singular_inputs
+        if singular.status is Status.CHANGE_POINT
+    ]
     if not inner:
         return (), ()
     offsets = [*(-d for d in DISTANCES), *reversed(DISTANCES)]
@@ -250,7 +251,7 @@ def _next_to(
 
 def _troubles(closure: Closure) -> list[float]:
     ends = [end for one in closure.input_ranges if not one.whole for end in one[:2]]
-    return [*closure.critical_inputs, *ends]
+    return [*(singular.value for singular in closure.singular_inputs), *ends]
 
 
 def _away(value: float, critical: float, turning: bool) -> float:

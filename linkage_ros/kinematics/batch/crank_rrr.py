@@ -137,7 +137,8 @@ class CrankRRRArrays:
         """Append the directions of both links, and what is asked for of their motion."""
         i, j, _ = self._arms
         x = block.known[0]
-        phi = x[i] - x[j] if j else x[i]
+        # Of links that never turn there is one number for all states.
+        phi = np.atleast_1d(x[i] - x[j] if j else x[i])
         count = len(phi)
         w = Scratch(*block.scratch[:, :count])
         self._triangle(phi, w)

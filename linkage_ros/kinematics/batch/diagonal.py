@@ -57,7 +57,8 @@ class CrankDiagonalArrays(CrankDiagonal):
         a, difference, root, fold, stretch, short_pair, whole = self._constants
         first, second, offset = self.arms
         base = x[second]
-        half = 0.5 * (x[first] - base)
+        # Of links that never turn there is one number for all states.
+        half = 0.5 * np.atleast_1d(x[first] - base)
         half_sine, half_cosine = half_angle(half, offset, self.half_turn, stretch == 0.0)
         near, far = root * half_sine, root * half_cosine
         excess = near * near

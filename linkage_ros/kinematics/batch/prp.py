@@ -35,7 +35,7 @@ class PRPArrays(PRPDyad):
     def close(self, known: States) -> PRPPose:
         """Append both slides."""
         x, pins = known
-        (i, j), (one, other) = self._arms, self._units
+        (i, j), (one, other) = self.arms, self._units
         start, end = (pins[k] for k in self._starts)
         units: Any = turned(x[i]) * one, turned(x[j]) * other
         across: Any = turned(x[j] - x[i]) * self._across

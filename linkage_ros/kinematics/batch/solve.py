@@ -106,7 +106,7 @@ class Solver:
         if derivatives not in (0, 1, 2):
             raise ValueError(f'derivatives: {derivatives!r} is none of 0, 1, 2')
         driven = len(self._factors)
-        if rates is None and derivatives:
+        if rates is None and derivatives and len(inputs) == driven:
             if driven > 1:
                 raise ValueError(f'rates: give one for each of the {driven} driven joints')
             rates = 1.0
@@ -166,8 +166,11 @@ class Solver:
 def _numbers(name: str, values: list[Any], driven: int, count: int | None) -> list[Array]:
     """Return an array for each driven joint, as long as the states; of one number, if may be."""
     if len(values) != driven:
-        raise ValueError(f'{name}: {len(values)} given, {driven} joints are driven')
-    arrays = [np.asarray(value, np.float64) for value in values]
+        raise ValueError(f'{name}: {len(values)} given; give {driven}, one for each driven joint')
+    try:
+        arrays = [np.asarray(value, np.float64) for value in values]
+    except (TypeError, ValueError) as error:
+        raise ValueError(f'{name}: not an array of numbers: {error}') from None
     shapes = [array.shape for array in arrays]
     try:
         shape = np.broadcast_shapes(*shapes, () if count is None else (count,))

@@ -206,6 +206,10 @@ class DrivenRRRDyad:
         change = GrowthChange(square, 0.0, 0.0, None)
         triangle_accelerations(triangle, self._sign, (b - c) * (b + c), growth, change, changes)
 
+    def side_of(self, pose: DrivenRRRPose) -> float:
+        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        return pose.triangle.cross
+
     def transmission_angle(self, pose: DrivenRRRPose) -> float:
         """Return the angle between the two sides at B, folded into [0, π/2], in [rad]."""
         return folded(pose.triangle.second - pose.triangle.first)

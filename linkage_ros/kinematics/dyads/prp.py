@@ -29,8 +29,8 @@ parallel they do not meet, or lie on each other: open, or indeterminate.
 
 from __future__ import annotations
 
-from cmath import rect
-from math import atan2
+from cmath import phase, rect
+from math import atan2, pi
 from typing import NamedTuple
 
 from linkage_ros.kinematics.plane import cross
@@ -82,20 +82,20 @@ class PRPDyad:
 
     """
 
-    __slots__ = ('_across', '_arms', '_starts', '_units')
+    __slots__ = ('_across', '_starts', '_units', 'arms')
 
     def __init__(
         self, starts: tuple[int, int], arms: tuple[int, int], units: tuple[complex, complex]
     ) -> None:
         self._starts = starts
-        self._arms = arms
+        self.arms = arms
         self._units = units
         self._across = units[1] * units[0].conjugate()
 
     def close(self, known: State) -> PRPPose:
         """Append both slides."""
         x, pins = known
-        (i, j), (one, other) = self._arms, self._units
+        (i, j), (one, other) = self.arms, self._units
         start, end = (pins[k] for k in self._starts)
         units = rect(1.0, x[i]) * one, rect(1.0, x[j]) * other
         # The angle between the lines first: two directions would cancel where they are parallel.
@@ -112,7 +112,7 @@ class PRPDyad:
     def rates(self, pose: PRPPose, _known: State, speeds: State) -> tuple[float, float]:
         """Append the rates of both slides."""
         v, velocities = speeds
-        (i, j), (one, other) = self._arms, pose.units
+        (i, j), (one, other) = self.arms, pose.units
         start, end = (velocities[k] for k in self._starts)
         carried = end + 1j * (v[j] * pose.second) * other
         carried -= start + 1j * (v[i] * pose.first) * one
@@ -128,11 +128,21 @@ class PRPDyad:
     ) -> None:
         """Append the accelerations of both slides."""
         v, (a, pulls) = speeds[0], changes
-        (i, j), (one, other) = self._arms, pose.units
+        (i, j), (one, other) = self.arms, pose.units
         start, end = (pulls[k] for k in self._starts)
         carried = end + _carried(pose.second, rates[1], v[j], a[j]) * other
         carried -= start + _carried(pose.first, rates[0], v[i], a[i]) * one
         resolved(carried, pose.units, pose.across.imag, changes)
+
+    @property
+    def singular_angles(self) -> tuple[float, ...]:
+        """Differences of the two coordinates at which the lines are parallel, in [rad]."""
+        angle = phase(self._across)
+        return angle, angle + pi
+
+    def side_of(self, pose: PRPPose) -> float:
+        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        return pose.across.imag
 
     def transmission_angle(self, pose: PRPPose) -> float:
         """Return the angle between the two lines, in [0, π/2], in [rad]."""

@@ -139,6 +139,10 @@ class RPRDyad:
         changes[0].append(base + pull * (unit.imag + offset * lean) + swing * swing * bent)
         changes[0].append(pose.diagonal.square * (pull * lean + swing * swing * bend))
 
+    def side_of(self, pose: RPRPose) -> float:
+        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        return pose.slide
+
     def transmission_angle(self, pose: RPRPose) -> float:
         """Return the angle between AD and the normal of the rail, in [0, π/2], in [rad]."""
         return atan2(abs(pose.slide), abs(self._constants[0]))

@@ -134,6 +134,10 @@ class RRPDyad:
         changes[0].append(turn + change)
         changes[0].append(pull.real + velocity.imag * link + y * change)
 
+    def side_of(self, pose: RRPPose) -> float:
+        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        return pose.along
+
     def transmission_angle(self, pose: RRPPose) -> float:
         """Return the angle between the link and the normal of the line, in [0, π/2], in [rad]."""
         return atan2(abs(pose.along), abs(pose.sight.place.imag))

@@ -137,6 +137,10 @@ class RRRDyad:
         change = self.diagonal.accelerations(pose.diagonal, growth, known, speeds, changes)
         triangle_accelerations(pose, self._sign, self._difference, growth, change, changes)
 
+    def side_of(self, pose: RRRPose) -> float:
+        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        return pose.cross
+
     def transmission_angle(self, pose: RRRPose) -> float:
         """Return the angle between the two links at B, folded into [0, π/2], in [rad]."""
         return folded(pose.second - pose.first)

@@ -1,0 +1,30 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Linkage files on which the kinematics once failed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import read_yaml
+
+FOLDER = Path(__file__).parent
+
+
+def defect(name: str) -> Closure:
+    """Return the linkage of one of the files."""
+    return Closure(read_linkage(read_yaml(FOLDER / f'{name}.yaml')[0]))

@@ -1,0 +1,153 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where an input meets toggles and change points: listed, with what is met there."""
+
+from __future__ import annotations
+
+from math import inf, pi, remainder, tau
+import random
+
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
+from linkage_ros.kinematics.status import Status
+import pytest
+
+from .defects import defect
+from .flat_linkages import FLAT
+from .linkages import four_bar_linkage
+
+COUNT = 100
+
+
+def met(closure: Closure, status: Status) -> list[float]:
+    """Return the singular inputs at which a status is met."""
+    return [one.value for one in closure.singular_inputs if one.status is status]
+
+
+def agree(found: list[float], expected: list[float]) -> bool:
+    """Return whether two lists hold the same angles, but for whole turns and rounding."""
+    return len(found) == len(expected) and all(
+        any(abs(remainder(one - other, tau)) < 1e-12 for other in found) for one in expected
+    )
+
+
+@pytest.mark.parametrize('kind', FLAT)
+def test_change_points_and_pins_that_meet_are_listed(kind: str) -> None:
+    for number in range(COUNT):
+        flat = FLAT[kind](random.Random(f'singular/{kind}/{number}'))
+        closure = Closure(flat.linkage)
+        assert agree(met(closure, Status.CHANGE_POINT), [flat.sign * at for at in flat.at]), flat
+        assert agree(met(closure, Status.INDETERMINATE), list(flat.meets)), flat
+
+
+@pytest.mark.parametrize('kind', FLAT)
+def test_the_state_says_so_and_moves_on_as_before_and_behind(kind: str) -> None:
+    for number in range(COUNT):
+        flat = FLAT[kind](random.Random(f'singular/{kind}/{number}'))
+        closure = Closure(flat.linkage)
+        for at in flat.at:
+            value = flat.sign * remainder(at, tau)
+            position = closure.position(value)
+            assert position.status is Status.CHANGE_POINT, flat
+            velocity = closure.velocity(position, 1.0)
+            change = closure.acceleration(position, velocity, 0.3)
+            h = 1e-4
+            places = [closure.position(value + k * h).joints for k in (-2, -1, 1, 2)]
+            for j, joint in enumerate(position.joints):
+                a, b, c, d = (values[j] for values in places)
+                rate = (a - 8.0 * b + 8.0 * c - d) / (12.0 * h)
+                pull = (-a + 16.0 * b - 30.0 * joint + 16.0 * c - d) / (12.0 * h * h)
+                size = 1.0 + abs(rate) ** 5 + abs(pull) ** 2.5
+                assert velocity.joints[j] == pytest.approx(rate, abs=1e-8 * size), flat
+                assert change.joints[j] == pytest.approx(pull + 0.3 * rate, abs=1e-4 * size), flat
+
+
+@pytest.mark.parametrize('kind', FLAT)
+def test_arrays_have_the_same_statuses_rates_and_accelerations_there(kind: str) -> None:
+    for number in range(COUNT):
+        flat = FLAT[kind](random.Random(f'singular/{kind}/{number}'))
+        closure = Closure(flat.linkage)
+        values = [flat.sign * remainder(at, tau) for at in flat.at]
+        if not values:
+            continue
+        batch = closure.solve(values, rates=1.3, accelerations=0.4)
+        assert batch.velocities is not None
+        assert batch.accelerations is not None
+        for k, value in enumerate(values):
+            position = closure.position(value)
+            velocity = closure.velocity(position, 1.3)
+            change = closure.acceleration(position, velocity, 0.4)
+            assert list(Status)[batch.status[k]] is position.status
+            for row, joints in zip(batch[1:], (position, velocity, change), strict=True):
+                assert row is not None
+                assert row[:, k] == pytest.approx(joints.joints, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize('kind', FLAT)
+def test_the_distance_to_the_nearest_counts_down_to_it(kind: str) -> None:
+    flat = FLAT[kind](random.Random(f'singular/{kind}/1'))
+    closure = Closure(flat.linkage)
+    for at in flat.at:
+        for away in (1e-3, -1e-3, 1e-6):
+            position = closure.position(flat.sign * at + away)
+            assert closure.nearness(position).toggle_distance == pytest.approx(abs(away))
+
+
+def test_a_dyad_that_follows_others_is_searched_for_its_singular_inputs() -> None:
+    # Two four-bars: the rocker of the first, a parallelogram, is the crank of the second, another
+    # parallelogram, which folds flat whenever that rocker lies on the ground line.
+    links = {
+        'ground': {'O': (0.0, 0.0), 'D': (2.0, 0.0), 'E': (5.0, 0.0)},
+        'crank': {'O': (0.0, 0.0), 'A': (1.0, 0.0)},
+        'coupler': {'A': (0.0, 0.0), 'B': (2.0, 0.0)},
+        'rocker': {'D': (0.0, 0.0), 'B': (1.0, 0.0), 'F': (1.5, 0.0)},
+        'second_coupler': {'F': (0.0, 0.0), 'G': (3.0, 0.0)},
+        'second_rocker': {'E': (0.0, 0.0), 'G': (1.5, 0.0)},
+    }
+    joints = {'last': RevoluteJoint('ground', 'second_rocker')}
+    linkage = Linkage(
+        links, (Input('crank_joint', 'ground', 'crank'),), {'B': 'left', 'G': 'left'}, joints, {}
+    )
+    closure = Closure(linkage)
+    assert agree(met(closure, Status.CHANGE_POINT), [0.0, pi])
+    # With a second dyad that only just reaches at 0: there it turns back, as at a toggle.
+    links['second_rocker'] = {'E': (0.0, 0.0), 'G': (2.0, 0.0)}
+    links['second_coupler'] = {'F': (0.0, 0.0), 'G': (3.5, 0.0)}
+    closure = Closure(linkage)
+    assert agree(met(closure, Status.TOGGLE), [0.0])
+
+
+def test_the_ends_of_a_limited_range_are_toggles() -> None:
+    closure = Closure(four_bar_linkage((6.0, 4.0, 5.0, 4.5), 'left'))
+    (interval,) = closure.input_ranges
+    assert [one.value for one in closure.singular_inputs] == [interval.lowest, interval.highest]
+    assert {one.status for one in closure.singular_inputs} == {Status.TOGGLE}
+
+
+@pytest.mark.parametrize(
+    ('name', 'status', 'places'),
+    [
+        ('change_point', Status.CHANGE_POINT, [pi]),
+        ('inv_ahead', Status.CHANGE_POINT, [0.0]),
+        ('isosceles', Status.CHANGE_POINT, [-0.5 * pi, 0.5 * pi]),
+        ('par', Status.CHANGE_POINT, [0.0, pi]),
+        ('inv1', Status.INDETERMINATE, [0.0]),
+        ('straight_rev_ahead', Status.INDETERMINATE, [0.0]),
+    ],
+)
+def test_the_files_that_had_none(name: str, status: Status, places: list[float]) -> None:
+    closure = defect(name)
+    assert agree(met(closure, status), places)
+    assert closure.nearness(closure.position(places[0] + 1e-3)).toggle_distance < inf
