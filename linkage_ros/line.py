@@ -40,7 +40,17 @@ from linkage_ros.effects.stage import (
 from linkage_ros.errors import DefinitionError
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.look import at_rest, delayed, full_look, Look, observer, plain_look, sensing
+from linkage_ros.look import (
+    at_rest,
+    Delayed,
+    full_look,
+    gap_seen,
+    in_line,
+    Look,
+    observer,
+    plain_look,
+    sensing,
+)
 from linkage_ros.scene.scene import Member, Scene
 from linkage_ros.solvers.registry import SOLVERS
 
@@ -63,6 +73,9 @@ class Extra(NamedTuple):
         Writes it.
     write_open
         Writes it where the loop has no pose; nothing where it has nothing to say then.
+    of_reading
+        Whether it is made of the reading alone, and so also of one that arrives where the loop has
+        no pose.
 
     """
 
@@ -71,6 +84,7 @@ class Extra(NamedTuple):
     message: str
     write: Writer
     write_open: OpenWriter | None
+    of_reading: bool
 
 
 class Line:
@@ -112,7 +126,9 @@ class Line:
         drive_module = import_module(DRIVES[drive])
         named = set(member.effects)
         named |= {also for effect in named for also in PUBLISHED_WITH.get(effect, ())}
-        computed = named | {need for effect in named for need in needs(effect)}
+        moves_by_rates = getattr(drive_parameters, 'carry_forward', True)
+        starting = named - _between_readings(member, named, moves_by_rates)
+        computed = named | {need for effect in starting for need in needs(effect)}
         modules = {name: module_of(name) for name in in_order(computed)}
         forced = drive == 'torque' or not computed.isdisjoint(LOADED)
         _refuse_idle(member, forced)
@@ -134,6 +150,7 @@ class Line:
             friction=friction.friction(parameters['friction']) if friction else None,
             prefix=member.prefix,
             effects=frozenset(member.effects),
+            moves_by_rates=moves_by_rates,
         )
         self.topic: str = getattr(drive_module, 'TOPIC', '')
         """Topic that the drive listens to; '' for none."""
@@ -161,8 +178,11 @@ class Line:
         sensors: list[Any] = built('sensor')
         if 'delay' in modules:
             *before, delay = sensors
-            sensors = [delayed(before, delay)]
-        sense = sensing([*sensors, *faulty], self.closure.turning, scene.wrapped)
+            sensors = [Delayed(before, delay)]
+        with_rates = 'velocity' in named or 'velocity' not in computed
+        line = in_line([*sensors, *faulty], self.closure.turning, scene.wrapped, with_rates)
+        sense, gap = sensing(line), gap_seen(line)
+        self._seeing_gaps: list[Any] = [sensor for sensor in line if hasattr(sensor, 'gap')]
         stages = built('stage')
         drive_stages = built('drive_stage')
         (begin,) = built('begin') or [at_rest]
@@ -175,18 +195,29 @@ class Line:
             if name in named and hasattr(module, 'TOPIC')
         }
         if begin is not at_rest or drive_stages or mechanism or publishing:
-            observe = observer(named, len(self.closure.linkage.joints))
+            read = named | ({'velocity'} & computed)
+            observe = observer(read, len(self.closure.linkage.joints))
             self.look = full_look(
-                state, drive_stages, close, mechanism, begin, stages, observe, sense
+                state, drive_stages, close, mechanism, begin, stages, observe, sense, gap
             )
         else:
-            self.look = plain_look(state, close, sense)
+            self.look = plain_look(state, close, sense, gap)
         self.extras = [
             _extra(name, module, module.writer(parameters[name], self.context), member.name)
             for name, module in publishing.items()
         ]
         self.stages = tuple(modules)
         """Names of the effects that are computed, in physical order."""
+
+    @property
+    def sees_gaps(self) -> bool:
+        """Return whether a sensor is told of ticks without a pose."""
+        return bool(self._seeing_gaps)
+
+    @property
+    def gap_begins(self) -> bool:
+        """Return whether a gap began with the last tick, if that had no pose."""
+        return any(sensor.gap_begins for sensor in self._seeing_gaps)
 
     @property
     def choice(self) -> Choice | None:
@@ -207,9 +238,20 @@ class Line:
         return rejection
 
 
+def _between_readings(member: Member, named: set[str], moves_by_rates: bool) -> set[str]:
+    """Return the effects that mix readings, where they do so without rates or not at all."""
+    found = {'jitter', 'delay'} & named
+    if moves_by_rates and 'delay' in found:
+        delay = module_of('delay')
+        parameters = member.effects.get('delay') or delay.PARAMETERS()
+        return set() if delay.interpolates(parameters, named) else {'delay'}
+    return set() if moves_by_rates else found
+
+
 def _extra(name: str, module: ModuleType, write: Writer, member: str) -> Extra:
     topic: str = f'~/{member}/{module.TOPIC[2:]}' if member else module.TOPIC
-    return Extra(name, topic, module.MESSAGE, write, getattr(write, 'no_pose', None))
+    of_reading = getattr(module, 'OF_READING', False)
+    return Extra(name, topic, module.MESSAGE, write, getattr(write, 'no_pose', None), of_reading)
 
 
 def _refuse_idle(member: Member, forced: bool) -> None:

@@ -24,13 +24,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from operator import add
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.effects.stage import Begin, DriveStage, Motion, Reading, Sensor, Stage
 from linkage_ros.effects.turns import all_wrapped, continuous
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.tuples import new
+
+if TYPE_CHECKING:
+    from linkage_ros.effects.delay import Delay
 
 
 class Look(NamedTuple):
@@ -46,7 +49,8 @@ class Look(NamedTuple):
     motion
         What the mechanism does; nothing where the loop has no pose, or no stage asks.
     reading
-        What is published of it; nothing where nothing is.
+        What is published of it; nothing where nothing is. A delay may have one where the linkage
+        has no pose.
 
     """
 
@@ -58,29 +62,108 @@ class Look(NamedTuple):
 
 _NO_CRANK = Look(None, None, None, None)
 
-
-def sensing(sensors: Sequence[Sensor], turning: Sequence[bool], wrapped: bool) -> Sensor:
-    """Put sensors together: what makes angles run on before them, what wraps them behind."""
-    if wrapped and not sensors:
-        return all_wrapped(turning)
-    return _chain([continuous(turning), *sensors, *([all_wrapped(turning)] if wrapped else [])])
+Gap = Callable[[int], Reading | None]
+"""What is read at a time, in [ns], at which the linkage has no pose."""
 
 
-def delayed(sensors: Sequence[Sensor], delay: Any) -> Sensor:
-    """Put a delay behind sensors, which is told their silence too."""
-    sense = _chain(sensors)
+def in_line(
+    sensors: Sequence[Sensor], turning: Sequence[bool], wrapped: bool, with_rates: bool
+) -> list[Sensor]:
+    """
+    Return all that a reading passes.
 
-    def late(now: int, reading: Reading) -> Reading | None:
-        arrived: Reading | None = delay(now, sense(now, reading))
-        return arrived
+    Parameters
+    ----------
+    sensors
+        What the scene calls for, in order.
+    turning
+        For each joint whether it is an angle.
+    wrapped
+        Whether angles are published within a turn; before the sensors they run on.
+    with_rates
+        Whether rates are published; else they end here, having served between readings.
 
-    return late
+    """
+    behind: list[Sensor] = [] if with_rates else [_without_rates]
+    if wrapped:
+        behind.append(all_wrapped(turning))
+        if not sensors:
+            return behind
+    return [continuous(turning), *sensors, *behind]
+
+
+def _without_rates(_now: int, reading: Reading) -> Reading:
+    stamp, joints, _, accelerations, efforts = reading
+    return new(Reading, (stamp, joints, (), accelerations, efforts))
+
+
+def sensing(sensors: Sequence[Sensor]) -> Sensor:
+    """Put sensors together, as long as none of them reads nothing."""
+    return sensors[0] if len(sensors) == 1 else _chain(sensors)
+
+
+def gap_seen(sensors: Sequence[Sensor]) -> Gap | None:
+    """Return what sensors make of a tick without a pose; None where none of them is told."""
+    told = [getattr(sensor, 'gap', None) for sensor in sensors]
+    if not any(told):
+        return None
+
+    def gap(now: int) -> Reading | None:
+        found: Reading | None = None
+        for sensor, tell in zip(sensors, told, strict=True):
+            if found is not None:
+                found = sensor(now, found)
+            elif tell is not None:
+                found = tell(now)
+        return found
+
+    return gap
+
+
+class Delayed:
+    """
+    A delay behind other sensors, which is told their silence, too.
+
+    Parameters
+    ----------
+    sensors
+        Those before it.
+    delay
+        The delay.
+
+    """
+
+    __slots__ = ('_before', '_delay', '_gap_before')
+
+    def __init__(self, sensors: Sequence[Sensor], delay: Delay) -> None:
+        self._before: list[tuple[Any, bool]] = [(s, hasattr(s, 'gap')) for s in sensors]
+        self._gap_before = gap_seen(sensors)
+        self._delay = delay
+
+    def __call__(self, now: int, reading: Reading) -> Reading | None:
+        """Return what arrives."""
+        found = reading
+        for sensor, sees_gaps in self._before:
+            found = sensor(now, found)
+            if found is None:
+                # One that is told of gaps reads nothing where it looks into one.
+                return self._delay.gap(now) if sees_gaps else self._delay(now, None)
+        return self._delay(now, found)
+
+    def gap(self, now: int) -> Reading | None:
+        """Return what arrives where the linkage has no pose."""
+        found = self._gap_before(now) if self._gap_before is not None else None
+        return self._delay.gap(now) if found is None else self._delay(now, found)
+
+    @property
+    def gap_begins(self) -> bool:
+        """Return whether the last gap began for one of them."""
+        before = (sensor for sensor, sees_gaps in self._before if sees_gaps)
+        return self._delay.gap_begins or any(sensor.gap_begins for sensor in before)
 
 
 def _chain(sensors: Sequence[Sensor]) -> Sensor:
     """Let each sensor read what the one before it has read, as long as there is something."""
-    if len(sensors) == 1:
-        return sensors[0]
 
     def chain(now: int, reading: Reading) -> Reading | None:
         found: Reading | None = reading
@@ -97,17 +180,18 @@ def plain_look(
     state: Callable[[int], CrankState | None],
     close: Callable[..., Position],
     sense: Sensor,
+    gap: Gap | None,
 ) -> Callable[[int], Look]:
     """Put a tick together that asks for positions and for nothing that moves or pushes."""
 
     def look(now: int) -> Look:
         crank = state(now)
         if crank is None:
-            return _NO_CRANK
+            return new(Look, (None, None, None, gap(now))) if gap else _NO_CRANK
         position = close(*crank[0])
         joints = position[2]
         if not joints:
-            return new(Look, (crank, position, None, None))
+            return new(Look, (crank, position, None, gap(now) if gap else None))
         reading = sense(now, new(Reading, (now, joints, (), (), ())))
         return new(Look, (crank, position, None, reading))
 
@@ -123,20 +207,21 @@ def full_look(
     stages: Sequence[Stage],
     observe: Callable[[int, Motion], Reading],
     sense: Sensor,
+    gap: Gap | None,
 ) -> Callable[[int], Look]:
     """Put a tick together."""
 
     def look(now: int) -> Look:
         crank = state(now)
         if crank is None:
-            return _NO_CRANK
+            return new(Look, (None, None, None, gap(now))) if gap else _NO_CRANK
         for between in drive_stages:
             crank = between(crank)
         position = close(*crank[0])
         for harm in mechanism:
             position = harm(position)
         if not position[2]:
-            return new(Look, (crank, position, None, None))
+            return new(Look, (crank, position, None, gap(now) if gap else None))
         motion = begin(crank, position)
         for stage in stages:
             motion = stage(motion)

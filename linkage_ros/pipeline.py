@@ -36,7 +36,7 @@ from linkage_ros.tuples import new
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Injection
 
-_WITHHOLDING = {'rate_limit', 'dropout', 'delay'}
+_WITHHOLDING = {'rate_limit', 'dropout', 'delay', 'jitter'}
 """Effects that may leave a tick without a message."""
 
 _GOING_ON = {'backlash'}
@@ -149,8 +149,10 @@ class Pipeline:
     def remembers(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes what comes after it."""
         return any(
-            position is not None and bool(position[2] or self._goes_on)
-            for _, position, _, _ in tick.looks
+            line.gap_begins
+            if look.position is None or not (look.position.joints or self._goes_on)
+            else True
+            for line, look in zip(self.lines, tick.looks, strict=True)
         )
 
     def _tick_many(self, now: int) -> Tick:
@@ -213,8 +215,11 @@ def _ticking_one(line: Line) -> Callable[[int], Tick]:
             return new(Tick, ((look,), b'', ()))
         stamp, joints, rates, _, efforts = reading
         message = write(stamp, joints, rates, efforts)
-        if not extras or motion is None:
+        if not extras:
             return new(Tick, ((look,), message, ()))
+        if motion is None:
+            written = tuple([_written(extra, now, look) for extra in line.extras])
+            return new(Tick, ((look,), message, written if any(written) else ()))
         written = tuple([write_extra(now, motion, reading) for write_extra in extras])
         return new(Tick, ((look,), message, written))
 
@@ -224,8 +229,10 @@ def _ticking_one(line: Line) -> Callable[[int], Tick]:
 def _written(extra: Extra, now: int, look: Look) -> bytes:
     """Return an extra of a linkage at a time, in [ns]; b'' for none."""
     _, position, motion, reading = look
+    if reading is not None and (motion is not None or extra.of_reading):
+        return extra.write(now, motion, reading)
     if motion is not None:
-        return b'' if reading is None else extra.write(now, motion, reading)
+        return b''
     if position is None or extra.write_open is None:
         return b''
     return extra.write_open(now, position)

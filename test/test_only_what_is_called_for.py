@@ -67,13 +67,13 @@ SCENES = {
     'pin_forces': ('effects: {pin_forces: {}}', FORCES | PINS),
     'compliance': ('effects: {compliance: {links: {coupler: 1.0e6}}}', FORCES),
     'clearance': ('effects: {clearance: {pins: {A: 1.0e-5}}}', FORCES),
-    'jitter': ('effects: {jitter: {seconds: 0.001}}', {'effects.history'}),
+    'jitter': ('effects: {jitter: {seconds: 0.001}}', {'effects.history', 'effects.velocity'}),
     'bias': ('effects: {bias: {joints: {rocker_joint: 0.1}}}', set()),
     'noise': ('effects: {noise: {joints: {rocker_joint: {white: 0.001}}}}', set()),
     'encoder': ('effects: {encoder: {joints: {rocker_joint: {counts: 4096}}}}', set()),
     'rate_limit': ('effects: {rate_limit: {rate: 100}}', set()),
     'dropout': ('effects: {dropout: {probability: 0.1}}', set()),
-    'delay': ('effects: {delay: {seconds: 0.002}}', {'effects.history'}),
+    'delay': ('effects: {delay: {seconds: 0.002}}', {'effects.history', 'effects.velocity'}),
     'markers': ('effects: {markers: {}}', DRAWN),
 }
 SILENT = {'not_a_number': 'drive: {topic: {}}\n'}

@@ -119,6 +119,9 @@ class Context:
         What the joints' names have before their own in messages; '' for nothing.
     effects
         Names of the effects that the scene names.
+    moves_by_rates
+        Whether the crank's rates are those at which it moves; one that is held between its samples
+        stands, whatever its rate.
 
     """
 
@@ -130,6 +133,7 @@ class Context:
     friction: Friction | None
     prefix: str = ''
     effects: frozenset[str] = frozenset()
+    moves_by_rates: bool = True
 
     @property
     def joints(self) -> tuple[str, ...]:

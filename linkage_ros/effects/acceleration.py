@@ -33,6 +33,7 @@ from linkage_ros.tuples import new
 
 TOPIC = '~/motion'
 MESSAGE = 'trajectory_msgs/msg/JointTrajectory'
+OF_READING = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ def writer(_parameters: AccelerationParameters, context: Context) -> Writer:
 
     write = JointTrajectoryWriter(context.joints_in_messages).write
 
-    def write_motion(_now: int, _motion: Motion, reading: Reading) -> bytes:
+    def write_motion(_now: int, _motion: Motion | None, reading: Reading) -> bytes:
         stamp, positions, rates, accelerations, _ = reading
         return write(stamp, positions, rates, accelerations)
 

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 Delay: what is read arrives later, by a transport time that is exact to the nanosecond.
 
@@ -24,13 +23,18 @@ With the delay d in whole nanoseconds, at the tick t::
 ``sampled``, the newest reading that is at least d old, as of a line that carries one reading for
 each tick (the delays of dm_control's observables: S. Tunyasuvunakool et al., dm_control: Software
 and tasks for continuous control, Software Impacts 6, 2020; in a control loop: B. Wittenmark, J.
-Nilsson and M. Törngren, Timing problems in real-time control systems, ACC 1995). A reading of an
-encoder keeps its whole counts only where it is sampled.
+Nilsson and M. Törngren, Timing problems in real-time control systems, ACC 1995). Unless it is
+named it is ``sampled`` behind an encoder, whose readings stay whole counts, and else
+``interpolated``.
 
-Nothing is published before there is a reading that old, and nothing is extrapolated. Behind a
-sensor that is silent at times (a slow one, a lossy one) the line carries messages and no signal:
-from the first silence on, each reading arrives once, as it is, with the first tick that is d
-later; of several that come due between two ticks, one with each tick.
+Nothing is published before there is a reading that old, and nothing is extrapolated. Where the
+linkage had no pose, or no crank, there is a gap: it arrives d later. The last reading before it
+arrives as it is, with the first tick that is d later; nothing is mixed across it.
+
+Behind a sensor that is silent at times (a slow one, a lossy one) the line carries messages and no
+signal. The first silence, too, arrives d later: from the last reading before it on, each reading
+arrives once, as it is, with the first tick that is d later; of several that come due between two
+ticks, one with each tick.
 
 ``stamp: arrival`` leaves the message the stamp of its tick, as a driver does that knows of no
 delay; ``measured`` is the time at which the sensor saw it, t − d, or that of the reading.
@@ -41,12 +45,15 @@ The line holds the readings of the last d: at 1 kHz a thousand for a second.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
 from linkage_ros.effects.stage import Reading, restamped
 from linkage_ros.parameters import choice, number
+
+_AUTOMATIC = 'automatic'
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +64,10 @@ class DelayParameters:
         'how much later, rounded to nanoseconds', unit='s', least=0.0, most=10.0
     )
     between: str = choice(
-        'between two ticks: the value at exactly that time, or the newest that is old enough',
-        ('interpolated', 'sampled'),
-        'interpolated',
+        'between two ticks: the value at exactly that time, or the newest that is old enough; '
+        'automatic: sampled behind an encoder, else interpolated',
+        ('interpolated', 'sampled', _AUTOMATIC),
+        _AUTOMATIC,
     )
     stamp: str = choice(
         'stamp of the message: time of its arrival, or of the measurement',
@@ -71,9 +79,16 @@ class DelayParameters:
 PARAMETERS = DelayParameters
 
 
-def sensor(parameters: DelayParameters, _context: Context) -> Delay:
+def interpolates(parameters: DelayParameters, named: Collection[str]) -> bool:
+    """Return whether readings are mixed, with these effects in a scene."""
+    if parameters.between == _AUTOMATIC:
+        return 'encoder' not in named
+    return parameters.between == 'interpolated'
+
+
+def sensor(parameters: DelayParameters, context: Context) -> Delay:
     """Build the sensor."""
-    return Delay(parameters)
+    return Delay(parameters, interpolates(parameters, context.effects), context.moves_by_rates)
 
 
 class Delay:
@@ -84,43 +99,70 @@ class Delay:
     ----------
     use
         What it does.
+    mixes
+        Whether readings are mixed between two ticks; else it carries one for each tick.
+    with_rates
+        Whether they are mixed by their rates, too.
+
+    Attributes
+    ----------
+    gap_begins
+        Whether the last gap that it was told of began there.
 
     """
 
-    __slots__ = ('_arrived', '_delay', '_history', '_look', '_measured', '_on_the_way')
+    __slots__ = (
+        '_arrived', '_delay', '_history', '_look', '_measured', '_messages', '_on_the_way',
+        'gap_begins',
+    )  # fmt: skip
 
-    def __init__(self, use: DelayParameters) -> None:
+    def __init__(self, use: DelayParameters, mixes: bool, with_rates: bool = True) -> None:
         self._delay = round(use.seconds * 1e9)
-        self._history = History(self._delay)
-        sampled = use.between == 'sampled'
-        self._look = self._history.newest if sampled else self._history.between
+        self._history = History(self._delay, with_rates)
+        self._look = self._history.arriving if mixes else self._history.newest
         self._measured = use.stamp == 'measured'
         self._arrived = -1
-        """Time up to which readings have arrived while there was no silence, in [ns]."""
-        self._on_the_way: deque[tuple[int, Reading]] | None = None
-        """Readings that have not arrived; nothing before the first silence."""
+        """Time up to which readings have arrived, in [ns]."""
+        self._messages: int | None = None
+        """Time of the last reading before the first silence, in [ns]; nothing before that."""
+        self._on_the_way: deque[tuple[int, Reading]] = deque()
+        """Readings since then that have not arrived."""
+        self.gap_begins = False
 
     def __call__(self, now: int, reading: Reading | None) -> Reading | None:
-        """Return what arrives; None in the place of a reading is silence."""
-        due = now - self._delay
-        if reading is None and self._on_the_way is None:
-            self._on_the_way = deque(self._history.after(self._arrived))
-        if self._on_the_way is None:
-            assert reading is not None
-            self._history.add(now, reading)
-            self._arrived = due
-            found = self._look(due)
+        """Return what arrives; None in the place of a reading is the silence of a sensor."""
+        if self._messages is not None:
+            if reading is not None:
+                self._on_the_way.append((now, reading))
+        elif reading is None:
+            self._begin_messages()
         else:
-            found = self._next(self._on_the_way, now, reading, due)
+            self._history.add(now, reading)
+        return self._arriving(now)
+
+    def gap(self, now: int) -> Reading | None:
+        """Return what arrives at a time, in [ns], at which the linkage has no pose."""
+        self.gap_begins = self._messages is None and self._history.add_gap(now)
+        return self._arriving(now)
+
+    def _begin_messages(self) -> None:
+        """Let the line carry messages from the newest reading on."""
+        self._messages = -1
+        for newest in self._history.after(self._arrived)[-1:]:
+            self._messages = newest[0]
+            self._on_the_way.append(newest)
+
+    def _arriving(self, now: int) -> Reading | None:
+        due = now - self._delay
+        if self._messages is not None and due >= self._messages:
+            found = self._next(due)
+        else:
+            found = self._look(due, self._arrived)
+        self._arrived = due
         return found if found is None or self._measured else restamped(found, now)
 
-    @staticmethod
-    def _next(
-        on_the_way: deque[tuple[int, Reading]], now: int, reading: Reading | None, due: int
-    ) -> Reading | None:
-        """Send a reading on its way, and return the first that is due."""
-        if reading is not None:
-            on_the_way.append((now, reading))
-        if on_the_way and on_the_way[0][0] <= due:
-            return on_the_way.popleft()[1]
+    def _next(self, due: int) -> Reading | None:
+        """Return the first reading on the way, if it is due."""
+        if self._on_the_way and self._on_the_way[0][0] <= due:
+            return self._on_the_way.popleft()[1]
         return None

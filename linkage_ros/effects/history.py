@@ -30,6 +30,8 @@ At a tick next to a toggle a rate may be any number, and the cubic would leave t
 a motion that the readings resolve, c = h·v₀ + h·v₁ − 2Δ, which is h³/6 times the third derivative,
 is small beside the change of the rates or the way itself. Where 2·|c| > |h·v₁ − h·v₀| + |Δ| the
 rates do not fit the values, and the line is taken.
+
+Where the linkage has no pose there is a gap: nothing is read, and nothing is mixed across it.
 """
 
 from __future__ import annotations
@@ -45,21 +47,27 @@ _Values = tuple[float, ...]
 
 class History:
     """
-    Readings, as many as reach back over a span; older ones are forgotten.
+    Readings and gaps, as many as reach back over a span; older ones are forgotten.
+
+    A gap stands at the first time at which there was no reading, and lasts until the next one.
 
     Parameters
     ----------
     span
         How far back it has to reach, in [ns].
+    with_rates
+        Whether rates are those at which the values change. A crank that is held between its
+        samples has a rate, and stands.
 
     """
 
-    __slots__ = ('_readings', '_span', '_times')
+    __slots__ = ('_readings', '_span', '_times', '_with_rates')
 
-    def __init__(self, span: int) -> None:
+    def __init__(self, span: int, with_rates: bool = True) -> None:
         self._span = span
+        self._with_rates = with_rates
         self._times: deque[int] = deque()
-        self._readings: deque[Reading] = deque()
+        self._readings: deque[Reading | None] = deque()
 
     def __len__(self) -> int:
         return len(self._times)
@@ -86,24 +94,57 @@ class History:
         if times and times[-1] == now:
             readings[-1] = reading
             return
+        self._append(now, reading)
+
+    def add_gap(self, now: int) -> bool:
+        """
+        Remember that nothing is read at a time, in [ns].
+
+        Returns
+        -------
+        begins
+            Whether a gap begins there: not where one lasts, nor where nothing was read before.
+
+        """
+        if not self._times or self._readings[-1] is None:
+            return False
+        self._append(now, None)
+        return True
+
+    def _append(self, now: int, reading: Reading | None) -> None:
+        times, readings = self._times, self._readings
+        if times:
+            # By the last time: what came due since then is still asked for.
+            oldest = times[-1] - self._span
+            while len(times) > 1 and times[1] <= oldest:
+                times.popleft()
+                readings.popleft()
         times.append(now)
         readings.append(reading)
-        oldest = now - self._span
-        while len(times) > 1 and times[1] <= oldest:
-            times.popleft()
-            readings.popleft()
 
-    def newest(self, time: int) -> Reading | None:
-        """Return the newest reading that is not after a time, in [ns], if there is one."""
+    def newest(self, time: int, since: int) -> Reading | None:
+        """
+        Return the newest reading at a time, in [ns]; in a gap the last one before it, once.
+
+        Parameters
+        ----------
+        time
+            The time.
+        since
+            When it was asked for before: of a gap only what came after that.
+
+        """
         at = bisect_right(self._times, time)
-        return self._readings[at - 1] if at else None
+        if at and self._readings[at - 1] is not None:
+            return self._readings[at - 1]
+        return self._before_gap(time, since)
 
     def between(self, time: int) -> Reading | None:
         """
         Return what was read at a time, in [ns], and bears it as its stamp.
 
         Where nothing was read since, there is nothing to mix with: then it is the newest reading,
-        with its own stamp. Before the first there is nothing.
+        with its own stamp. Before the first there is nothing, and nothing in a gap.
         """
         at = bisect_right(self._times, time)
         if not at:
@@ -111,20 +152,38 @@ class History:
         before, begin = self._readings[at - 1], self._times[at - 1]
         if begin == time or at == len(self._times):
             return before
-        return _mixed(time, begin, before, self._times[at], self._readings[at])
+        after = self._readings[at]
+        if before is None or after is None:
+            return None
+        return _mixed(time, begin, before, self._times[at], after, self._with_rates)
+
+    def arriving(self, time: int, since: int) -> Reading | None:
+        """Return as `between` does, and the last reading before a gap as it is, once."""
+        return self.between(time) or self._before_gap(time, since)
+
+    def _before_gap(self, time: int, since: int) -> Reading | None:
+        """Return the reading that was the newest at a time, if it came after another time."""
+        at = bisect_right(self._times, time)
+        while at and self._times[at - 1] > since:
+            at -= 1
+            if self._readings[at] is not None:
+                return self._readings[at]
+        return None
 
     def after(self, time: int) -> list[tuple[int, Reading]]:
         """Return the readings since a time, in [ns], each with its own."""
         pairs = zip(self._times, self._readings, strict=True)
-        return [(at, reading) for at, reading in pairs if at > time]
+        return [(at, reading) for at, reading in pairs if at > time and reading is not None]
 
 
-def _mixed(time: int, begin: int, before: Reading, end: int, after: Reading) -> Reading:
+def _mixed(
+    time: int, begin: int, before: Reading, end: int, after: Reading, with_rates: bool
+) -> Reading:
     """Return the reading at a time between two, all times in [ns]."""
     s = (time - begin) / (end - begin)
     _, x0, v0, a0, e0 = before
     _, x1, v1, a1, e1 = after
-    if v0 and v1:
+    if with_rates and v0 and v1:
         h = (end - begin) * 1e-9
         joints = tuple(
             [_cubic(s, p, q, h * v, h * w) for p, q, v, w in zip(x0, x1, v0, v1, strict=True)]

@@ -27,7 +27,8 @@ then (B. Wittenmark, J. Nilsson and M. Törngren, Timing problems in real-time c
 
 Between two ticks x is interpolated, as `history` has it. A sensor cannot look before the first
 tick: an instant before it is the first tick's. Where J is more than a period, an instant may lie
-before that of the tick before. The message keeps the stamp of its tick.
+before that of the tick before. The message keeps the stamp of its tick. Where the linkage has no
+pose, or had none at the instant, nothing is read.
 
 All instants are whole nanoseconds.
 """
@@ -35,10 +36,11 @@ All instants are whole nanoseconds.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from random import Random
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
-from linkage_ros.effects.stage import Reading, restamped, Sensor
+from linkage_ros.effects.stage import Reading, restamped
 from linkage_ros.parameters import choice, number
 
 
@@ -55,26 +57,57 @@ class JitterParameters:
 PARAMETERS = JitterParameters
 
 
-def sensor(parameters: JitterParameters, context: Context) -> Sensor:
+def sensor(parameters: JitterParameters, context: Context) -> Jitter:
     """Build the sensor."""
-    most = round(parameters.seconds * 1e9)
-    generator = context.random('jitter')
-    history = History(most)
+    return Jitter(parameters, context.random('jitter'), context.moves_by_rates)
 
-    if parameters.distribution == 'uniform':
-        uniform = generator.random
 
-        def earlier() -> int:
-            return int((most + 1) * uniform())
-    else:
-        normal, deviation = generator.gauss, most / 3.0
+class Jitter:
+    """
+    A sensor whose instants wander.
 
-        def earlier() -> int:
-            return min(round(abs(normal(0.0, deviation))), most)
+    Parameters
+    ----------
+    use
+        What it does.
+    random
+        What draws how much earlier it looks.
+    with_rates
+        Whether readings are mixed by their rates, too.
 
-    def jitter(now: int, reading: Reading) -> Reading | None:
+    Attributes
+    ----------
+    gap_begins
+        Whether the last gap that it was told of began there.
+
+    """
+
+    __slots__ = ('_earlier', '_history', 'gap_begins')
+
+    def __init__(self, use: JitterParameters, random: Random, with_rates: bool) -> None:
+        most = round(use.seconds * 1e9)
+        self._history = History(most, with_rates)
+        self.gap_begins = False
+        if use.distribution == 'uniform':
+            uniform = random.random
+
+            def earlier() -> int:
+                return int((most + 1) * uniform())
+        else:
+            normal, deviation = random.gauss, most / 3.0
+
+            def earlier() -> int:
+                return min(round(abs(normal(0.0, deviation))), most)
+
+        self._earlier = earlier
+
+    def __call__(self, now: int, reading: Reading) -> Reading | None:
+        """Return what is read at a time, in [ns]."""
+        history = self._history
         history.add(now, reading)
-        found = history.between(max(now - earlier(), history.begin))
+        found = history.between(max(now - self._earlier(), history.begin))
         return None if found is None else restamped(found, reading[0])
 
-    return jitter
+    def gap(self, now: int) -> None:
+        """Take note that the linkage has no pose at a time, in [ns]; nothing is read."""
+        self.gap_begins = self._history.add_gap(now)

@@ -32,12 +32,17 @@ and with what builds its part of the tick; which, says where in the tick it stan
     stands before them and has ``begin`` instead, which makes the motion that they change.
 ``sensor(parameters, context) -> Callable[[int, Reading], Reading | None]``
     Between the mechanism and the message: given the time of the tick, in [ns], and what is read
-    so far, return what is read; None where nothing is.
+    so far, return what is read; None where nothing is. Where the linkage has no pose, or no crank,
+    it is not asked, unless it has a method ``gap(now) -> Reading | None``; such a sensor also says
+    by ``gap_begins`` whether the last gap that it was told of began there.
 
 An effect that publishes a message of its own has also
 
 ``TOPIC``, ``MESSAGE``
     The topic, and the type of the message: package/msg/Type.
+``OF_READING``
+    True where the message is made of the reading alone: then it is also published of a reading
+    that a delay brings where the loop has no pose, and the motion is None.
 ``writer(parameters, context) -> Callable[[int, Motion, Reading], bytes]``
     Build what writes the message, given the time of the tick, in [ns]; b'' where there is nothing
     to publish. It is asked only where there is a reading. Where it has a method
@@ -52,7 +57,7 @@ from collections.abc import Callable, Collection
 from importlib import import_module
 from operator import add
 from types import ModuleType
-from typing import NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
@@ -94,6 +99,9 @@ NEEDS = {
     'pin_forces': ('velocity', 'acceleration'),
     'compliance': ('velocity', 'acceleration', 'pin_forces'),
     'clearance': ('velocity', 'acceleration', 'pin_forces'),
+    # Between two readings by their rates, whether these are published or not.
+    'jitter': ('velocity',),
+    'delay': ('velocity',),
 }
 """What an effect starts from, which is then computed; but published only where it is named."""
 
@@ -216,5 +224,5 @@ DriveStage = Callable[[CrankState], CrankState]
 Begin = Callable[[CrankState, Position], Motion]
 Stage = Callable[[Motion], Motion]
 Sensor = Callable[[int, Reading], Reading | None]
-Writer = Callable[[int, Motion, Reading], bytes]
+Writer = Callable[[int, Any, Reading], bytes]
 OpenWriter = Callable[[int, Position], bytes]

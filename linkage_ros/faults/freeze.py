@@ -16,8 +16,8 @@
 """
 Freeze: the last reading is published again and again, with stamps that go on.
 
-What a sensor's electronics do that hang while their driver goes on polling. Where nothing was read
-before, nothing is published.
+What a sensor's electronics do that hang while their driver goes on polling, whether the linkage
+has a pose or not. Where nothing was read before, nothing is published.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from linkage_ros.effects.stage import Reading, restamped, Sensor
+from linkage_ros.effects.stage import Reading, restamped
 from linkage_ros.faults.fault import Switch
 
 
@@ -37,15 +37,44 @@ class FreezeParameters:
 PARAMETERS = FreezeParameters
 
 
-def sensor(_parameters: FreezeParameters, switch: Switch, _joints: Sequence[str]) -> Sensor:
+def sensor(_parameters: FreezeParameters, switch: Switch, _joints: Sequence[str]) -> Freeze:
     """Build what holds the readings."""
-    last: Reading | None = None
+    return Freeze(switch)
 
-    def freeze(_now: int, reading: Reading) -> Reading | None:
-        nonlocal last
-        if not switch.on:
-            last = reading
+
+class Freeze:
+    """
+    A sensor that may hang.
+
+    Parameters
+    ----------
+    switch
+        Whether it does.
+
+    Attributes
+    ----------
+    gap_begins
+        That a gap changes nothing for it.
+
+    """
+
+    __slots__ = ('_last', '_switch')
+
+    gap_begins = False
+
+    def __init__(self, switch: Switch) -> None:
+        self._switch = switch
+        self._last: Reading | None = None
+
+    def __call__(self, _now: int, reading: Reading) -> Reading | None:
+        """Return a reading, or the last one before it hung."""
+        if not self._switch.on:
+            self._last = reading
             return reading
-        return None if last is None else restamped(last, reading[0])
+        return None if self._last is None else restamped(self._last, reading[0])
 
-    return freeze
+    def gap(self, now: int) -> Reading | None:
+        """Return the last reading before it hung, stamped now, in [ns]; nothing else."""
+        if not self._switch.on or self._last is None:
+            return None
+        return restamped(self._last, now)
