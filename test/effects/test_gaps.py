@@ -73,9 +73,9 @@ def pipeline(effects, drive=SINE, faults=''):
     return Pipeline(parse_scene('test', 'test', files))
 
 
-def run(effects, ticks=4000, faults=''):
+def run(effects, ticks=4000):
     """Return for each tick, 1 ms apart, what is read."""
-    work = pipeline(effects, faults=faults)
+    work = pipeline(effects)
     return [work.tick(BEGIN + i * MS).looks[0].reading for i in range(ticks)]
 
 
@@ -152,8 +152,12 @@ def test_a_gap_behind_a_silent_sensor_is_counted_once():
 
 
 def test_freeze_over_an_open_loop_publishes_the_last_state():
-    faults = 'faults: {hang: {freeze: {}, at: [0.0995], seconds: 10}}\n'
-    found = run('velocity: {}', ticks=3000, faults=faults)
+    work = pipeline('velocity: {}', faults='faults: {hang: {freeze: {}}}\n')
+    found = []
+    for i in range(3000):
+        if i == 100:
+            work.injection.turn('hang', on=True)
+        found.append(work.tick(BEGIN + i * MS).looks[0].reading)
     posed = [closes(crank_at(BEGIN + i * MS)) for i in range(len(found))]
     assert all(posed[:100])
     assert not all(posed)
@@ -182,13 +186,9 @@ def test_to_name_velocity_changes_no_position(effects):
 
 
 def test_behind_an_encoder_a_delay_keeps_whole_counts():
-    counts = [
-        one.joints[1] * 4096 / (2.0 * pi)
-        for one in run(
-            'encoder: {joints: {rocker_joint: {counts: 4096}}}, delay: {seconds: 0.0123}'
-        )
-        if one is not None
-    ]
+    encoder = 'encoder: {joints: {rocker_joint: {counts: 4096}}}'
+    found = run(f'{encoder}, delay: {{seconds: 0.0123}}')
+    counts = [one.joints[1] * 4096 / (2.0 * pi) for one in found if one is not None]
     assert counts
     assert all(abs(count - round(count)) < 1e-9 for count in counts)
 
