@@ -157,12 +157,12 @@ class Line:
         self.drive: Drive = drive_module.build(drive_parameters, self.context)
         self._read = drive_module.reader(self.context) if self.topic else None
 
-        def built(function: str) -> list[Any]:
-            return [
-                getattr(module, function)(parameters[name], self.context)
+        def built(function: str) -> dict[str, Any]:
+            return {
+                name: getattr(module, function)(parameters[name], self.context)
                 for name, module in modules.items()
                 if hasattr(module, function)
-            ]
+            }
 
         mechanism: list[Any] = []
         faulty: list[Sensor] = []
@@ -175,7 +175,10 @@ class Line:
                 raise DefinitionError(
                     'faults', f'not_a_number spoils messages, and {drive} has none', 'leave it out'
                 )
-        sensors: list[Any] = built('sensor')
+        by_effect: dict[str, Any] = built('sensor')
+        if {'encoder', 'rate_limit'} <= set(by_effect):
+            by_effect['rate_limit'].read_by(by_effect['encoder'])
+        sensors = list(by_effect.values())
         if 'delay' in modules:
             *before, delay = sensors
             sensors = [Delayed(before, delay)]
@@ -183,9 +186,9 @@ class Line:
         line = in_line([*sensors, *faulty], self.closure.turning, scene.wrapped, with_rates)
         sense, gap = sensing(line), gap_seen(line)
         self._seeing_gaps: list[Any] = [sensor for sensor in line if hasattr(sensor, 'gap')]
-        stages = built('stage')
-        drive_stages = built('drive_stage')
-        (begin,) = built('begin') or [at_rest]
+        stages = list(built('stage').values())
+        drive_stages = list(built('drive_stage').values())
+        begin = built('begin').get('velocity', at_rest)
         state, close = self.drive.state, self.closure.position
         self.look: Callable[[int], Look]
         """Returns what the linkage comes to at a time, in [ns]."""

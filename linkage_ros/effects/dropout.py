@@ -40,6 +40,7 @@ arrived, with the stamp of the tick, and nothing before the first.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import Context as Rounding
 from random import Random
 
 from linkage_ros.drives.drive import Context
@@ -93,17 +94,31 @@ def _chances(loss: float, burst: float) -> tuple[float, float]:
             f'{burst:g} is less than a sample',
             'write 1 or more [samples], or 0 for losses that are independent',
         )
-    if loss > burst * (1.0 - loss):
+    if _too_short(burst, loss):
         remedy = 'write 0'
         if loss < 1.0:
-            remedy = f'write {loss / (1.0 - loss):.6g} or more [samples], or a lower probability'
+            remedy = f'write {_least_burst(loss)} or more [samples], or a lower probability'
         raise DefinitionError(
             'effects.dropout.burst',
             f'with a mean of {burst:g} no {loss:g} of all samples can be lost, since between two '
             'bursts one arrives',
             remedy,
         )
-    return loss / (burst * (1.0 - loss)), 1.0 - 1.0 / burst
+    return min(loss / (burst * (1.0 - loss)), 1.0), 1.0 - 1.0 / burst
+
+
+def _too_short(burst: float, loss: float) -> bool:
+    """Return whether so much cannot be lost in bursts so short, by more than their rounding."""
+    return loss > burst * (1.0 - loss) * (1.0 + 1e-12)
+
+
+def _least_burst(loss: float) -> str:
+    """Return the shortest burst that does for a loss, to six digits: what is advised is taken."""
+    rounding = Rounding(prec=6)
+    least = rounding.create_decimal(repr(loss / (1.0 - loss)))
+    while _too_short(float(least), loss):
+        least = rounding.next_plus(least)
+    return f'{least.normalize():f}'
 
 
 class Dropout:

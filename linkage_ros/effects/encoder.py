@@ -32,13 +32,18 @@ then on it knows k. A mark is passed where it lies between the counts of two tic
 passed to and fro between them it is as if the joint had stayed. On a slide there is one mark, at
 θ₀. Without ``index`` it never learns.
 
+``absolute`` encoders know the angle within one turn: k is counted from −n/2 to n/2, so that y lies
+within half a turn of θ₀; ``multi_turn: true`` counts turns, too, as those do that keep them in a
+battery or in gears. A slide has no turns.
+
 ``rates: differenced`` are what a driver makes of the counts, (k − k_last)·q/Δt, with Δt the time
-since the last tick: 0 at the first tick, and as they were where no time has passed. They are whole
-multiples of q/Δt (R. H. Brown, S. C. Schneider and M. G. Mulligan, Analysis of algorithms for
-velocity estimation from discrete position versus time data, IEEE Transactions on Industrial
-Electronics 39, 1992). The step of y at the index mark is no motion, and not in them. ``exact``
-leaves the rates as they come. Where none come none are made. Accelerations and efforts, and joints
-without an encoder, pass as they come.
+since it read them last: at the last tick, or at the last sample of `rate_limit`. They are 0 when
+it first reads, and as they were where no time has passed. They are whole multiples of q/Δt (R. H.
+Brown, S. C. Schneider and M. G. Mulligan, Analysis of algorithms for velocity estimation from
+discrete position versus time data, IEEE Transactions on Industrial Electronics 39, 1992). Turns
+and the step of y at the index mark are no motion, and not in them. ``exact`` leaves the rates as
+they come. Where none come none are made. Accelerations and efforts, and joints without an encoder,
+pass as they come.
 """
 
 from __future__ import annotations
@@ -66,6 +71,7 @@ class JointEncoder:
         'counts from where it is switched on, until it passes its index mark', False
     )
     index: bool = flag('has an index mark, where count 0 begins', True)
+    multi_turn: bool = flag('an absolute encoder that counts turns, too', False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +82,8 @@ class EncoderParameters:
         'encoder of a joint', 'joint', JointEncoder, required=True
     )
     rates: str = choice(
-        'rates of these joints: differences of their counts over the time of a tick, or exact',
+        'rates of these joints: differences of their counts over the time between two readings of '
+        'the driver, or exact',
         ('differenced', 'exact'),
         'differenced',
     )
@@ -108,6 +115,14 @@ def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
                 'an absolute encoder needs no mark',
                 'leave it out, or write incremental: true',
             )
+        if encoder.multi_turn and (encoder.incremental or not turns):
+            raise DefinitionError(
+                f'effects.encoder.joints.{joint}.multi_turn',
+                'an incremental encoder counts on and on'
+                if encoder.incremental
+                else f'{joint} is a slide and has no turns',
+                'leave it out',
+            )
         counters.append((place, Counter(encoder, turns)))
     return Encoder(tuple(counters), parameters.rates == 'differenced')
 
@@ -125,7 +140,9 @@ class Counter:
 
     """
 
-    __slots__ = ('_begin', '_counts', '_encoder', '_last', '_span', '_turns', 'rate')
+    __slots__ = (
+        '_begin', '_counts', '_encoder', '_in_a_turn', '_last', '_read', '_span', '_turns', 'rate',
+    )  # fmt: skip
 
     rate: float
     """What a driver makes of the counts, in [rad/s] or [m/s]."""
@@ -133,27 +150,36 @@ class Counter:
     def __init__(self, encoder: JointEncoder, turns: bool) -> None:
         self._encoder = encoder
         self._turns = turns
+        self._in_a_turn = turns and not (encoder.incremental or encoder.multi_turn)
         # The counts and what they span: (k*tau)/n is closer than k times a rounded resolution.
         self._counts, self._span = encoder.counts, tau if turns else 1.0
         self._last: int | None = None
         self._begin: int | None = None
+        self._read: int | None = None
         self.rate = 0.0
 
-    def read(self, value: float, elapsed: int) -> float:
-        """Return what is read of a value, in [rad] or [m], so many [ns] after the last."""
+    def count(self, value: float) -> float:
+        """Return what the encoder says of a value, in [rad] or [m]."""
         encoder, counts, span, last = self._encoder, self._counts, self._span, self._last
         count = floor((value - encoder.offset) * counts / span)
         if last is None:
             self._begin = count if encoder.incremental else None
-        else:
-            if elapsed > 0:
-                self.rate = (count - last) * span / (counts * elapsed * 1e-9)
-            if self._begin is not None and encoder.index and self._passes(last, count):
-                self._begin = None
+        elif self._begin is not None and encoder.index and self._passes(last, count):
+            self._begin = None
         self._last = count
         if self._begin is not None:
             return (count - self._begin) * span / counts
+        if self._in_a_turn:
+            count = (count + counts // 2) % counts - counts // 2
         return encoder.offset + count * span / counts
+
+    def read(self, elapsed: int) -> float:
+        """Return the rate that a driver makes of the counts, so many [ns] after it read last."""
+        if self._read is not None and self._last is not None and elapsed > 0:
+            moved = self._last - self._read
+            self.rate = moved * self._span / (self._counts * elapsed * 1e-9)
+        self._read = self._last
+        return self.rate
 
     def _passes(self, last: int, count: int) -> bool:
         """Whether an index mark lies between two counts."""
@@ -173,26 +199,41 @@ class Encoder:
     differenced
         Whether the rates are made of the counts.
 
+    Attributes
+    ----------
+    read_at_ticks
+        Whether the driver reads the counts at every tick; else at those at which somebody calls
+        `differenced`.
+
     """
 
-    __slots__ = ('_counters', '_differenced', '_last')
+    __slots__ = ('_counters', '_differenced', '_last', 'read_at_ticks')
 
     def __init__(self, counters: tuple[tuple[int, Counter], ...], differenced: bool) -> None:
         self._counters = counters
         self._differenced = differenced
         self._last = 0
+        self.read_at_ticks = True
 
     def __call__(self, now: int, reading: Reading) -> Reading:
         """Return what is read."""
         stamp, joints, rates, accelerations, efforts = reading
-        elapsed = now - self._last
-        self._last = now
         values = list(joints)
         for place, counter in self._counters:
-            values[place] = counter.read(values[place], elapsed)
-        if rates and self._differenced:
-            speeds = list(rates)
-            for place, counter in self._counters:
-                speeds[place] = counter.rate
-            rates = tuple(speeds)
-        return new(Reading, (stamp, tuple(values), rates, accelerations, efforts))
+            values[place] = counter.count(values[place])
+        found = new(Reading, (stamp, tuple(values), rates, accelerations, efforts))
+        return self.differenced(now, found) if self.read_at_ticks else found
+
+    def differenced(self, now: int, reading: Reading) -> Reading:
+        """Return a reading with the rates that the driver makes of it, at a time in [ns]."""
+        if not self._differenced:
+            return reading
+        elapsed = now - self._last
+        self._last = now
+        stamp, joints, rates, accelerations, efforts = reading
+        speeds = list(rates)
+        for place, counter in self._counters:
+            rate = counter.read(elapsed)
+            if rates:
+                speeds[place] = rate
+        return new(Reading, (stamp, joints, tuple(speeds), accelerations, efforts))

@@ -25,6 +25,9 @@ sample is what is read at the first tick at or after t_k: it is not interpolated
 the counts of an encoder stay whole. It is held until the next one (a zero-order hold; K. J. Åström
 and B. Wittenmark, Computer-Controlled Systems, 3rd ed., 1997).
 
+With an `encoder` before it, the driver reads the counts with each sample: differenced rates are
+over the time between two samples.
+
 ``hold: repeat`` publishes at every tick what is held, rates, accelerations and efforts too, with
 the stamp of the tick, as a driver does that polls its sensor. ``silent`` publishes a sample once.
 """
@@ -32,10 +35,14 @@ the stamp of the tick, as a driver does that polls its sensor. ``silent`` publis
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading, restamped, Sensor
 from linkage_ros.parameters import choice, number
+
+if TYPE_CHECKING:
+    from linkage_ros.effects.encoder import Encoder
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +76,7 @@ class RateLimit:
 
     """
 
-    __slots__ = ('_begin', '_due', '_held', '_per', '_repeat', '_unit')
+    __slots__ = ('_begin', '_due', '_encoder', '_held', '_per', '_repeat', '_unit')
 
     def __init__(self, use: RateLimitParameters) -> None:
         # f = numerator/denominator, and the k-th sample is due after ⌊(k·per + unit)/(2·unit)⌋ ns.
@@ -78,6 +85,12 @@ class RateLimit:
         self._repeat = use.hold == 'repeat'
         self._held: Reading | None = None
         self._begin = self._due = 0
+        self._encoder: Encoder | None = None
+
+    def read_by(self, encoder: Encoder) -> None:
+        """Let an encoder before it be read with each sample, and not at every tick."""
+        self._encoder = encoder
+        encoder.read_at_ticks = False
 
     def __call__(self, now: int, reading: Reading) -> Reading | None:
         """Return what is held; None where that is not repeated."""
@@ -92,5 +105,7 @@ class RateLimit:
         elapsed = now - self._begin
         following = ((2 * elapsed + 1) * unit - 1) // per + 1
         self._due = self._begin + (following * per + unit) // (2 * unit)
+        if self._encoder is not None:
+            reading = self._encoder.differenced(now, reading)
         self._held = reading
         return reading

@@ -189,6 +189,15 @@ def test_what_cannot_be_is_refused(probability, burst, remedy):
     assert raised.value.remedy.startswith(remedy)
 
 
+@pytest.mark.parametrize('hundredths', range(51, 100))
+def test_the_burst_that_is_advised_is_taken(hundredths):
+    with pytest.raises(DefinitionError) as raised:
+        line(hundredths / 100, 1.0)
+    advised = float(raised.value.remedy.split()[1])
+    assert advised == pytest.approx(hundredths / (100 - hundredths), rel=1e-5)
+    line(hundredths / 100, advised)
+
+
 @pytest.mark.parametrize(
     ('text', 'message'),
     [

@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import pairwise
 from math import floor, isclose, pi, tau, ulp
 
 from hypothesis import assume, given
@@ -34,7 +35,8 @@ EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')
 
 
 def angle_encoder(rates='differenced', **parameters):
-    """Return the encoder of rocker_joint, the second of two angles."""
+    """Return the encoder of rocker_joint, the second of two angles; turns are counted."""
+    parameters.setdefault('multi_turn', not parameters.get('incremental', False))
     joints = {'rocker_joint': JointEncoder(**parameters)}
     return encoder.sensor(EncoderParameters(joints, rates), context(ANGLES))
 
@@ -235,7 +237,7 @@ def test_what_has_no_encoder_passes_as_it_comes():
 
 def test_in_a_scene_whose_angle_runs_on_over_turns():
     # The coupler falls behind by a turn in each of the three turns of the crank.
-    text = 'encoder: {joints: {coupler_joint: {counts: 64}}}'
+    text = 'encoder: {joints: {coupler_joint: {counts: 64, multi_turn: true}}}'
     ideal, found = published('', 200, rate=100.0), published(text, 200, rate=100.0)
     assert found[-1].joints[0] < -2 * tau
     for i, f in zip(ideal, found, strict=True):
@@ -243,6 +245,59 @@ def test_in_a_scene_whose_angle_runs_on_over_turns():
         assert f.joints[1] == i.joints[1]
         assert f.rates[1] == i.rates[1]
     assert found == published(text, 200, rate=100.0)
+
+
+@pytest.mark.parametrize(
+    ('offset', 'counts', 'expected'),
+    [
+        # Eight counts lie from −180° to 135° about the offset, five from −144° to 144°.
+        (0.0, 8, range(-4, 4)),
+        (0.7, 8, range(-4, 4)),
+        (0.0, 5, range(-2, 3)),
+        (0.0, 1, [0]),
+    ],
+)
+def test_an_absolute_encoder_reads_within_half_a_turn_of_its_offset(offset, counts, expected):
+    sensor = angle_encoder(counts=counts, offset=offset, multi_turn=False)
+    angles = [offset + (k + 0.5) * tau / counts for k in range(-5 * counts, 5 * counts)]
+    found = read(sensor, angles)
+    assert {round((y - offset) * counts / tau) for y in found} == set(expected)
+    for y, angle in zip(found, angles, strict=True):
+        count = (angle - y) * counts / tau - 0.5
+        assert count == pytest.approx(round(count / counts) * counts, abs=1e-9)
+
+
+def test_a_whole_turn_is_no_motion_in_the_rates_of_an_absolute_encoder():
+    sensor = angle_encoder(counts=100, multi_turn=False)
+    rates = []
+    for ms in range(300):
+        now = BEGIN + ms * MS
+        found = sensor(now, reading(now, 0.0, (ms + 0.5) * tau / 100, rates=(0.0, 9.0)))
+        rates.append(found.rates[1])
+    assert rates == pytest.approx([0.0, *[tau / 100 / 1e-3] * 299])
+
+
+def test_behind_a_slower_driver_rates_are_over_the_time_between_its_samples():
+    # 1024 counts a turn at 1 kHz make steps of 6.1 rad/s; read each 20 ms of 0.31 rad/s.
+    effects = (
+        'encoder: {joints: {rocker_joint: {counts: 1024}}}, rate_limit: {rate: 50, hold: silent}'
+    )
+    found = [one for one in published(effects, 200, rate=3.0) if one is not None]
+    assert len(found) == 10
+    for before, after in pairwise(found):
+        moved = after.joints[1] - before.joints[1]
+        assert after.rates[1] == pytest.approx(moved / 0.02, abs=1e-12)
+    # Repeated readings keep the rate of their sample.
+    held = published(effects.replace('silent', 'repeat'), 200, rate=3.0)
+    assert [one.rates[1] for one in held[::20]] == [one.rates[1] for one in found]
+    assert all(one.rates == held[i // 20 * 20].rates for i, one in enumerate(held))
+
+
+def test_turns_are_counted_by_an_absolute_encoder_of_an_angle_only():
+    with pytest.raises(DefinitionError, match=r'multi_turn: an incremental encoder counts on'):
+        angle_encoder(counts=8, incremental=True, multi_turn=True)
+    with pytest.raises(DefinitionError, match=r'multi_turn: rod_slide is a slide'):
+        slide_encoder(counts=8, multi_turn=True)
 
 
 def test_an_absolute_encoder_is_not_told_of_a_mark():
