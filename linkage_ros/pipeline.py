@@ -107,6 +107,7 @@ class Pipeline:
             raise scene.members[0].content.error(
                 'drive', f'{" and ".join(topics)} are listened to', 'drive all by one of them'
             )
+        _refuse_stamps(scene)
         self.topic = topics[0] if topics else ''
         """The topic that the drives listen to; '' for none."""
         # Of the drives only that from a topic remembers nothing of the ticks.
@@ -197,6 +198,18 @@ class Pipeline:
     def max_age(self) -> int:
         """Age of the newest sample beyond which something is amiss, in [ns]; 0 for never."""
         return max(line.drive.max_age for line in self.lines)
+
+
+def _refuse_stamps(scene: Scene) -> None:
+    """Refuse stamps of measurement that one message of several linkages could not bear."""
+    delays = [member.effects.get('delay') for member in scene.members]
+    for member, delay in zip(scene.members, delays, strict=True):
+        if delay is not None and delay.stamp == 'measured' and set(delays) != {delay}:
+            raise member.content.error(
+                'effects.delay.stamp',
+                'measured is a stamp of its own, and all linkages share one message',
+                'give all linkages the same delay, or write arrival',
+            )
 
 
 def _ticking_one(line: Line) -> Callable[[int], Tick]:

@@ -99,7 +99,7 @@ def recorded_scene(bag: Bag) -> Scene:
         raise BagError(
             bag.path, f'carries no {LINKAGE_FILE}', 'name a bag that linkage_ros has recorded'
         )
-    return parse_scene(run.scene, str(bag.path), files, run.scene_folder, run.solvers)
+    return parse_scene(run.scene, str(bag.path), files, run.scene_folder, run.solvers, run.seed)
 
 
 def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:

@@ -237,3 +237,29 @@ def test_what_is_wrong_is_said_in_a_line(load, text, expected):
         load(text)
     assert expected in str(caught.value)
     assert '\n' not in str(caught.value)
+
+
+MEASURED = 'delay: {seconds: 0.004, stamp: measured}'
+
+
+@pytest.mark.parametrize(
+    ('left', 'right', 'fits'),
+    [
+        (MEASURED, MEASURED, True),
+        (MEASURED, '', False),
+        (MEASURED, 'delay: {seconds: 0.005, stamp: measured}', False),
+        (MEASURED, 'delay: {seconds: 0.004}', False),
+        ('delay: {seconds: 0.004}', '', True),
+    ],
+)
+def test_the_stamp_of_a_measurement_is_of_all_linkages_or_refused(load, left, right, fits):
+    scene = load(
+        'linkages:\n'
+        f'  - {{name: left, linkage: four_bar.yaml, effects: {{{left}}}}}\n'
+        f'  - {{name: right, linkage: half_open.yaml, effects: {{{right}}}}}\n'
+    )
+    if fits:
+        Pipeline(scene)
+        return
+    with pytest.raises(FileError, match='effects.delay.stamp: measured is a stamp of its own'):
+        Pipeline(scene)

@@ -63,15 +63,14 @@ class Injection:
         """How many times each has begun."""
         self._begun: int | None = None
         self._asked: list[Change] = []
-        windows = [
-            (round(at * 1e9), name, True) for name, fault in faults.items() for at in fault.at
-        ] + [
-            (round((at + fault.seconds) * 1e9), name, False)
+        changes = [
+            (time, name, on)
             for name, fault in faults.items()
-            for at in fault.at
+            for begin, end in _windows(fault)
+            for time, on in ((begin, True), (end, False))
         ]
         # An end before a beginning at the same instant: two windows that touch are two.
-        self._timeline = sorted(windows, key=lambda entry: (entry[0], entry[2]))
+        self._timeline = sorted(changes, key=lambda entry: (entry[0], entry[2]))
         self._next = 0
         self._clocks = [
             import_module(FAULTS[fault.kind]).clock(fault.parameters, self.switches[name])
@@ -121,3 +120,14 @@ class Injection:
                 build = getattr(module, function)
                 built.append(build(fault.parameters, self.switches[name], *arguments))
         return [each for each in built if each is not None]
+
+
+def _windows(fault: Fault) -> list[tuple[int, int]]:
+    """Return when a fault begins and ends by itself, in [ns]; windows that overlap are one."""
+    windows: list[tuple[int, int]] = []
+    for at in sorted(fault.at):
+        begin, end = round(at * 1e9), round((at + fault.seconds) * 1e9)
+        if windows and begin < windows[-1][1]:
+            begin, end = windows[-1][0], max(end, windows.pop()[1])
+        windows.append((begin, end))
+    return windows

@@ -27,7 +27,14 @@ from typing import cast
 
 from linkage_ros import __version__
 from linkage_ros.bag.reading.reader import RUN_FILE
-from linkage_ros.bag.reading.run_events import BEGUN, CHOSEN, MID_RUN, OWN_EFFECTS, WITH_THE_RUN
+from linkage_ros.bag.reading.run_events import (
+    BEGUN,
+    CHOSEN,
+    MID_RUN,
+    OWN_EFFECTS,
+    SEED,
+    WITH_THE_RUN,
+)
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.packing import compression_type
 from linkage_ros.bag.writing.recorder import Recorder, RecordingSummary
@@ -207,6 +214,7 @@ def _attachments(
         **named,
         'extra_topics': [topic.name for key, topic in topics if key == EXTRA],
         BEGUN: begun,
+        SEED: scene.seed,
         # A replay must not choose again.
         **({CHOSEN: chosen} if (chosen := _chosen(lines)) else {}),
         **({OWN_EFFECTS: own} if (own := own_effects_here(scene)) else {}),

@@ -23,6 +23,7 @@ from importlib import import_module
 from os.path import isfile
 from pathlib import Path
 from typing import Any, Literal
+from zlib import crc32
 
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS, in_order, module_of
@@ -135,6 +136,7 @@ def parse_scene(
     files: Mapping[str, bytes],
     folder: str = '',
     solvers: Mapping[str, Any] | None = None,
+    seed: int | None = None,
 ) -> Scene:
     """
     Read a scene out of the files that a bag carries.
@@ -150,6 +152,8 @@ def parse_scene(
     solvers
         By the name of each linkage whose scene asks for an accuracy what was chosen: a solver, as
         the scene could have said it.
+    seed
+        The seed where the scene names none; None for one that follows from its name.
 
     Raises
     ------
@@ -167,7 +171,7 @@ def parse_scene(
             raise within.error('linkage', 'is not among the files', 'name another bag')
         return parse_yaml(files[part], f'{where}: {part}'), files[part]
 
-    scene = _scene(name, content, open_linkage, files[SCENE_FILE], folder)
+    scene = _scene(name, content, open_linkage, files[SCENE_FILE], folder, seed)
     if not solvers:
         return scene
     return replace(scene, members=tuple(_as_chosen(one, solvers) for one in scene.members))
@@ -181,8 +185,18 @@ def _as_chosen(member: Member, solvers: Mapping[str, Any]) -> Member:
     return replace(member, solver=read_solver(where, {}), accuracy=None)
 
 
+def seed_of(name: str) -> int:
+    """Return the seed of a scene that names none: two scenes do not share their noise."""
+    return crc32(name.encode())
+
+
 def _scene(
-    name: str, content: Section, open_linkage: Open, scene_bytes: bytes, folder: str
+    name: str,
+    content: Section,
+    open_linkage: Open,
+    scene_bytes: bytes,
+    folder: str,
+    seed: int | None = None,
 ) -> Scene:
     files = {SCENE_FILE: scene_bytes}
     members: list[Member] = []
@@ -205,7 +219,7 @@ def _scene(
         members=tuple(members),
         rate=_rate(content),
         wrapped=content.choice('angles', ('continuous', 'wrapped'), 'continuous') == 'wrapped',
-        seed=content.whole('seed', 0, least=0, most=2**53),
+        seed=content.whole('seed', seed_of(name) if seed is None else seed, least=0, most=2**53),
         faults=read_faults(content, members),
         record=_record(content.section('record')) if 'record' in content else None,
         files=files,

@@ -80,11 +80,11 @@ def scene_schema() -> Schema:
                 'default': 'continuous',
             },
             'seed': {
-                'description': 'From which everything random comes.',
+                'description': 'From which everything random comes; if not said, a number that '
+                'follows from the name of the scene.',
                 'type': 'integer',
                 'minimum': 0,
                 'maximum': 2**53,
-                'default': 0,
             },
             **own,
             'faults': {

@@ -25,6 +25,8 @@ from __future__ import annotations
 from math import isnan
 
 from linkage_ros.errors import FileError
+from linkage_ros.faults.fault import Fault
+from linkage_ros.faults.freeze import FreezeParameters
 from linkage_ros.faults.injection import Change, Injection
 from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.kinematics.status import Status
@@ -153,6 +155,28 @@ def test_windows_that_touch_are_two():
     both = [Change('mine', False), Change('mine', True)]
     assert injection.advance(BEGIN + 20 * MS) == both
     assert injection.injected == {'mine': 2}
+
+
+@pytest.mark.parametrize(
+    ('at', 'seconds', 'on', 'times'),
+    [
+        # Windows of 5 ms from 2 and from 4 ms: the later end holds.
+        ([0.002, 0.004], 0.005, range(2, 9), 1),
+        # Three in a chain, not written in order.
+        ([0.008, 0.002, 0.005], 0.004, range(2, 12), 1),
+        # One that begins where the other ends is another one.
+        ([0.002, 0.004], 0.002, range(2, 6), 2),
+    ],
+)
+def test_of_windows_that_overlap_the_later_end_holds(at, seconds, on, times):
+    injection = Injection({'hang': Fault('freeze', FreezeParameters(), tuple(at), seconds)})
+    seen = []
+    for ms in range(15):
+        injection.advance(BEGIN + ms * MS)
+        if injection.switches['hang'].on:
+            seen.append(ms)
+    assert seen == list(on)
+    assert injection.injected['hang'] == times
 
 
 def test_somebody_asks():

@@ -59,6 +59,17 @@ def assert_it_closes(closure):
         assert closure.position(1.5, 1.5).joints
 
 
+def test_a_seed_that_is_not_said_follows_from_the_name_of_the_scene():
+    files = {'scene.yaml': SCENE, 'linkage.yaml': FOUR_BAR}
+    one, other = (parse_scene(name, 'here', files).seed for name in ('press', 'leg'))
+    assert one != other
+    assert one == parse_scene('press', 'there', files).seed
+    # A bag says what it was; older ones, which do not, had 0.
+    assert parse_scene('press', 'bag', files, seed=0).seed == 0
+    said = {**files, 'scene.yaml': SCENE + b'\nseed: 7\n'}
+    assert parse_scene('press', 'bag', said, seed=3).seed == 7
+
+
 def test_a_scene_that_says_nothing(build):
     scene, _ = build()
     assert scene.rate == 1000.0
@@ -69,7 +80,7 @@ def test_a_scene_that_says_nothing(build):
         TopicParameters(carry_forward=True, max_age=0.2, max_lead=0.1),
     )
     assert member.effects == {}
-    assert (member.name, member.loads, scene.seed, scene.faults) == ('', None, 0, {})
+    assert (member.name, member.loads, scene.faults) == ('', None, {})
     assert scene.record is None
     assert scene.files == {'scene.yaml': SCENE, 'linkage.yaml': FOUR_BAR}
 

@@ -33,6 +33,9 @@ CHOSEN = 'solver'
 OWN_EFFECTS = 'effects'
 """The key under which it says which modules the effects are that are not of this package."""
 
+SEED = 'seed'
+"""The key under which it says from what everything random came."""
+
 VERSIONS = ('linkage_ros', 'python', 'machine')
 
 
@@ -100,6 +103,8 @@ class RunAccount(NamedTuple):
         What was chosen to close the loops, as a scene could say it, by the name of the linkage.
     own_effects
         Which modules the effects are that are not of this package, by their names.
+    seed
+        From which everything random came. Runs that do not say it had 0, unless their scene did.
 
     """
 
@@ -115,6 +120,7 @@ class RunAccount(NamedTuple):
     versions: Mapping[str, str] = {}
     solvers: Mapping[str, Any] = {}
     own_effects: Mapping[str, str] = {}
+    seed: int = 0
 
 
 def run_account(bag: Bag) -> RunAccount:
@@ -143,7 +149,8 @@ def run_account(bag: Bag) -> RunAccount:
     solvers = said.get(CHOSEN, {})
     topics = [value for key, value in texts.items() if key.endswith('_topic')]
     named = _are_names(topics) and _are_names(extras)
-    if missing or wrong or not named or not isinstance(solvers, dict):
+    seed = said.get(SEED, 0)
+    if missing or wrong or not named or not isinstance(solvers, dict) or type(seed) is not int:
         raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag')
     # It is shown, and nothing else; a file's name may be anything.
     if not texts['scene'].isprintable():
@@ -155,6 +162,7 @@ def run_account(bag: Bag) -> RunAccount:
         versions={key: texts[key] for key in VERSIONS if key in texts},
         solvers=solvers,
         own_effects=_own_effects(said),
+        seed=seed,
     )
 
 
