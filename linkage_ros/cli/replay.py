@@ -35,7 +35,7 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.reading.reader import Bag, RUN_FILE
 from linkage_ros.bag.reading.run_events import run_account
 from linkage_ros.cli.bag_reading import BagReading, opened
 from linkage_ros.cli.proof import DIFFERENT, IDENTICAL, prove, turning_joints
@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         code = {IDENTICAL: 0, DIFFERENT: EXIT_DIFFERENT}.get(account['verdict'], EXIT_INCOMPLETE)
     else:
         scene = load_scene(arguments.scene)
-        if 'seed' not in scene.members[0].content:
+        if RUN_FILE in bag.attachments and 'seed' not in scene.members[0].content:
             # What differs is the scene, and not the noise.
             scene = replace(scene, seed=run_account(bag).seed)
         account = replayed_with(bag, reading, scene, arguments.crank_topic, arguments.output)

@@ -93,6 +93,7 @@ class Recorded:
         self._extras = [f'/linkage/{extra.topic[2:]}' for extra in self.pipeline.extras]
         run: dict[str, Any] = {
             'scene': loaded.name,
+            'seed': loaded.seed,
             'joint_states_topic': '/joint_states',
             'withheld_topic': '/linkage/withheld',
             'extra_topics': self._extras,

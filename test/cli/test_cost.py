@@ -129,7 +129,7 @@ def test_a_variant_consists_of_what_it_is_asked_for(tmp_path):
 
     assert stages() == ()
     assert stages('bias') == ('bias',)
-    assert stages('delay', 'bias') == ('bias', 'delay')
+    assert stages('delay', 'bias') == ('velocity', 'bias', 'delay')
     assert stages('velocity') == ('velocity',)
     assert stages('effort') == ('velocity', 'acceleration', 'effort')
     assert variants.build(frozenset({'faults'})).pipeline.injection is not None

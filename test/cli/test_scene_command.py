@@ -74,7 +74,7 @@ def test_stages_come_in_their_order_and_say_who_brings_them_in(tmp_path, capsys)
         'constant_rate', 'backlash', 'velocity', 'acceleration', 'effort', 'pin_forces', 'delay',
     ]  # fmt: skip
     by_name = {line[1]: ' '.join(line) for line in lines if line and line[0].isdigit()}
-    assert by_name['velocity'].endswith('brought in by effort, pin_forces')
+    assert by_name['velocity'].endswith('brought in by effort, pin_forces, delay')
     assert 'between motor and crank' in by_name['backlash']
     assert by_name['delay'].endswith('seconds 0.002')
     assert by_name['constant_rate'].endswith('rate 6.28')
