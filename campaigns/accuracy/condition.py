@@ -25,9 +25,10 @@ from __future__ import annotations
 from math import pi, remainder
 from typing import Any
 
-from campaigns.accuracy.mechanism import Key, Turn
+from campaigns.accuracy.mechanism import GROUND, Key, Turn
+from campaigns.accuracy.motion import Handed, Motion
 from campaigns.accuracy.reference import Outcome, Reference, series, Truth
-from campaigns.accuracy.tangent import Array, Tangent
+from campaigns.accuracy.tangent import Array, handed_on, Tangent, turn_sizes
 from flint import arb, ctx
 import numpy as np
 
@@ -68,18 +69,18 @@ def condition_numbers(
         reference.constants(),
         reference.numbers,
         values,
+        {name: np.array([series(m.held[name]) for m in motions]).T for name in motions[0].held},
         np.array([remainder(angle, 2 * pi) for angle in phi]),
         np.array(alpha),
     )
     kappa = np.empty((len(truths), len(mechanism.joints), 3))
     for j, joint in enumerate(mechanism.joints.values()):
         if isinstance(joint, Turn):
-            change = tangent.turn[joint.child] - tangent.turn[joint.parent]
+            change = tangent.shown[joint.child] - tangent.shown[joint.parent]
         else:
             change = tangent.slide[joint]
         kappa[:, j] = np.abs(change).sum(axis=2).T
-    sizes = np.array([[series(y) for y in truth.joints] for truth in truths]).real
-    return (kappa + _at_least_half_a_turn(reference, sizes)) * FACTORIALS
+    return (kappa + _published(reference, motions)) * FACTORIALS
 
 
 def exact_condition_numbers(
@@ -131,8 +132,11 @@ def exact_condition_numbers(
     still = _coefficients(reference.solve(phi, 0.0, precision))
     for j, y in enumerate(still):
         kappa[j, 2] += 2 * abs(float(y[2]))
-    sizes = np.array([[float(c) for c in y] for y in exact])
-    kappa += _at_least_half_a_turn(reference, sizes[None])[0]
+    for handed in handed_on(reference.mechanism):
+        amount = step * _size(base.motion, handed)
+        changed = Reference(reference.mechanism, numbers, (handed, amount))
+        add(changed.solve(phi, alpha, precision))
+    kappa += _published(reference, [base.motion])[0]
     if ties is reference.mechanism.ties:
         # What hangs together may not move at all: κ would be 0, but terms as great as the
         # crank's own rate and acceleration are rounded to come to that.
@@ -144,10 +148,25 @@ def _coefficients(truth: Truth) -> list[list[Any]]:
     return [[y[0], y[1], y[2]] for y in truth.joints]
 
 
-def _at_least_half_a_turn(reference: Reference, sizes: Array) -> Array:
-    sizes = np.abs(sizes)
+def _published(reference: Reference, motions: list[Motion]) -> Array:
+    """Return the sizes of what published joints are differences of, [case, joint, power]."""
+    sizes = np.zeros((len(motions), len(reference.mechanism.joints), 3))
     for j, joint in enumerate(reference.mechanism.joints.values()):
         if isinstance(joint, Turn):
-            # Within (-π, π] none is greater.
+            for link in {joint.child, joint.parent} - {GROUND}:
+                sizes[:, j] += turn_sizes(np.array([series(m.shown[link]) for m in motions]).T).T
             sizes[:, j, 0] = pi
+        else:
+            sizes[:, j] = np.abs([series(m.slide[joint]) for m in motions])
     return sizes
+
+
+def _size(motion: Motion, handed: Handed) -> Any:
+    """Return the size of what a dyad hands on."""
+    owner, what, power = handed
+    if what == 'turn':
+        return arb(turn_sizes(np.array([series(motion.shown[owner])]).T)[power, 0])
+    if what == 'slide':
+        return arb(series(motion.slide[owner])[power].real)
+    place = series(motion.held[owner])[power]
+    return arb(place.real if what == 'x' else place.imag)

@@ -28,10 +28,11 @@ Arrays are [power of time, case, number].
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import pi
 from typing import Any
 
 from campaigns.accuracy.mechanism import CRANK, GROUND, Key, Mechanism, Spot
-from campaigns.accuracy.motion import Constants, ORDER
+from campaigns.accuracy.motion import Constants, Handed, ORDER
 import numpy as np
 import numpy.typing as npt
 
@@ -44,6 +45,28 @@ def times(series: Array, change: Array) -> Array:
     product[1:] += series[1] * change[:-1]
     product[2] += series[2] * change[0]
     return product
+
+
+def handed_on(mechanism: Mechanism) -> tuple[Handed, ...]:
+    """Return what dyads hand on to the ones behind them: angles, slides, and pins."""
+    if len(mechanism.dyads) < 2:
+        return ()
+    turned = [link for dyad in mechanism.dyads for link in dyad.turned]
+    links = [link for link in mechanism.links if link not in {GROUND, CRANK}]
+    names = [
+        *((link, 'turn') for link in turned),
+        *((link, part) for link in links for part in 'xy'),
+        *((name, 'slide') for name, slide in mechanism.sliders.items() if slide.block),
+    ]
+    return tuple(Handed(*name, power) for name in names for power in range(ORDER))
+
+
+def turn_sizes(unit: Array) -> Array:
+    """Return the sizes of an angle, its rate and half its acceleration, of the series of e^iθ."""
+    back = unit[0].conj()
+    # A published or handed angle counts as π at least; within (-π, π] none is greater.
+    sizes = [np.full(len(back), pi), (unit[1] * back).imag, (unit[2] * back).imag]
+    return np.abs(np.array(sizes))
 
 
 class Tangent:
@@ -60,6 +83,8 @@ class Tangent:
         The same as doubles.
     values
         Series of links, slides and inverse determinants, [power of time, case].
+    held
+        Series of the pins that links are held by.
     phi, alpha
         Input angles and accelerations of the cases.
 
@@ -71,6 +96,7 @@ class Tangent:
         constants: Constants,
         numbers: Mapping[Key, float],
         values: Mapping[str | int, Array],
+        held: Mapping[str, Array],
         phi: Array,
         alpha: Array,
     ) -> None:
@@ -80,7 +106,11 @@ class Tangent:
         self._cases = len(phi)
         columns = [key for key, value in numbers.items() if value]
         self._column = {key: i for i, key in enumerate(columns)}
-        self._count = len(columns) + 3
+        self._inputs = len(columns)
+        self.handed = handed_on(mechanism)
+        self._handed = {key: self._inputs + 3 + i for i, key in enumerate(self.handed)}
+        self._count = len(columns) + 3 + len(self.handed)
+        self._held = held
         self.unit = {name: values[name][..., None] for name in ('ground', *self._links())}
         self.slide_value = {name: values[name][..., None] for name in mechanism.sliders}
         self._inverse = iter(range(len(mechanism.dyads)))
@@ -104,9 +134,10 @@ class Tangent:
                 change = self._change((link, point), x * unit, y * unit)
                 self._vectors[link, point] = change
         self.turn = {GROUND: self._zeros(float), CRANK: self._zeros(float)}
-        self.turn[CRANK][0, :, -3] = phi
-        self.turn[CRANK][1, :, -2] = 1.0
-        self.turn[CRANK][2, :, -1] = 0.5 * alpha
+        self.turn[CRANK][0, :, self._inputs] = phi
+        self.turn[CRANK][1, :, self._inputs + 1] = 1.0
+        self.turn[CRANK][2, :, self._inputs + 2] = 0.5 * alpha
+        self.shown = dict(self.turn)
         self._origin = {GROUND: self._zeros(complex)}
         self.slide: dict[str, Array] = {}
         pivot = next(iter(mechanism.links[CRANK]))
@@ -153,12 +184,29 @@ class Tangent:
 
     def place(self, link: str, turn: Array, point: str, where: Array) -> None:
         """Note the change of a link's angle, and of where one of its points is."""
+        self.shown[link] = turn
+        if (link, 'turn', 0) in self._handed:
+            turn = turn.copy()
+            for power, size in enumerate(turn_sizes(self.unit[link][..., 0])):
+                turn[power, :, self._handed[Handed(link, 'turn', power)]] += size
+        if (link, 'x', 0) in self._handed:
+            where = where.copy()
+            for power, place in enumerate(self._held[link]):
+                where[power, :, self._handed[Handed(link, 'x', power)]] += place.real
+                where[power, :, self._handed[Handed(link, 'y', power)]] += 1j * place.imag
         self.turn[link] = turn
         self._origin[link] = where - self._arm(Spot(link, point))
 
-    def place_block(self, slider: str, pin: str, turn: Array, where: Array) -> None:
-        """Note the change of a block."""
-        self.place(str(self.mechanism.sliders[slider].block), turn, pin, where)
+    def ride(self, slider: str, pin: str, turn: Array, where: Array) -> None:
+        """Note the change of a block that a slide places."""
+        slide = self.mechanism.sliders[slider]
+        if (slider, 'slide', 0) in self._handed:
+            moved = self._zeros(float)
+            for power in range(ORDER):
+                column = self._handed[Handed(slider, 'slide', power)]
+                moved[power, :, column] = self.slide_value[slider][power, :, 0]
+            where = where + times(self.unit[slide.along] * self.direction[slider], moved)
+        self.place(str(slide.block), turn, pin, where)
 
     def line(self, name: str, point: str) -> tuple[Array, Array, Array, Array | None]:
         """Return a line's direction, its change, that of its start, and the block's turn."""

@@ -57,6 +57,10 @@ class RPR:
     def assembly(self) -> tuple[str, Side]:
         return self.slider, 'ahead' if self.side > 0 else 'behind'
 
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return (self.rail,)
+
     def close(self, motion: Motion) -> None:
         start, end = motion.at(self.a), motion.at(self.d)
         diagonal = end - start

@@ -59,6 +59,10 @@ class RRR:
     def assembly(self) -> tuple[str, Side]:
         return self.pin, 'left' if self.side > 0 else 'right'
 
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return self.one, self.two
+
     def close(self, motion: Motion) -> None:
         start = motion.at(self.a)
         diagonal = motion.at(self.d) - start
@@ -71,7 +75,7 @@ class RRR:
         # two × one, which both rates are divided by.
         motion.inverse.append(inverse(height))
         motion.place(self.one, one / b, self.a.point, start)
-        motion.place(self.two, two / c, self.pin, start + one)
+        motion.place(self.two, two / c, self.d.point, motion.at(self.d))
 
     def _triangle(self, motion: Motion, diagonal: Any) -> tuple[Any, ...]:
         b = motion.vector(self.one, self.a.point, self.pin)
