@@ -25,7 +25,7 @@ from __future__ import annotations
 from math import pi, remainder
 from typing import Any
 
-from campaigns.accuracy.mechanism import GROUND, Key, Turn
+from campaigns.accuracy.mechanism import GROUND, Key, Spot, Turn
 from campaigns.accuracy.motion import Handed, Motion
 from campaigns.accuracy.reference import Outcome, Reference, series, Truth
 from campaigns.accuracy.tangent import Array, handed_on, Tangent, turn_sizes
@@ -69,7 +69,11 @@ def condition_numbers(
         reference.constants(),
         reference.numbers,
         values,
-        {name: np.array([series(m.held[name]) for m in motions]).T for name in motions[0].held},
+        {
+            handed.owner: np.array([series(_place(m, handed.owner)) for m in motions]).T
+            for handed in handed_on(mechanism)
+            if handed.what == 'x' and not handed.power
+        },
         np.array([remainder(angle, 2 * pi) for angle in phi]),
         np.array(alpha),
     )
@@ -161,6 +165,10 @@ def _published(reference: Reference, motions: list[Motion]) -> Array:
     return sizes
 
 
+def _place(motion: Motion, owner: str | Spot) -> Any:
+    return motion.at(owner) if isinstance(owner, Spot) else motion.held[owner]
+
+
 def _size(motion: Motion, handed: Handed) -> Any:
     """Return the size of what a dyad hands on."""
     owner, what, power = handed
@@ -168,5 +176,5 @@ def _size(motion: Motion, handed: Handed) -> Any:
         return arb(turn_sizes(np.array([series(motion.shown[owner])]).T)[power, 0])
     if what == 'slide':
         return arb(series(motion.slide[owner])[power].real)
-    place = series(motion.held[owner])[power]
+    place = series(_place(motion, owner))[power]
     return arb(place.real if what == 'x' else place.imag)

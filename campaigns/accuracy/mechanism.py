@@ -76,6 +76,8 @@ class Dyad(Protocol):
     @property
     def turned(self) -> tuple[str, ...]: ...
 
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]: ...
+
     def close(self, motion: Any) -> None: ...
 
     def vary(self, tangent: Any) -> None: ...
@@ -135,6 +137,11 @@ class Mechanism:
             found[name, 'direction', 'x'], found[name, 'direction', 'y'] = slide.direction
             found[name, 'direction', 'angle'] = slide.angle
         return found
+
+    def start(self, slider: str) -> Spot:
+        """Return where the line of a slider starts."""
+        slide = self.sliders[slider]
+        return Spot(slide.along, slide.through)
 
     def size(self) -> float:
         """Return the sum of the distances of each link's points from its first."""

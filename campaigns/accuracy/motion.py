@@ -49,15 +49,16 @@ class Handed(NamedTuple):
     Attributes
     ----------
     owner
-        A link or a slider.
+        A link, a slider, or a point of a link.
     what
-        ``turn``, the link's angle; ``x`` or ``y``, of the pin by which it is held; ``slide``.
+        ``turn``, the link's angle; ``x`` or ``y``, of the pin by which it is held, or of the point
+        itself; ``slide``.
     power
         Of time: 0, 1 or 2, for the position, the rate and half the acceleration.
 
     """
 
-    owner: str
+    owner: str | Spot
     what: str
     power: int
 
@@ -147,15 +148,20 @@ class Motion:
         self.slide: dict[str, Any] = {}
         self.inverse: list[Any] = []
         self.phi = phi
+        self._behind = False
         for dyad in self.mechanism.dyads:
             dyad.close(self)
+            self._behind = True
 
     def at(self, spot: Spot) -> Any:
         """Return where a point of a placed link is."""
         z = self.constants.points[spot]
         if spot.link == GROUND:
             return acb_series([z])
-        return self.origin[spot.link] + self.unit[spot.link] * z
+        place = self.origin[spot.link] + self.unit[spot.link] * z
+        if self._behind and self._changed is not None and self._changed[0].owner == spot:
+            place += self._change()
+        return place
 
     def vector(self, link: str, start: str, end: str) -> Any:
         """Return what leads from one point of a link to another, in its frame."""
@@ -166,13 +172,11 @@ class Motion:
         self.shown[link] = unit
         self.held[link] = where
         if self._changed is not None and self._changed[0].owner == link:
-            (_, what, power), amount = self._changed
-            change = acb_series([0] * power + [amount])
-            if what == 'turn':
+            if self._changed[0].what == 'turn':
                 # To first order, as the differences are that this is for.
-                unit = unit * (1 + change * acb(0, 1))
+                unit = unit * (1 + self._change() * acb(0, 1))
             else:
-                where = where + (change if what == 'x' else change * acb(0, 1))
+                where = where + self._change()
         self.unit[link] = unit
         self.origin[link] = where - unit * self.constants.points[Spot(link, point)]
 
@@ -180,10 +184,14 @@ class Motion:
         """Note where a block is that a slide places."""
         slide = self.mechanism.sliders[slider]
         if self._changed is not None and self._changed[0].owner == slider:
-            (_, _, power), amount = self._changed
             line = self.unit[slide.along] * self.constants.directions[slider]
-            where = where + line * acb_series([0] * power + [amount])
+            where = where + line * self._change()
         self.place(str(slide.block), unit, point, where)
+
+    def _change(self) -> Any:
+        assert self._changed is not None
+        (_, what, power), amount = self._changed
+        return acb_series([0] * power + [acb(0, amount) if what == 'y' else acb(amount)])
 
     def line(self, name: str, point: str) -> tuple[Any, Any, Any]:
         """

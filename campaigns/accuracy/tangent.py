@@ -53,9 +53,11 @@ def handed_on(mechanism: Mechanism) -> tuple[Handed, ...]:
         return ()
     turned = [link for dyad in mechanism.dyads for link in dyad.turned]
     links = [link for link in mechanism.links if link not in {GROUND, CRANK}]
+    spots = {spot for dyad in mechanism.dyads[1:] for spot in dyad.given(mechanism)}
+    pins: list[str | Spot] = [*links, *sorted(spot for spot in spots if spot.link != GROUND)]
     names = [
         *((link, 'turn') for link in turned),
-        *((link, part) for link in links for part in 'xy'),
+        *((pin, part) for pin in pins for part in 'xy'),
         *((name, 'slide') for name, slide in mechanism.sliders.items() if slide.block),
     ]
     return tuple(Handed(*name, power) for name in names for power in range(ORDER))
@@ -84,7 +86,7 @@ class Tangent:
     values
         Series of links, slides and inverse determinants, [power of time, case].
     held
-        Series of the pins that links are held by.
+        Series of the pins that links are held by, and of the points that dyads are given.
     phi, alpha
         Input angles and accelerations of the cases.
 
@@ -96,7 +98,7 @@ class Tangent:
         constants: Constants,
         numbers: Mapping[Key, float],
         values: Mapping[str | int, Array],
-        held: Mapping[str, Array],
+        held: Mapping[str | Spot, Array],
         phi: Array,
         alpha: Array,
     ) -> None:
@@ -104,6 +106,7 @@ class Tangent:
         self._constants = constants
         self._values = values
         self._cases = len(phi)
+        self._behind = False
         columns = [key for key, value in numbers.items() if value]
         self._column = {key: i for i, key in enumerate(columns)}
         self._inputs = len(columns)
@@ -144,6 +147,7 @@ class Tangent:
         self.place(CRANK, self.turn[CRANK], pivot, self.at(Spot(GROUND, pivot)))
         for dyad in mechanism.dyads:
             dyad.vary(self)
+            self._behind = True
 
     def _links(self) -> list[str]:
         return [name for name in self.mechanism.links if name != GROUND]
@@ -172,7 +176,16 @@ class Tangent:
 
     def at(self, spot: Spot) -> Array:
         """Return the change of where a point is."""
-        return self._origin[spot.link] + self._arm(spot)
+        change = self._origin[spot.link] + self._arm(spot)
+        if self._behind:
+            self._round_pin(spot, change)
+        return change
+
+    def _round_pin(self, owner: str | Spot, change: Array) -> None:
+        if (owner, 'x', 0) in self._handed:
+            for power, place in enumerate(self._held[owner]):
+                change[power, :, self._handed[Handed(owner, 'x', power)]] += place.real
+                change[power, :, self._handed[Handed(owner, 'y', power)]] += 1j * place.imag
 
     def _arm(self, spot: Spot) -> Array:
         unit = self.unit[spot.link]
@@ -189,11 +202,8 @@ class Tangent:
             turn = turn.copy()
             for power, size in enumerate(turn_sizes(self.unit[link][..., 0])):
                 turn[power, :, self._handed[Handed(link, 'turn', power)]] += size
-        if (link, 'x', 0) in self._handed:
-            where = where.copy()
-            for power, place in enumerate(self._held[link]):
-                where[power, :, self._handed[Handed(link, 'x', power)]] += place.real
-                where[power, :, self._handed[Handed(link, 'y', power)]] += 1j * place.imag
+        where = where.copy()
+        self._round_pin(link, where)
         self.turn[link] = turn
         self._origin[link] = where - self._arm(Spot(link, point))
 

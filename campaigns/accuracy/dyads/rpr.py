@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from campaigns.accuracy.mechanism import Spot
+from campaigns.accuracy.mechanism import Mechanism, Spot
 from campaigns.accuracy.motion import conjugate, inverse, Motion, real, root
 from campaigns.accuracy.tangent import Tangent, times
 from flint import acb
@@ -60,6 +60,9 @@ class RPR:
     @property
     def turned(self) -> tuple[str, ...]:
         return (self.rail,)
+
+    def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, self.d
 
     def close(self, motion: Motion) -> None:
         start, end = motion.at(self.a), motion.at(self.d)

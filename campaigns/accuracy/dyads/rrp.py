@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from campaigns.accuracy.mechanism import Spot
+from campaigns.accuracy.mechanism import Mechanism, Spot
 from campaigns.accuracy.motion import conjugate, imag, inverse, Motion, real, root
 from campaigns.accuracy.tangent import Tangent, times
 from linkage_ros.kinematics.linkage import Side
@@ -57,6 +57,9 @@ class RRP:
     @property
     def turned(self) -> tuple[str, ...]:
         return (self.one,)
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, mechanism.start(self.slider)
 
     def close(self, motion: Motion) -> None:
         start = motion.at(self.a)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from campaigns.accuracy.mechanism import Spot
+from campaigns.accuracy.mechanism import Mechanism, Spot
 from campaigns.accuracy.motion import conjugate, inverse, Motion, real, root
 from campaigns.accuracy.tangent import Tangent, times
 from linkage_ros.kinematics.linkage import Side
@@ -62,6 +62,9 @@ class RRR:
     @property
     def turned(self) -> tuple[str, ...]:
         return self.one, self.two
+
+    def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, self.d
 
     def close(self, motion: Motion) -> None:
         start = motion.at(self.a)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from campaigns.accuracy.mechanism import Spot
+from campaigns.accuracy.mechanism import Mechanism, Spot
 from campaigns.accuracy.motion import conjugate, imag, inverse, Motion
 from campaigns.accuracy.tangent import Tangent, times
 
@@ -49,6 +49,9 @@ class PRP:
     @property
     def turned(self) -> tuple[str, ...]:
         return ()
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return mechanism.start(self.one), mechanism.start(self.two)
 
     def close(self, motion: Motion) -> None:
         base_one, line_one, block_one = motion.line(self.one, self.pin)
@@ -106,6 +109,9 @@ class RPP:
     @property
     def turned(self) -> tuple[str, ...]:
         return ()
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, mechanism.start(self.outer)
 
     def close(self, motion: Motion) -> None:
         inner, outer = (motion.mechanism.sliders[name] for name in (self.inner, self.outer))
