@@ -327,8 +327,8 @@ class Closure:
         speeds = State(velocity.state.coordinates, list(velocity.state.pins))
         changes = State(acceleration.state.coordinates, list(acceleration.state.pins))
         for step in self._more_steps:
-            step.rates((), state, speeds)
-            step.accelerations((), None, state, speeds, changes)
+            rates = step.rates((), state, speeds)
+            step.accelerations((), rates, state, speeds, changes)
         return {
             key: PointMotion(*(values.pins[i] * self.scale for values in (state, speeds, changes)))
             for key, i in self._point_index.items()

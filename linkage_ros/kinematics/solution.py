@@ -18,12 +18,14 @@
 from __future__ import annotations
 
 from cmath import phase, rect
+from dataclasses import replace
 from math import inf
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.diagonal import AnyDiagonal
+from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
 from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import Carry, DrivenRRRDyad, Side
 from linkage_ros.kinematics.dyads.prp import PRPDyad
@@ -36,6 +38,7 @@ from linkage_ros.kinematics.known_links import KnownLinks
 from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
 from linkage_ros.kinematics.linkage import Input, Linkage
 from linkage_ros.kinematics.places import Turned
+from linkage_ros.kinematics.plane import resolved
 from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
 from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.structure import Driven, Dyad, Iterated, Structure
@@ -238,6 +241,11 @@ class Planner(KnownLinks):
         self.slides[name] = Slide(k + 1, line.sign)
 
     def _prp(self, dyad: Dyad) -> None:
+        one, other = (outer.to for outer in dyad.outer)
+        pivot = self.common(one, other, ())
+        if pivot is not None:
+            self._crank_prp(dyad, pivot)
+            return
         starts, arms, units = [], [], []
         k = self.coordinate_count
         for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
@@ -249,6 +257,25 @@ class Planner(KnownLinks):
             self.ride(body, point, outer.to, line, Slide(k + i, 1.0))
             self.slides[outer.name] = Slide(k + i, line.sign)
         self.add(PRPDyad((starts[0], starts[1]), (arms[0], arms[1]), (units[0], units[1])))
+        self.new_coordinates(2)
+
+    def _crank_prp(self, dyad: Dyad, pivot: str) -> None:
+        offsets, angles, size = [], [], 0.0
+        k = self.coordinate_count
+        for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
+            point, center = self.points[body][dyad.inner.name], self.points[outer.to][pivot]
+            line = self.line(outer.name, outer.to, point)
+            way, offset = resolved(line.start - center, line.direction)
+            offsets.append(offset)
+            angles.append(self.angles[outer.to].along(line.direction))
+            size += abs(line.start - center)
+            foot = replace(line, start=center + 1j * offset * line.direction)
+            self.ride(body, point, outer.to, foot, Slide(k + i, 1.0))
+            self.slides[outer.name] = Slide(k + i, line.sign, -line.sign * way)
+        first, second = angles
+        arms = first.coordinate, second.coordinate
+        across = second.unit * first.unit.conjugate()
+        self.add(CrankPRPDyad((offsets[0], offsets[1]), size, arms, across))
         self.new_coordinates(2)
 
     def _rpp(self, dyad: Dyad) -> None:

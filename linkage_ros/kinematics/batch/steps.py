@@ -22,6 +22,7 @@ from operator import attrgetter
 from typing import Any
 
 from linkage_ros.kinematics.batch.arrays import ArrayStep, Block, remade
+from linkage_ros.kinematics.batch.crank_prp import CrankPRPArrays
 from linkage_ros.kinematics.batch.crank_rrr import CrankRRRArrays
 from linkage_ros.kinematics.batch.diagonal import (
     CrankDiagonalArrays,
@@ -37,6 +38,7 @@ from linkage_ros.kinematics.batch.rpr import RPRArrays
 from linkage_ros.kinematics.batch.rrp import RRPArrays
 from linkage_ros.kinematics.batch.rrr import RRRArrays
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
+from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
 from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import DrivenRRRDyad
 from linkage_ros.kinematics.dyads.prp import PRPDyad
@@ -130,6 +132,7 @@ _KINDS: dict[type[Any], Callable[[Any], ArrayStep]] = {
     RRPDyad: _on_rail(RRPArrays),
     RPPDyad: _on_rail(RPPDyad),
     PRPDyad: _walked(PRPArrays),
+    CrankPRPDyad: _walked(CrankPRPArrays),
     DrivenRRRDyad: _driven_rrr,
     Iteration: _iteration,
 }
