@@ -43,7 +43,10 @@ class CrankDiagonal:
         upper² − s² = (upper² − (a + d)²) + far² = (upper² − (d − a)²) − near²
 
     Where a and d are long beside upper, so that no stretch can be near s = a + d, the last line is
-    taken: the one before it would cancel a + d. The brackets are constants of the linkage.
+    taken: the one before it would cancel a + d. The brackets are constants of the linkage, and so
+    is the sum of both, span = upper² − lower². It gives the greater one from the smaller: where
+    they are alike, what rounds the one then makes the other as much smaller, and their product,
+    which has its extreme there, loses nothing. Each from its own bracket, it lost 147 u·κ.
 
     Parameters
     ----------
@@ -53,7 +56,7 @@ class CrankDiagonal:
         The margins |d − a| − lower and upper − a − d, correctly rounded; stretch is infinite where
         the dyad has no upper limit.
     limits
-        lower and upper.
+        lower and upper, and the span, which their difference would cancel; infinite likewise.
     arms
         Indices, among the coordinates, of the directions of OA and OD.
     offset
@@ -62,8 +65,8 @@ class CrankDiagonal:
     """
 
     __slots__ = (
-        '_constants', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits', 'sides',
-        'stretch_margin',
+        '_constants', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits', 'root',
+        'sides', 'stretch_margin',
     )  # fmt: skip
 
     _at_change_point = Status.CHANGE_POINT
@@ -74,11 +77,11 @@ class CrankDiagonal:
         d: float,
         fold: float,
         stretch: float,
-        limits: tuple[float, float],
+        limits: tuple[float, float, float],
         arms: tuple[int, int] = (1, 0),
         offset: float = 0.0,
     ) -> None:
-        lower, upper = limits
+        lower, upper, _ = limits
         least = abs(d - a)
         self.least = (Fraction(d) - Fraction(a)) ** 2
         self.sides = (a, d)
@@ -87,8 +90,8 @@ class CrankDiagonal:
         self.brackets = (fold * (least + lower), stretch * (upper + a + d))
         short_pair = a + d > 2.0 * upper
         whole = (fsum((upper, -max(a, d), min(a, d)))) * (upper + least) if short_pair else 0.0
-        # Two roots, since a·d may underflow where the lengths differ by many decades.
-        self._constants = (a, d - a, 2.0 * sqrt(a) * sqrt(d), *self.brackets, short_pair, whole)
+        self.root = mean_root(a, d)
+        self._constants = (a, d - a, self.root, *self.brackets, short_pair, whole)
         self.arms = (*arms, offset)
         self.half_turn = (sin(0.5 * offset), cos(0.5 * offset))
 
@@ -110,7 +113,7 @@ class CrankDiagonal:
         near, far = root * half_sine, root * half_cosine
         excess = near * near
         square = difference * difference + excess
-        lower, upper = self.limits
+        lower, upper, _ = self.limits
         if square < SMALLEST:
             status = Status.OPEN if lower else Status.INDETERMINATE
             return Diagonal(0.0, 0.0, 0.0, 0.0, lower, near, far, 0.0, status)
@@ -129,6 +132,10 @@ class CrankDiagonal:
         if missing:
             gap = missing / (sqrt(square) + upper)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
+        if upper != inf:
+            root_fold, root_stretch = self._complemented(
+                excess, far * far, root_fold, root_stretch
+            )
         status = _CLOSED
         if (root_fold == 0.0 and fold) or (root_stretch == 0.0 and stretch):
             status = Status.TOGGLE
@@ -140,6 +147,20 @@ class CrankDiagonal:
             Diagonal,
             (square, direction, root_fold, root_stretch, 0.0, near, far, excess, status),
         )
+
+    def _complemented(
+        self, excess: float, rest: float, root_fold: float, root_stretch: float
+    ) -> tuple[float, float]:
+        """Return both roots; the greater is made of the smaller, where it is not signed."""
+        _, _, _, fold, stretch, short_pair, whole = self._constants
+        folding, stretching = fold + excess, whole - excess if short_pair else stretch + rest
+        if (fold and not root_fold) or (stretch and not root_stretch):
+            return root_fold, root_stretch
+        if folding < stretching and stretch:
+            root_stretch = sqrt(self.limits[2] - folding)
+        elif folding >= stretching and fold:
+            root_fold = sqrt(self.limits[2] - stretching)
+        return root_fold, root_stretch
 
     def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> Growth:
         """
@@ -192,7 +213,7 @@ class CrankDiagonal:
         q, p = growth.unit.real, -growth.unit.imag
         square, _, fold, stretch, _, near, far, _, _ = diagonal
         (short, long), (fold_bracket, stretch_bracket) = self.sides, self.brackets
-        turn = p + (p - q) * (p + q) + 1j * (q * ((long - short) * (long + short) / square))
+        turn = p * (1.0 + p) + 1j * (q * ((long - short) * (long + short) / square))
         fold_ratio, stretch_ratio = self._ratios(near, far, fold, stretch)
         bend = 0.0
         if fold_bracket:
@@ -208,6 +229,16 @@ class CrankDiagonal:
         """Differences of the two coordinates at which all links lie in one line, in [rad]."""
         margins = ((self.fold_margin, 0.0), (self.stretch_margin, pi))
         return tuple(phi - self.arms[2] for margin, phi in margins if margin == 0.0)
+
+
+def mean_root(a: float, d: float) -> float:
+    """Return 2·√(ad), correctly rounded."""
+    # Two roots, since a·d may underflow where the lengths differ by many decades.
+    root = 2.0 * sqrt(a) * sqrt(d)
+    if not root:
+        return root
+    exact = Fraction(root)
+    return float(exact - (exact - 4 * Fraction(a) * Fraction(d) / exact) / 2)
 
 
 class UnsignedDiagonal(CrankDiagonal):

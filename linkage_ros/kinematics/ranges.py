@@ -112,7 +112,7 @@ def _crank_intervals(diagonal: CrankDiagonal) -> list[tuple[float, float]]:
         sin²(φ/2) = (lower² − (d − a)²)/(4ad)        cos²(φ/2) = ((a + d)² − upper²)/(4ad)
     """
     a, d = diagonal.sides
-    lower, upper = diagonal.limits
+    lower, upper, _ = diagonal.limits
     lowest, highest = 0.0, pi
     if diagonal.fold_margin < 0.0:
         square = -diagonal.fold_margin / a * (lower + abs(d - a)) / d / 4.0

@@ -169,7 +169,7 @@ class Planner(KnownLinks):
         hinge = self._hinge(first.name, second.name)
         if hinge is None:
             ends = self.place_pin(first.name), self.place_pin(second.name)
-            diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c)), _LEVEL
+            diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c, 4.0 * b * c)), _LEVEL
         else:
             diagonal, base = (
                 crank_diagonal(
@@ -202,7 +202,7 @@ class Planner(KnownLinks):
         hinge = self._hinge(first.name, second.name)
         if hinge is None:
             ends = self.place_pin(first.name), self.place_pin(second.name)
-            diagonal, base = FreeDiagonal(ends, (abs(offset), inf)), _LEVEL
+            diagonal, base = FreeDiagonal(ends, (abs(offset), inf, inf)), _LEVEL
         else:
             diagonal, base = (
                 swivel_diagonal(

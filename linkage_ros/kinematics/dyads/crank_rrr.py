@@ -61,7 +61,7 @@ class CrankRRRDyad(RRRDyad):
         a, d = diagonal.sides
         fold, stretch = diagonal.brackets
         self._closing = (
-            *diagonal.arms, 2.0 * a, d - a, (d - a) * (d - a), 2.0 * sqrt(a) * sqrt(d),
+            *diagonal.arms, 2.0 * a, d - a, (d - a) * (d - a), diagonal.root, diagonal.limits[2],
             fold, abs(fold), stretch, abs(stretch), *sums(b, c, diagonal.least), float(sign),
         )  # fmt: skip
         self._moving = (*diagonal.arms[:2], a * (d - a))
@@ -79,7 +79,7 @@ class CrankRRRDyad(RRRDyad):
     def close(self, known: State) -> RRRPose:
         """Append the directions of both links."""
         (
-            i, j, offset, twice_a, apart, apart_square, root,
+            i, j, offset, twice_a, apart, apart_square, root, span,
             fold, fold_size, stretch, stretch_size, more, less, sign,
         ) = self._closing  # fmt: skip
         x = known[0]
@@ -102,6 +102,10 @@ class CrankRRRDyad(RRRDyad):
             or square < SMALLEST
         ):
             return super().close(known)
+        if folding < stretching:
+            stretching = span - folding
+        else:
+            folding = span - stretching
         fold_root, stretch_root = sqrt(folding), sqrt(stretching)
         cross = sign * fold_root * stretch_root
         if -SMALLEST < cross < SMALLEST:

@@ -131,7 +131,7 @@ class RPRDyad:
         grown, lean = unit.real, sign * unsigned
         if known_bend is None:
             slope = offset / pose.slide
-            bend = square.real + grown * grown * (1.0 - slope) * (1.0 + slope)
+            bend = square.real - grown * slope * (grown * slope)
             bend = bend / pose.slide
         else:
             bend = sign * known_bend
@@ -159,4 +159,4 @@ def swivel_diagonal(
     """Return the diagonal of the inverted slider-crank with crank a on ground d."""
     fold = margin(max(a, d), -min(a, d), -abs(offset))
     kind = CrankDiagonal if turns_known else UnsignedDiagonal
-    return kind(a, d, fold, inf, (abs(offset), inf), arms, angle)
+    return kind(a, d, fold, inf, (abs(offset), inf, inf), arms, angle)
