@@ -91,14 +91,16 @@ class CrankDiagonal:
         short_pair = a + d > 2.0 * upper
         whole = (fsum((upper, -max(a, d), min(a, d)))) * (upper + least) if short_pair else 0.0
         self.root = mean_root(a, d)
-        self._constants = (a, d - a, self.root, *self.brackets, short_pair, whole)
+        self._constants = (
+            a, d - a, float(self.least), self.root, *self.brackets, short_pair, whole,
+        )  # fmt: skip
         self.arms = (*arms, offset)
         self.half_turn = (sin(0.5 * offset), cos(0.5 * offset))
 
     def at(self, known: State) -> Diagonal:
         """Return the diagonal."""
         x = known[0]
-        a, difference, root, fold, stretch, short_pair, whole = self._constants
+        a, difference, least, root, fold, stretch, short_pair, whole = self._constants
         first, second, offset = self.arms
         base = x[second]
         half = 0.5 * (x[first] - base)
@@ -112,7 +114,7 @@ class CrankDiagonal:
             )
         near, far = root * half_sine, root * half_cosine
         excess = near * near
-        square = difference * difference + excess
+        square = least + excess
         lower, upper, _ = self.limits
         if square < SMALLEST:
             status = Status.OPEN if lower else Status.INDETERMINATE
@@ -152,7 +154,7 @@ class CrankDiagonal:
         self, excess: float, rest: float, root_fold: float, root_stretch: float
     ) -> tuple[float, float]:
         """Return both roots; the greater is made of the smaller, where it is not signed."""
-        _, _, _, fold, stretch, short_pair, whole = self._constants
+        _, _, _, _, fold, stretch, short_pair, whole = self._constants
         folding, stretching = fold + excess, whole - excess if short_pair else stretch + rest
         if (fold and not root_fold) or (stretch and not root_stretch):
             return root_fold, root_stretch
@@ -180,14 +182,14 @@ class CrankDiagonal:
         a, difference = self._constants[:2]
         p = (a * difference - 0.5 * near * near) / square
         q = 0.5 * near * far / square
-        fold_ratio, stretch_ratio = self._ratios(near, far, fold, stretch)
+        fold_ratio, stretch_ratio = self.ratios(near, far, fold, stretch)
         base = v[second]
         lean = 0.5 * fold_ratio * stretch_ratio / square
         return new(Growth, (q - 1j * p, v[first] - base, base, lean))
 
-    def _ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
+    def ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
         """Return near by fold and far by stretch; where one is the other the ratio is 1."""
-        _, _, _, fold_bracket, stretch_bracket, _, _ = self._constants
+        fold_bracket, stretch_bracket = self.brackets
         return (
             near / fold if fold_bracket else 1.0,
             far / stretch if stretch_bracket else 1.0,
@@ -211,10 +213,16 @@ class CrankDiagonal:
         a = changes[0]
         first, second, _ = self.arms
         q, p = growth.unit.real, -growth.unit.imag
+        short, long = self.sides
+        turn = p * (1.0 + p) + 1j * (q * ((long - short) * (long + short) / diagonal.square))
+        bend = self.bend(diagonal)
+        return new(GrowthChange, (turn, a[first] - a[second], a[second], bend))
+
+    def bend(self, diagonal: Diagonal) -> float:
+        """Return the bend that `accelerations` tells of."""
         square, _, fold, stretch, _, near, far, _, _ = diagonal
-        (short, long), (fold_bracket, stretch_bracket) = self.sides, self.brackets
-        turn = p * (1.0 + p) + 1j * (q * ((long - short) * (long + short) / square))
-        fold_ratio, stretch_ratio = self._ratios(near, far, fold, stretch)
+        fold_bracket, stretch_bracket = self.brackets
+        fold_ratio, stretch_ratio = self.ratios(near, far, fold, stretch)
         bend = 0.0
         if fold_bracket:
             bend = fold_bracket * (far / fold) / fold * (stretch_ratio / fold)
@@ -222,7 +230,7 @@ class CrankDiagonal:
             bend -= near * fold_ratio
         elif stretch_bracket:
             bend -= stretch_bracket * (near / stretch) / stretch * (fold_ratio / stretch)
-        return new(GrowthChange, (turn, a[first] - a[second], a[second], 0.25 * bend / square))
+        return 0.25 * bend / square
 
     @property
     def singular_angles(self) -> tuple[float, ...]:
@@ -259,6 +267,6 @@ class UnsignedDiagonal(CrankDiagonal):
         found = super().at(known)
         return found._replace(fold=abs(found.fold), stretch=abs(found.stretch))
 
-    def _ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
+    def ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
         """Return near by fold and far by stretch."""
         return near / fold, far / stretch

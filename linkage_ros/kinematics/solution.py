@@ -28,6 +28,7 @@ from linkage_ros.kinematics.diagonal import AnyDiagonal
 from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
 from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import Carry, DrivenRRRDyad, Side
+from linkage_ros.kinematics.dyads.folding_rrr import FoldingRRRDyad
 from linkage_ros.kinematics.dyads.prp import PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad, swivel_diagonal
@@ -178,9 +179,12 @@ class Planner(KnownLinks):
                 hinge.base,
             )
             sign = hinge.side_at_change_point(diagonal, sign)
-        written_out = type(diagonal) is CrankDiagonal and CrankRRRDyad.fits(diagonal)
-        kind = CrankRRRDyad if written_out else RRRDyad
-        self.add(kind(diagonal, b, c, sign))  # type: ignore[arg-type]  # as just asked
+        kind: type[RRRDyad] = RRRDyad
+        if FoldingRRRDyad.fits(diagonal):
+            kind = FoldingRRRDyad
+        elif type(diagonal) is CrankDiagonal and CrankRRRDyad.fits(diagonal):
+            kind = CrankRRRDyad
+        self.add(kind(diagonal, b, c, sign))
         k = self.new_coordinates(2)
         self.angles[one] = _facing(k, base, one_arm)
         self.angles[other] = _facing(k + 1, base, other_arm)

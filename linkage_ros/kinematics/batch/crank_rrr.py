@@ -188,7 +188,7 @@ class CrankRRRArrays:
 
     def _triangle(self, phi: Array, w: Scratch) -> None:
         """Find the squares, and ¼·K² as cross."""
-        a, d, root, fold, stretch, more, less, _ = self._constants
+        _, _, root, fold, stretch, more, less, _ = self._constants
         near, far = w.x, w.y
         sine_cosine(phi, near, far, w.p, 0.5)
         np.multiply(near, 2.0 * root, out=near)
@@ -199,7 +199,7 @@ class CrankRRRArrays:
         np.multiply(near, near, out=w.near)
         np.multiply(far, far, out=w.far)
 
-        np.add(w.near, 0.5 * (d - a) * (d - a), out=w.s)
+        np.add(w.near, 0.5 * float(self._diagonal.least), out=w.s)
         np.add(w.near, more, out=w.plus)
         np.subtract(less, w.near, out=w.minus)
         np.add(w.near, fold, out=w.x)

@@ -55,7 +55,7 @@ class CrankDiagonalArrays(CrankDiagonal):
     def at(self, known: States) -> Diagonal:
         """Return the diagonals."""
         x = known[0]
-        a, difference, root, fold, stretch, short_pair, whole = self._constants
+        a, difference, least, root, fold, stretch, short_pair, whole = self._constants
         first, second, offset = self.arms
         base = x[second]
         # Of links that never turn there is one number for all states.
@@ -63,7 +63,7 @@ class CrankDiagonalArrays(CrankDiagonal):
         half_sine, half_cosine = half_angle(half, offset, self.half_turn, stretch == 0.0)
         near, far = root * half_sine, root * half_cosine
         excess = near * near
-        square = difference * difference + excess
+        square = least + excess
         lower, upper, span = self.limits
         met = square < SMALLEST
         direction = base + np.arctan2(

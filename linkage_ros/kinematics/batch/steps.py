@@ -30,6 +30,7 @@ from linkage_ros.kinematics.batch.diagonal import (
     UnsignedDiagonalArrays,
 )
 from linkage_ros.kinematics.batch.driven_rrr import DrivenRRRArrays, SideArrays
+from linkage_ros.kinematics.batch.folding_rrr import FoldingRRRArrays
 from linkage_ros.kinematics.batch.one_by_one import OneByOne
 from linkage_ros.kinematics.batch.places import PointOnLinkArrays, PointOnRailArrays
 from linkage_ros.kinematics.batch.prp import PRPArrays
@@ -41,6 +42,7 @@ from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagona
 from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
 from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import DrivenRRRDyad
+from linkage_ros.kinematics.dyads.folding_rrr import FoldingRRRDyad
 from linkage_ros.kinematics.dyads.prp import PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad
@@ -91,7 +93,8 @@ def _walked(kind: type[Any]) -> Callable[[Any], ArrayStep]:
 def _rrr(dyad: RRRDyad) -> ArrayStep:
     if CrankRRRArrays.fits(dyad):
         return CrankRRRArrays(dyad)
-    return _Walked(remade(RRRArrays, dyad, diagonal=_part(dyad.diagonal)))
+    kind = FoldingRRRArrays if isinstance(dyad, FoldingRRRDyad) else RRRArrays
+    return _Walked(remade(kind, dyad, diagonal=_part(dyad.diagonal)))
 
 
 def _rpr(dyad: RPRDyad) -> ArrayStep:
@@ -127,6 +130,7 @@ _KINDS: dict[type[Any], Callable[[Any], ArrayStep]] = {
     PointOnLink: _walked(PointOnLinkArrays),
     PointOnRail: _walked(PointOnRailArrays),
     CrankRRRDyad: _rrr,
+    FoldingRRRDyad: _rrr,
     RRRDyad: _rrr,
     RPRDyad: _rpr,
     RRPDyad: _on_rail(RRPArrays),
