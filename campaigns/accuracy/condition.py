@@ -26,9 +26,9 @@ from math import pi, remainder
 from typing import Any
 
 from campaigns.accuracy.mechanism import GROUND, Key, Spot, Turn
-from campaigns.accuracy.motion import Handed, Motion
+from campaigns.accuracy.motion import conjugate, Handed, imag, Motion
 from campaigns.accuracy.reference import Outcome, Reference, series, Truth
-from campaigns.accuracy.tangent import Array, handed_on, Tangent, turn_sizes
+from campaigns.accuracy.tangent import Array, handed_on, Tangent, turn_sizes, turn_values
 from flint import arb, ctx
 import numpy as np
 
@@ -115,12 +115,16 @@ def exact_condition_numbers(
         ties = tuple({key: value} for key, value in numbers.items() if value)
     kappa = np.zeros((len(base.joints), 3))
     exact = _coefficients(base)
+    found = handed_on(reference.mechanism)
+    conditions = [0.0] * len(found)
 
     def add(changed: Truth) -> None:
         nonlocal kappa
         for j, (one, other) in enumerate(zip(exact, _coefficients(changed), strict=True)):
             for k in range(3):
                 kappa[j, k] += abs(float((other[k] - one[k]) / step))
+        for i, handed in enumerate(found):
+            conditions[i] += abs(float(_change(base.motion, changed.motion, handed) / step))
 
     for tie in ties:
         varied: dict[Key, Any] = dict(numbers)
@@ -136,8 +140,14 @@ def exact_condition_numbers(
     still = _coefficients(reference.solve(phi, 0.0, precision))
     for j, y in enumerate(still):
         kappa[j, 2] += 2 * abs(float(y[2]))
-    for handed in handed_on(reference.mechanism):
-        amount = step * _size(base.motion, handed)
+    # Half of the acceleration is what the rate makes of itself: as α is, it counts twice.
+    still_motion = reference.solve(phi, 0.0, precision).motion
+    for i, handed in enumerate(found):
+        if handed.what in {'turn', 'slide'} and handed.power:
+            of = base.motion if handed.power == 1 else still_motion
+            conditions[i] += handed.power * abs(_value(of, handed))
+    for i, handed in enumerate(found):
+        amount = step * arb(_size(base.motion, handed) + conditions[i])
         changed = Reference(reference.mechanism, numbers, (handed, amount))
         add(changed.solve(phi, alpha, precision))
     kappa += _published(reference, [base.motion])[0]
@@ -169,12 +179,28 @@ def _place(motion: Motion, owner: str | Spot) -> Any:
     return motion.at(owner) if isinstance(owner, Spot) else motion.held[owner]
 
 
-def _size(motion: Motion, handed: Handed) -> Any:
+def _size(motion: Motion, handed: Handed) -> float:
     """Return the size of what a dyad hands on."""
+    if handed.what == 'turn' and not handed.power:
+        return pi
+    return abs(_value(motion, handed))
+
+
+def _value(motion: Motion, handed: Handed) -> float:
     owner, what, power = handed
     if what == 'turn':
-        return arb(turn_sizes(np.array([series(motion.shown[owner])]).T)[power, 0])
+        return float(turn_values(np.array([series(motion.shown[owner])]).T)[power, 0])
     if what == 'slide':
-        return arb(series(motion.slide[owner])[power].real)
+        return series(motion.slide[owner])[power].real
     place = series(_place(motion, owner))[power]
-    return arb(place.real if what == 'x' else place.imag)
+    return place.real if what == 'x' else place.imag
+
+
+def _change(motion: Motion, changed: Motion, handed: Handed) -> Any:
+    """Return by how much an angle or a slide is another one; of pins only their size counts."""
+    owner, what, power = handed
+    if what == 'turn':
+        return imag(changed.shown[owner] * conjugate(motion.shown[owner]))[power]
+    if what == 'slide':
+        return (changed.slide[owner] - motion.slide[owner])[power]
+    return 0

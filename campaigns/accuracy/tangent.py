@@ -48,27 +48,30 @@ def times(series: Array, change: Array) -> Array:
 
 
 def handed_on(mechanism: Mechanism) -> tuple[Handed, ...]:
-    """Return what dyads hand on to the ones behind them: angles, slides, and pins."""
+    """Return what dyads hand on to the ones behind them: pins, then angles and slides in order."""
     if len(mechanism.dyads) < 2:
         return ()
-    turned = [link for dyad in mechanism.dyads for link in dyad.turned]
     links = [link for link in mechanism.links if link not in {GROUND, CRANK}]
     spots = {spot for dyad in mechanism.dyads[1:] for spot in dyad.given(mechanism)}
     pins: list[str | Spot] = [*links, *sorted(spot for spot in spots if spot.link != GROUND)]
-    names = [
-        *((link, 'turn') for link in turned),
-        *((pin, part) for pin in pins for part in 'xy'),
-        *((name, 'slide') for name, slide in mechanism.sliders.items() if slide.block),
-    ]
+    names: list[tuple[str | Spot, str]] = [(pin, part) for pin in pins for part in 'xy']
+    for dyad in mechanism.dyads:
+        names += [(link, 'turn') for link in dyad.turned]
+        names += [(slider, 'slide') for slider in dyad.slid if mechanism.sliders[slider].block]
     return tuple(Handed(*name, power) for name in names for power in range(ORDER))
 
 
-def turn_sizes(unit: Array) -> Array:
-    """Return the sizes of an angle, its rate and half its acceleration, of the series of e^iθ."""
+def turn_values(unit: Array) -> Array:
+    """Return an angle's rate and half its acceleration, behind a 0, of the series of e^iθ."""
     back = unit[0].conj()
-    # A published or handed angle counts as π at least; within (-π, π] none is greater.
-    sizes = [np.full(len(back), pi), (unit[1] * back).imag, (unit[2] * back).imag]
-    return np.abs(np.array(sizes))
+    return np.array([np.zeros(len(back)), (unit[1] * back).imag, (unit[2] * back).imag])
+
+
+def turn_sizes(unit: Array) -> Array:
+    """Return their sizes, and π in place of the 0: an angle counts as half a turn at least."""
+    sizes = np.abs(turn_values(unit))
+    sizes[0] = pi
+    return sizes
 
 
 class Tangent:
@@ -200,7 +203,8 @@ class Tangent:
         self.shown[link] = turn
         if (link, 'turn', 0) in self._handed:
             turn = turn.copy()
-            for power, size in enumerate(turn_sizes(self.unit[link][..., 0])):
+            sizes = turn_sizes(self.unit[link][..., 0]) + np.abs(turn).sum(axis=2)
+            for power, size in enumerate(sizes):
                 turn[power, :, self._handed[Handed(link, 'turn', power)]] += size
         where = where.copy()
         self._round_pin(link, where)
@@ -212,9 +216,10 @@ class Tangent:
         slide = self.mechanism.sliders[slider]
         if (slider, 'slide', 0) in self._handed:
             moved = self._zeros(float)
-            for power in range(ORDER):
-                column = self._handed[Handed(slider, 'slide', power)]
-                moved[power, :, column] = self.slide_value[slider][power, :, 0]
+            sizes = np.abs(self.slide[slider]).sum(axis=2)
+            sizes += np.abs(self.slide_value[slider][..., 0])
+            for power, size in enumerate(sizes):
+                moved[power, :, self._handed[Handed(slider, 'slide', power)]] = size
             where = where + times(self.unit[slide.along] * self.direction[slider], moved)
         self.place(str(slide.block), turn, pin, where)
 

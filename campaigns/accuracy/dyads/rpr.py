@@ -61,6 +61,10 @@ class RPR:
     def turned(self) -> tuple[str, ...]:
         return (self.rail,)
 
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return ()
+
     def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
         return self.a, self.d
 

@@ -58,6 +58,10 @@ class RRP:
     def turned(self) -> tuple[str, ...]:
         return (self.one,)
 
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return (self.slider,)
+
     def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
         return self.a, mechanism.start(self.slider)
 

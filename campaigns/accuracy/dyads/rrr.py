@@ -63,6 +63,10 @@ class RRR:
     def turned(self) -> tuple[str, ...]:
         return self.one, self.two
 
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return ()
+
     def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
         return self.a, self.d
 

@@ -50,6 +50,10 @@ class PRP:
     def turned(self) -> tuple[str, ...]:
         return ()
 
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return self.one, self.two
+
     def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
         return mechanism.start(self.one), mechanism.start(self.two)
 
@@ -109,6 +113,10 @@ class RPP:
     @property
     def turned(self) -> tuple[str, ...]:
         return ()
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return (self.outer,)
 
     def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
         return self.a, mechanism.start(self.outer)
