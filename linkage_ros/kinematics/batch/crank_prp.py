@@ -33,7 +33,7 @@ class CrankPRPArrays(CrankPRPDyad):
     def close(self, known: States) -> CrankPRPPose:
         """Append both ways along the lines."""
         x = known[0]
-        (i, j), (one, other) = self._arms, self._offsets
+        (i, j), (one, other) = self.arms, self._offsets
         across: Any = turned(x[j] - x[i]) * self._across
         sine, cosine = across.imag, across.real
         parallel = np.abs(sine) <= ROUNDING

@@ -33,8 +33,8 @@ were 1,000 times as far, and 23 u·κ in random linkages.
 
 from __future__ import annotations
 
-from cmath import rect
-from math import atan2
+from cmath import phase, rect
+from math import atan2, pi
 from typing import NamedTuple
 
 from linkage_ros.kinematics.rounding import ROUNDING
@@ -85,20 +85,20 @@ class CrankPRPDyad:
 
     """
 
-    __slots__ = ('_across', '_arms', '_offsets', '_size')
+    __slots__ = ('_across', '_offsets', '_size', 'arms')
 
     def __init__(
         self, offsets: tuple[float, float], size: float, arms: tuple[int, int], across: complex
     ) -> None:
         self._offsets = offsets
         self._size = size
-        self._arms = arms
+        self.arms = arms
         self._across = across
 
     def close(self, known: State) -> CrankPRPPose:
         """Append both ways along the lines."""
         x = known[0]
-        (i, j), (one, other) = self._arms, self._offsets
+        (i, j), (one, other) = self.arms, self._offsets
         across = rect(1.0, x[j] - x[i]) * self._across
         sine, cosine = across.imag, across.real
         if abs(sine) <= ROUNDING:
@@ -113,7 +113,7 @@ class CrankPRPDyad:
     def rates(self, pose: CrankPRPPose, _known: State, speeds: State) -> float:
         """Append their rates; return δ̇/sin δ."""
         v = speeds[0]
-        i, j = self._arms
+        i, j = self.arms
         _, _, first, second, across = pose
         swing = (v[j] - v[i]) / across.imag
         v += (-swing * second, -swing * first)
@@ -129,7 +129,7 @@ class CrankPRPDyad:
     ) -> None:
         """Append their accelerations."""
         a = changes[0]
-        i, j = self._arms
+        i, j = self.arms
         _, _, first, second, across = pose
         sine, cosine = across.imag, across.real
         pull, whirl = (a[j] - a[i]) / sine, swing * swing
@@ -141,3 +141,13 @@ class CrankPRPDyad:
     def transmission_angle(self, pose: CrankPRPPose) -> float:
         """Return the angle between the two lines, in [0, π/2], in [rad]."""
         return atan2(abs(pose.across.imag), abs(pose.across.real))
+
+    @property
+    def singular_angles(self) -> tuple[float, ...]:
+        """Differences of the two coordinates at which the lines are parallel, in [rad]."""
+        angle = phase(self._across)
+        return angle, angle + pi
+
+    def side_of(self, pose: CrankPRPPose) -> float:
+        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        return pose.across.imag

@@ -62,7 +62,8 @@ class CrankRRRDyad(RRRDyad):
         fold, stretch = diagonal.brackets
         self._closing = (
             *diagonal.arms, 2.0 * a, d - a, float(diagonal.least), diagonal.root,
-            diagonal.limits[2], fold, abs(fold), stretch, abs(stretch), *sums(b, c, diagonal.least), float(sign),
+            diagonal.limits[2], fold, abs(fold), stretch, abs(stretch),
+            *sums(b, c, diagonal.least), float(sign),
         )  # fmt: skip
         self._moving = (*diagonal.arms[:2], a * (d - a))
         self._pulling = (
