@@ -83,7 +83,8 @@ class RPR:
         block = motion.mechanism.sliders[self.slider].block
         if block is not None:
             twist = motion.constants.twists[self.slider]
-            motion.place(block, unit * twist, self.d.point, end)
+            # It turns as the rail does, and that angle is handed on once.
+            motion.place(block, motion.unit[self.rail] * twist, self.d.point, end)
 
     def _base(self, motion: Motion) -> Any:
         """Return, in the rail's frame, where the block's pin is at slide 0, from the rail's."""
@@ -120,6 +121,6 @@ class RPR:
         tangent.place(self.rail, turn, self.a.point, start)
         tangent.slide[self.slider] = along.real + (base * direction.conjugate()).imag * turn
         if slide.block is not None:
-            turn_block = turn.copy()
+            turn_block = tangent.turn[self.rail].copy()
             turn_block[0] += tangent.twist_change[self.slider]
             tangent.place(slide.block, turn_block, self.d.point, end)
