@@ -65,8 +65,8 @@ class CrankDiagonal:
     """
 
     __slots__ = (
-        '_constants', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits', 'root',
-        'sides', 'stretch_margin',
+        '_constants', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits', 'quad',
+        'root', 'sides', 'stretch_margin',
     )  # fmt: skip
 
     _at_change_point = Status.CHANGE_POINT
@@ -90,9 +90,9 @@ class CrankDiagonal:
         self.brackets = (fold * (least + lower), stretch * (upper + a + d))
         short_pair = a + d > 2.0 * upper
         whole = (fsum((upper, -max(a, d), min(a, d)))) * (upper + least) if short_pair else 0.0
-        self.root = mean_root(a, d)
+        self.root, self.quad = mean_root(a, d), float(4 * Fraction(a) * Fraction(d))
         self._constants = (
-            a, d - a, float(self.least), self.root, *self.brackets, short_pair, whole,
+            a, d - a, float(self.least), self.root, self.quad, *self.brackets, short_pair, whole,
         )  # fmt: skip
         self.arms = (*arms, offset)
         self.half_turn = (sin(0.5 * offset), cos(0.5 * offset))
@@ -100,7 +100,7 @@ class CrankDiagonal:
     def at(self, known: State) -> Diagonal:
         """Return the diagonal."""
         x = known[0]
-        a, difference, least, root, fold, stretch, short_pair, whole = self._constants
+        a, difference, least, root, quad, fold, stretch, short_pair, whole = self._constants
         first, second, offset = self.arms
         base = x[second]
         half = 0.5 * (x[first] - base)
@@ -113,7 +113,8 @@ class CrankDiagonal:
                 half_cosine * cosine - half_sine * sine,
             )
         near, far = root * half_sine, root * half_cosine
-        excess = near * near
+        # Not of the roots, which are rounded once more.
+        excess, rest = quad * half_sine * half_sine, quad * half_cosine * half_cosine
         square = least + excess
         lower, upper, _ = self.limits
         if square < SMALLEST:
@@ -122,22 +123,20 @@ class CrankDiagonal:
         direction = base + atan2(
             -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
         )
-        root_fold, missing = reach(fold, near)
+        root_fold, missing = reach(fold, near, excess)
         if missing:
             gap = missing / (sqrt(square) + lower)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
         root_stretch = 1.0
         if short_pair:
-            root_stretch, missing = root_of(whole - near * near, abs(whole) + near * near)
+            root_stretch, missing = root_of(whole - excess, abs(whole) + excess)
         elif upper != inf:
-            root_stretch, missing = reach(stretch, far)
+            root_stretch, missing = reach(stretch, far, rest)
         if missing:
             gap = missing / (sqrt(square) + upper)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
         if upper != inf:
-            root_fold, root_stretch = self._complemented(
-                excess, far * far, root_fold, root_stretch
-            )
+            root_fold, root_stretch = self._complemented(excess, rest, root_fold, root_stretch)
         status = _CLOSED
         if (root_fold == 0.0 and fold) or (root_stretch == 0.0 and stretch):
             status = Status.TOGGLE
@@ -154,7 +153,7 @@ class CrankDiagonal:
         self, excess: float, rest: float, root_fold: float, root_stretch: float
     ) -> tuple[float, float]:
         """Return both roots; the greater is made of the smaller, where it is not signed."""
-        _, _, _, _, fold, stretch, short_pair, whole = self._constants
+        _, _, _, _, _, fold, stretch, short_pair, whole = self._constants
         folding, stretching = fold + excess, whole - excess if short_pair else stretch + rest
         if (fold and not root_fold) or (stretch and not root_stretch):
             return root_fold, root_stretch
@@ -178,9 +177,9 @@ class CrankDiagonal:
         """
         v = speeds[0]
         first, second, _ = self.arms
-        square, _, fold, stretch, _, near, far, _, _ = diagonal
+        square, _, fold, stretch, _, near, far, excess, _ = diagonal
         a, difference = self._constants[:2]
-        p = (a * difference - 0.5 * near * near) / square
+        p = (a * difference - 0.5 * excess) / square
         q = 0.5 * near * far / square
         fold_ratio, stretch_ratio = self.ratios(near, far, fold, stretch)
         base = v[second]

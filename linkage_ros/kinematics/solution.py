@@ -39,7 +39,7 @@ from linkage_ros.kinematics.known_links import KnownLinks
 from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
 from linkage_ros.kinematics.linkage import Input, Linkage
 from linkage_ros.kinematics.places import Turned
-from linkage_ros.kinematics.plane import resolved
+from linkage_ros.kinematics.plane import cross, resolved
 from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
 from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.structure import Driven, Dyad, Iterated, Structure
@@ -299,7 +299,8 @@ class Planner(KnownLinks):
         constant = (inner.start - point) * turn
         level = Line(outer.start, 1 + 0j, 0.0, 1.0)
         rail = self._rail(first.name, second.to, level, inf)
-        self.add(RPPDyad(rail, constant, direction, outer.direction))
+        offsets = cross(constant, outer.direction), cross(inner.start - point, inner.direction)
+        self.add(RPPDyad(rail, direction, outer.direction, offsets))
         k = self.new_coordinates(2)
         self.ride(carrier, point, second.to, outer, Slide(k + 1, 1.0))
         self.slides[second.name] = Slide(k + 1, outer.sign)

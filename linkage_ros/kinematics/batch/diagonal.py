@@ -55,21 +55,21 @@ class CrankDiagonalArrays(CrankDiagonal):
     def at(self, known: States) -> Diagonal:
         """Return the diagonals."""
         x = known[0]
-        a, difference, least, root, fold, stretch, short_pair, whole = self._constants
+        a, difference, least, root, quad, fold, stretch, short_pair, whole = self._constants
         first, second, offset = self.arms
         base = x[second]
         # Of links that never turn there is one number for all states.
         half = 0.5 * np.atleast_1d(x[first] - base)
         half_sine, half_cosine = half_angle(half, offset, self.half_turn, stretch == 0.0)
         near, far = root * half_sine, root * half_cosine
-        excess = near * near
+        excess, rest = quad * half_sine * half_sine, quad * half_cosine * half_cosine
         square = least + excess
         lower, upper, span = self.limits
         met = square < SMALLEST
         direction = base + np.arctan2(
             -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
         )
-        root_fold, missing = reaches(fold, near)
+        root_fold, missing = reaches(fold, near, excess)
         gap = missing / (np.sqrt(square) + lower)
         root_stretch: Any = 1.0
         toggle = (root_fold == 0.0) & bool(fold)
@@ -78,10 +78,10 @@ class CrankDiagonalArrays(CrankDiagonal):
             if short_pair:
                 root_stretch, missing = roots_of(whole - excess, abs(whole) + excess)
             else:
-                root_stretch, missing = reaches(stretch, far)
+                root_stretch, missing = reaches(stretch, far, rest)
             gap = np.where(gap > 0.0, gap, missing / (np.sqrt(square) + upper))
             toggle |= (root_stretch == 0.0) & bool(stretch)
-            folding, stretching = fold + excess, stretch + far * far
+            folding, stretching = fold + excess, stretch + rest
             if short_pair:
                 stretching = whole - excess
             greater = folding < stretching
