@@ -76,6 +76,7 @@ def condition_numbers(
         },
         np.array([remainder(angle, 2 * pi) for angle in phi]),
         np.array(alpha),
+        np.array([_opening(reference, angle) for angle in phi]),
     )
     kappa = np.empty((len(truths), len(mechanism.joints), 3))
     for j, joint in enumerate(mechanism.joints.values()):
@@ -133,6 +134,7 @@ def exact_condition_numbers(
         add(Reference(reference.mechanism, varied).solve(phi, alpha, precision))
     turned = remainder(phi, 2 * pi)
     add(reference.solve(arb(phi) + step * arb(turned), alpha, precision))
+    add(reference.solve(arb(phi) + step * arb(_opening(reference, phi)), alpha, precision))
     add(reference.solve(phi, arb(alpha) * (1 + step), precision))
     # By the rate ω, which a motion has as 1: y' is as ω, and y'' = g·ω² + h·α.
     for j, y in enumerate(exact):
@@ -160,6 +162,12 @@ def exact_condition_numbers(
 
 def _coefficients(truth: Truth) -> list[list[Any]]:
     return [[y[0], y[1], y[2]] for y in truth.joints]
+
+
+def _opening(reference: Reference, phi: float) -> float:
+    """Return the angle that the first dyad sees where it is a sum, and rounded; else 0."""
+    opening = reference.mechanism.opening()
+    return remainder(phi + opening, 2 * pi) if opening else 0.0
 
 
 def _published(reference: Reference, motions: list[Motion]) -> Array:

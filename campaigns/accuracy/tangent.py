@@ -92,6 +92,8 @@ class Tangent:
         Series of the pins that links are held by, and of the points that dyads are given.
     phi, alpha
         Input angles and accelerations of the cases.
+    opening
+        Of each case the angle that the first dyad sees, as far as it is a sum.
 
     """
 
@@ -104,6 +106,7 @@ class Tangent:
         held: Mapping[str | Spot, Array],
         phi: Array,
         alpha: Array,
+        opening: Array,
     ) -> None:
         self.mechanism = mechanism
         self._constants = constants
@@ -114,8 +117,8 @@ class Tangent:
         self._column = {key: i for i, key in enumerate(columns)}
         self._inputs = len(columns)
         self.handed = handed_on(mechanism)
-        self._handed = {key: self._inputs + 3 + i for i, key in enumerate(self.handed)}
-        self._count = len(columns) + 3 + len(self.handed)
+        self._handed = {key: self._inputs + 4 + i for i, key in enumerate(self.handed)}
+        self._count = len(columns) + 4 + len(self.handed)
         self._held = held
         self.unit = {name: values[name][..., None] for name in ('ground', *self._links())}
         self.slide_value = {name: values[name][..., None] for name in mechanism.sliders}
@@ -143,6 +146,7 @@ class Tangent:
         self.turn[CRANK][0, :, self._inputs] = phi
         self.turn[CRANK][1, :, self._inputs + 1] = 1.0
         self.turn[CRANK][2, :, self._inputs + 2] = 0.5 * alpha
+        self.turn[CRANK][0, :, self._inputs + 3] = opening
         self.shown = dict(self.turn)
         self._origin = {GROUND: self._zeros(complex)}
         self.slide: dict[str, Array] = {}

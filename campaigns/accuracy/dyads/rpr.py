@@ -65,6 +65,10 @@ class RPR:
     def slid(self) -> tuple[str, ...]:
         return ()
 
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.d
+
     def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
         return self.a, self.d
 

@@ -62,6 +62,10 @@ class RRP:
     def slid(self) -> tuple[str, ...]:
         return (self.slider,)
 
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.slider
+
     def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
         return self.a, mechanism.start(self.slider)
 

@@ -67,6 +67,10 @@ class RRR:
     def slid(self) -> tuple[str, ...]:
         return ()
 
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.d
+
     def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
         return self.a, self.d
 

@@ -54,6 +54,10 @@ class PRP:
     def slid(self) -> tuple[str, ...]:
         return self.one, self.two
 
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.one, self.two
+
     def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
         return mechanism.start(self.one), mechanism.start(self.two)
 
@@ -117,6 +121,10 @@ class RPP:
     @property
     def slid(self) -> tuple[str, ...]:
         return (self.outer,)
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.outer
 
     def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
         return self.a, mechanism.start(self.outer)
