@@ -62,11 +62,16 @@ class CrankDiagonal:
     offset
         φ less the difference of those two coordinates, in (−π, π] rad.
 
+    Attributes
+    ----------
+    along, quad, root
+        a·(d − a), 4ad and 2·√(ad), correctly rounded.
+
     """
 
     __slots__ = (
-        '_constants', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits', 'quad',
-        'root', 'sides', 'stretch_margin',
+        '_constants', 'along', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits',
+        'quad', 'root', 'sides', 'stretch_margin',
     )  # fmt: skip
 
     _at_change_point = Status.CHANGE_POINT
@@ -85,6 +90,7 @@ class CrankDiagonal:
         least = abs(d - a)
         self.least = (Fraction(d) - Fraction(a)) ** 2
         self.sides = (a, d)
+        self.along = float(Fraction(a) * (Fraction(d) - Fraction(a)))
         self.limits = limits
         self.fold_margin, self.stretch_margin = fold, stretch
         self.brackets = (fold * (least + lower), stretch * (upper + a + d))
@@ -178,8 +184,7 @@ class CrankDiagonal:
         v = speeds[0]
         first, second, _ = self.arms
         square, _, fold, stretch, _, near, far, excess, _ = diagonal
-        a, difference = self._constants[:2]
-        p = (a * difference - 0.5 * excess) / square
+        p = (self.along - 0.5 * excess) / square
         q = 0.5 * near * far / square
         fold_ratio, stretch_ratio = self.ratios(near, far, fold, stretch)
         base = v[second]

@@ -254,8 +254,7 @@ class CrankRRRArrays:
 
     def _rates(self, w: Scratch) -> None:
         """Find p, q, r and twice the rates at a rate of φ of 1."""
-        a, d, *_ = self._constants
-        np.subtract(a * (d - a), w.near, out=w.p)
+        np.subtract(self._diagonal.along, w.near, out=w.p)
         np.divide(w.p, w.s, out=w.p)
         np.divide(w.q, w.s, out=w.q)
         np.divide(w.q, w.cross, out=w.r)

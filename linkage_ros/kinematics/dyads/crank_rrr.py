@@ -65,7 +65,7 @@ class CrankRRRDyad(RRRDyad):
             diagonal.limits[2], fold, abs(fold), stretch, abs(stretch),
             *sums(b, c, diagonal.least), float(sign),
         )  # fmt: skip
-        self._moving = (*diagonal.arms[:2], a * (d - a))
+        self._moving = (*diagonal.arms[:2], diagonal.along)
         self._pulling = (
             *diagonal.arms[:2], fold, stretch, (d - a) * (d + a), (b - c) * (b + c),
         )  # fmt: skip
