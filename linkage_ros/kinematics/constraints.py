@@ -102,8 +102,12 @@ class Constraints:
             self._linkage, self._links, planner.blocks, planner.points, planner.scale, place_known
         )
         sliding = tuple(bool(given.slider) for given in self._linkage.inputs)
+        far = sum(
+            max(abs(one - other) for one in points.values() for other in points.values())
+            for points in planner.points.values()
+        )
         return Iteration(
-            tuple(self._constraints), tuple(self.slides.values()), start, before, sliding
+            tuple(self._constraints), tuple(self.slides.values()), start, before, sliding, far
         )
 
     def _add_joint(self, joint: Joint) -> None:
