@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The branch of a single input that a pose names: all solutions that lead from it without a toggle.
 
@@ -171,7 +170,7 @@ class Branch:
             x = min(max(x - turned * period, low), high)
         elif self._turning and not low <= x <= high and self.interval.period:
             x -= tau * round((x - 0.5 * (low + high)) / tau)
-        side = self._sides[x >= self._x]
+        side = self._sides[int(x >= self._x)]
         while side.end is None and side.sign * x > self._reached(side) and self._lap(side):
             pass
         if side.sign * x > self._reached(side):
@@ -188,7 +187,7 @@ class Branch:
 
     def nearest_end(self, x: float) -> Array | None:
         """Return the unknowns at the end of the branch behind which an input lies."""
-        return self._sides[x >= self._x].node.place[:-1] if self._sides else None
+        return self._sides[int(x >= self._x)].node.place[:-1] if self._sides else None
 
     def _followed(self, node: Node | None, x: float) -> Interval:
         """Follow the branch to its ends, or to where it comes back."""

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The curve of solutions of links that are iterated, followed from cell to cell without a leap.
 
@@ -48,7 +47,10 @@ _CONTRACTS = 0.6
 
 _LONGEST = 0.25
 _SHORTEST = 2.0**-36
-"""Of a step, in [rad] or lengths."""
+"""Of a step, in [rad] or lengths; the longest grows with how far away the links are."""
+
+_AWAY = 2.0**20
+"""In lengths: what is so far away, on lines that get parallel, does not come back."""
 
 _STRAIGHT = 0.25
 """What the slope of x may depart by from a straight line within a cell, of its change."""
@@ -190,7 +192,10 @@ class Continuation:
             node = Node(node.place, -node.tangent)
         step = 2.0**-5
         while sign * (last - node.place[-1]) > 0.0:
-            step = min(step, _LONGEST)
+            far = float(max(np.abs(node.place[1:-1:3]).max(), np.abs(node.place[2:-1:3]).max()))
+            if far > _AWAY:
+                return
+            step = min(step, _LONGEST * max(1.0, far))
             left = sign * (last - node.place[-1])
             slope = sign * float(node.tangent[-1])
             whole = slope > 0.0 and step * slope >= 0.9 * left
