@@ -250,11 +250,11 @@ class Branch:
 
     def _comes_back(self, first: Node, side: _Side) -> bool:
         """Return whether all is where it began, and note after how many turns, and what gained."""
-        known = self._known_at(self._x), self._known_at(float(side.node.place[-1]))
-        if known[0] is None or known[1] is None:
+        begun, now = self._known_at(self._x), self._known_at(float(side.node.place[-1]))
+        if begun is None or now is None:
             return False
         # A slide that differs by a whole number of turns would be one in 10⁹.
-        (x, pins), (x_now, pins_now) = known
+        (x, pins), (x_now, pins_now) = begun, now
         angles = (remainder(a - b, tau) for a, b in zip(x, x_now, strict=True))
         if max(map(abs, angles)) > _SAME * (1.0 + abs(self._x)):
             return False

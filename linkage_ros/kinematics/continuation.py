@@ -250,7 +250,7 @@ class Continuation:
         a, b, c, d = cell.control()[:, -1].tolist()
         begin, middle, end = b - a, c - b, d - c
         most = max(min(abs(begin), abs(end)), abs(begin - end))
-        return abs(middle - 0.5 * (begin + end)) <= _STRAIGHT * most
+        return bool(abs(middle - 0.5 * (begin + end)) <= _STRAIGHT * most)
 
     def _contraction(self, cell: Cell) -> float:
         """Return q of a cell; infinite where the middle is no good approximation."""

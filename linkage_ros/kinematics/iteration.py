@@ -234,8 +234,7 @@ class Iteration:
         """Return what is known before this step, at any inputs."""
         known = State([0.0, *inputs], [])
         for step in self._before:
-            status = step.close(known)[0]
-            if not status.has_pose:
+            if not step.close(known)[0].has_pose:
                 return None
         return known
 
@@ -246,7 +245,7 @@ class Iteration:
         known, speeds = State([0.0, *inputs], []), State([0.0, *rates], [])
         for step in self._before:
             pose = step.close(known)
-            if pose[0] is not Status.CLOSED:
+            if not pose[0].has_rates:
                 return None
             step.rates(pose, known, speeds)
         return known, speeds

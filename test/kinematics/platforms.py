@@ -28,7 +28,7 @@ all platforms side by side, until x turns back or after some turns.
 
 from __future__ import annotations
 
-from cmath import phase, rect
+from cmath import rect
 from math import tau
 import random
 from typing import Any, NamedTuple
