@@ -57,6 +57,9 @@ _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 _SINGULAR = 1e-11
 """Of several inputs: smallest singular value of the Jacobian, of the largest, that has rates."""
 
+_AROUND = 64.0
+"""In [rad] or lengths: what a search for a solution does not go beyond."""
+
 _MOVED = 1e-6
 """In lengths: by less than that links are not said to miss each other."""
 
@@ -217,6 +220,31 @@ class Iteration:
         """Return the smallest singular value of the constraints' Jacobian, of the largest."""
         values = np.linalg.svd(pose.jacobian, compute_uv=False)
         return float(values[-1] / values[0])
+
+    def solution_from(self, angles: Array) -> Array | None:
+        """
+        Return the solution at the pose's inputs that a start with these angles leads to.
+
+        The bodies start where they miss their constraints least, which are linear in the places.
+        """
+        known = self._known_at(self._inputs)
+        if known is None:
+            return None
+        start = np.zeros_like(self._start)
+        start[0::3] = angles
+        errors, jacobian = equations(self._constraints, start, known)
+        places = np.arange(len(start)) % 3 > 0
+        start[places] = np.linalg.lstsq(jacobian[:, places], -errors, rcond=None)[0]
+        found = self._correct(known, start, _AROUND)
+        return None if found is None else found[0]
+
+    def solution_at(self, x: float) -> Array | None:
+        """Return the unknowns at a value of the single input, nothing where the branch is not."""
+        start, known = self._start_at((x,)), self._known(x)
+        if start is None or known is None:
+            return None
+        found = self._correct(known, start.unknowns, start.farthest)
+        return None if found is None else found[0]
 
     def _place(self, known: State, unknowns: Array, turned: Array) -> None:
         """Append a solution."""

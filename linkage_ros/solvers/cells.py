@@ -172,7 +172,7 @@ class _Group:
             # Where an unknown stands still, its box may be narrower than what others do to it.
             box = np.where(held[:, None], box, np.maximum(box, 1.5 * radius))
             radius, held = self._within(box, first, inverse)
-        proven = regular & held
+        proven: Mask = np.asarray(regular & held)
         self._set(0, middle, radius)
         loss = self._loss(inverse)
         worst = loss.sum(axis=2).max(axis=1)
