@@ -172,7 +172,7 @@ class _Group:
             # Where an unknown stands still, its box may be narrower than what others do to it.
             box = np.where(held[:, None], box, np.maximum(box, 1.5 * radius))
             radius, held = self._within(box, first, inverse)
-        proven: Mask = np.asarray(regular & held)
+        proven = regular & held
         self._set(0, middle, radius)
         loss = self._loss(inverse)
         worst = loss.sum(axis=2).max(axis=1)
@@ -194,7 +194,7 @@ class _Group:
         """Return how far from the middle a solution is, and where it is so within the box."""
         self._set(0, self._middle, box)
         radius: Array = (first + _image(self._loss(inverse), box)) * _UP
-        held: Mask = (radius < box).all(axis=1)
+        held: Mask = np.asarray((radius < box).all(axis=1))
         return radius, held
 
     def _step(self, order: int, inverse: Array) -> tuple[Array, Array]:
