@@ -21,14 +21,16 @@ which that lies::
 
     |P − A|² = l²        Im((P − A)·conj D) = 0
 
-Of the first leg A moves with the input x, as A₀ + e^{ix}·a or as A₀ + x·a, and D turns with a
-crank. The curve in (p, φ, x) is walked by its length, 1/500 of a radian or of a length at a time,
+Of the first leg A moves with the input x, as A₀ + Σ e^{iwx}·a or as A₀ + x·a, and D turns with a
+crank. The curve in (p, φ, x) is walked by its length, 1/250 of a radian or of a length at a time,
 all platforms side by side, until x turns back or after some turns.
 """
 
 from __future__ import annotations
 
-from cmath import rect
+from cmath import phase, rect
+from collections.abc import Callable
+from itertools import pairwise
 from math import tau
 import random
 from typing import Any, NamedTuple
@@ -46,18 +48,26 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-STEP = 1.0 / 500.0
+STEP = 1.0 / 250.0
 _ANGLE, _X = 2, 3
 
 
 class Leg(NamedTuple):
-    """A leg; ``length`` is 0 where it is a line along ``direction``."""
+    """
+    A leg; ``length`` is 0 where it is a line along ``direction``.
+
+    ``reach`` turns with the input, or is what it slides along; ``more`` turns ``more_rate`` times
+    as fast as the input, ``reach`` ``rate`` times.
+    """
 
     anchor: complex
     reach: complex
     length: float
     direction: complex
     point: complex
+    more: complex = 0j
+    rate: float = 1.0
+    more_rate: float = 0.0
 
 
 class Platform(NamedTuple):
@@ -169,9 +179,10 @@ def residuals(made: Platform, p: complex, angle: float, x: float) -> list[float]
     found = []
     for leg in made.legs:
         spot = p + rect(1.0, angle) * leg.point
-        turned = rect(1.0, x) if made.turning else x
+        moved = leg.reach * (rect(1.0, leg.rate * x) if made.turning else x)
+        moved += leg.more * rect(1.0, leg.more_rate * x)
         if leg.length:
-            found.append(abs(spot - leg.anchor - leg.reach * turned) - leg.length)
+            found.append(abs(spot - leg.anchor - moved) - leg.length)
         else:
             first = leg is made.legs[0] and made.turning
             way = leg.direction * (rect(1.0, x) if first else 1.0)
@@ -180,34 +191,37 @@ def residuals(made: Platform, p: complex, angle: float, x: float) -> list[float]
 
 
 def walks(
-    made: list[Platform], sign: float, turns: float = 3.0, most: int = 20000
+    made: list[Platform], signs: list[float], turns: float = 1.5, most: int = 12000
 ) -> list[Walked]:
-    """Walk all platforms to one side, until x turns back or has gone so far from the pose."""
-    fields = [[getattr(leg, name) for leg in one.legs] for one in made for name in Leg._fields]
-    anchor, reach, length, direction, point = (np.array(fields[k::5]) for k in range(5))
+    """Walk each platform to a side, until x turns back or has gone so far from the pose."""
+    fields = [
+        np.array([[getattr(leg, name) for leg in one.legs] for one in made])
+        for name in Leg._fields
+    ]
+    anchor, reach, length, direction, point, more, rate, more_rate = fields
+    sign = np.array(signs)
     turning = np.array([one.turning for one in made])
     state = np.array([(p.real, p.imag, angle, x) for one in made for p, angle, x in [one.pose]])
     first = state[:, _X].copy()
-    moves = np.zeros(anchor.shape)
-    moves[:, 0] = 1.0
-    turns_line = (moves > 0.0) & turning[:, None]
+    turning_legs = turning[:, None] & (np.arange(3) == 0)
 
     def system(z: Array) -> tuple[Array, Array]:
         x = z[:, _X, None]
         arm = np.exp(1j * z[:, _ANGLE, None]) * point
         spot = z[:, 0, None] + 1j * z[:, 1, None] + arm
-        crank = np.exp(1j * x)
-        at = anchor + reach * np.where(turning[:, None], crank, x) * moves
-        slope = reach * np.where(turning[:, None], 1j * crank, 1.0) * moves
+        crank, other = np.exp(1j * rate * x), np.exp(1j * more_rate * x)
+        at = anchor + reach * np.where(turning[:, None], crank, x) + more * other
+        slope = reach * np.where(turning[:, None], 1j * rate * crank, 1.0)
+        slope = slope + 1j * more_rate * more * other
         between = spot - at
-        way = direction * np.where(turns_line, crank, 1.0)
+        way = direction * np.where(turning_legs, crank, 1.0)
         along = np.conj(np.where(length > 0.0, between, 1j * way))
         error = np.where(
             length > 0.0, 0.5 * (np.abs(between) ** 2 - length**2), (along * between).real
         )
         by_x = -(along * slope).real
         # Im(b·conj(e^{ix}·d)) changes with x by −Re(b·conj(e^{ix}·d)).
-        by_x = np.where((length == 0.0) & turns_line, -(np.conj(way) * between).real, by_x)
+        by_x = np.where((length == 0.0) & turning_legs, -(np.conj(way) * between).real, by_x)
         rows = np.stack([along.real, -along.imag, (along * 1j * arm).real, by_x], axis=2)
         return error, rows
 
@@ -220,7 +234,7 @@ def walks(
 
     def corrected(start: Array, ahead: Array) -> Array:
         z = start
-        for _ in range(3):
+        for _ in range(2):
             error, slopes = system(z)
             rows = np.concatenate([slopes, ahead[:, None, :]], axis=1)
             off = np.sum(ahead * (z - start), axis=1)[:, None]
@@ -230,7 +244,7 @@ def walks(
 
     _, slopes = system(state)
     ahead = np.linalg.svd(slopes)[2][:, -1, :]
-    ahead *= (sign * np.sign(ahead[:, _X]))[:, None]
+    ahead = ahead * (sign * np.sign(ahead[:, _X]))[:, None]
     done: list[Walked | None] = [None] * len(made)
     rows = [state]
     for _ in range(most):
@@ -242,11 +256,15 @@ def walks(
         far = np.abs(new[:, _X] - first) > turns * tau
         for k in np.flatnonzero(back | far).tolist():
             if done[k] is None:
-                # x turns back within the step: as a parabola does, by its slopes at both ends.
                 end = None
                 if back[k]:
-                    part = ahead[k, _X] / (ahead[k, _X] - after[k, _X])
-                    end = float(state[k, _X] + 0.5 * part * STEP * ahead[k, _X])
+                    low, high = 0.0, STEP
+                    for _ in range(40):
+                        middle = 0.5 * (low + high)
+                        there = corrected(state + middle * ahead, ahead)
+                        on = sign[k] * tangent(there, ahead)[k, _X] > 0.0
+                        low, high = (middle, high) if on else (low, middle)
+                        end = float(there[k, _X])
                 done[k] = Walked(np.array([row[k] for row in rows]), end)
         if all(one is not None for one in done):
             break
@@ -254,3 +272,83 @@ def walks(
         rows.append(state)
     # Of a line that gets parallel to another, the platform goes away for ever.
     return [one or Walked(np.array([row[k] for row in rows]), None) for k, one in enumerate(done)]
+
+
+def platform_of(linkage: Linkage, size: float) -> Platform:
+    """
+    Return what a file of a platform on three arms says, lengths divided by a size.
+
+    Its links are L1, the crank from P1 to P2; the platform L2; and the arms L3 to L5.
+    """
+    points = {
+        link: {name: complex(*point) / size for name, point in given.items()}
+        for link, given in linkage.links.items()
+    }
+    ground, crank, plate = points['ground'], points['L1'], points['L2']
+    arms = [points[name] for name in ('L3', 'L4', 'L5')]
+    lengths = [abs(complex(*np.diff(list(arm.values())))) for arm in arms]
+    assert linkage.pose is not None
+    at = {name: complex(*point) / size for name, point in linkage.pose.points.items()}
+    angle = phase((at['P5'] - at['P3']) / (plate['P5'] - plate['P3']))
+    place = at['P3'] - rect(1.0, angle) * plate['P3']
+    legs = (
+        Leg(ground['P1'], crank['P2'] - crank['P1'], lengths[0], 0j, plate['P3']),
+        Leg(ground['P4'], 0j, lengths[1], 0j, plate['P5']),
+        Leg(ground['P6'], 0j, lengths[2], 0j, plate['P7']),
+    )
+    return Platform(legs, (place, angle, linkage.pose.inputs[0]), True)
+
+
+def everything(made: Platform, x: float) -> list[tuple[complex, float]]:
+    """
+    Return all (p, φ) of a platform whose last two legs are arms, by going through all angles.
+
+    To an angle φ the last two legs leave two places p; where the first leg fits, too, there is a
+    pose. Poses that are nearer to each other than 1/20000 of a turn are missed.
+    """
+    others = made.legs[1:]
+
+    def places(angle: float) -> list[complex]:
+        turned = rect(1.0, angle)
+        one, other = (leg.anchor - turned * leg.point for leg in others)
+        apart = other - one
+        a, b = others[0].length, others[1].length
+        along = (a * a - b * b + abs(apart) ** 2) / (2.0 * abs(apart))
+        square = a * a - along * along
+        if square < 0.0:
+            return []
+        up = complex(along, square**0.5), complex(along, -(square**0.5))
+        return [one + each * apart / abs(apart) for each in up]
+
+    def off(angle: float, side: int) -> float | None:
+        found = places(angle)
+        return residuals(made, found[side], angle, x)[0] if found else None
+
+    def halved(low: float, high: float, keeps: Callable[[float], bool]) -> float:
+        """Return the last angle from the low one on at which something is so."""
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if keeps(middle) else (low, middle)
+        return low
+
+    angles = [tau * k / 20000 for k in range(20001)]
+    reached = [bool(places(angle)) for angle in angles]
+    # The ends of where the two legs reach, too: next to them are the toggles of the two.
+    for k, (one, other) in enumerate(pairwise(reached)):
+        if one != other:
+            inside, outside = (angles[k], angles[k + 1]) if one else (angles[k + 1], angles[k])
+            angles.append(halved(inside, outside, lambda angle: bool(places(angle))))
+    angles.sort()
+    poses = []
+    for side in (0, 1):
+        values = [off(angle, side) for angle in angles]
+        for k, (low, high) in enumerate(pairwise(values)):
+            if low is None or high is None or low * high > 0.0:
+                continue
+            found = halved(
+                angles[k],
+                angles[k + 1],
+                lambda angle, low=low, side=side: (off(angle, side) or 0.0) * low > 0.0,  # type: ignore[misc]
+            )
+            poses.append((places(found)[side], found))
+    return poses
