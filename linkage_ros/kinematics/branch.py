@@ -46,6 +46,9 @@ _SAME = 1e-9
 _LAST_FLOATS = 32.0 * UNIT_ROUNDOFF
 """Of the input, or of 1: how near its end a toggle cannot be told from its neighbours."""
 
+_NEXT_TO_END = 2.0**-10
+"""In [rad] or lengths: how far links may go where those before them are next to a toggle."""
+
 
 class Interval(NamedTuple):
     """
@@ -176,12 +179,13 @@ class Branch:
         if side.sign * x > self._reached(side):
             return None
         gained = turned * self._gained
-        if not side.cells:
-            return Start(side.node.place[:-1], 0.0, gained, True)
         number = bisect_left(side.inputs, side.sign * x)
-        if side.end is not None and abs(x - side.end) <= _LAST_FLOATS * max(1.0, abs(x)):
-            return Start(side.cells[-1].end.place[:-1], inf, gained, True)
-        cell = side.cells[min(number, len(side.cells) - 1)]
+        if number == len(side.cells):
+            # Next to a toggle of the links before, where cells get too small to go on.
+            return Start(side.node.place[:-1], _NEXT_TO_END, gained, False)
+        cell = side.cells[number]
+        if cell.folds and abs(x - cell.end.place[-1]) <= _LAST_FLOATS * max(1.0, abs(x)):
+            return Start(cell.end.place[:-1], inf, gained, True)
         size = float(np.abs(cell.end.place - cell.begin.place).max())
         return Start(cell.at(cell.part_of(x))[:-1], 0.2 * size, gained, False)
 

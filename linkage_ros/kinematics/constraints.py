@@ -49,7 +49,7 @@ class Constraints:
     linkage
         The linkage.
     joints
-        All its joints.
+        Those of the group.
     links
         The links of the group.
     planner
@@ -73,8 +73,7 @@ class Constraints:
         self._known_pins: dict[str, int] = {}
         self.slides: dict[str, OnLine] = {}
         for joint in joints:
-            if joint.link in self._bodies or joint.to in self._bodies:
-                self._add_joint(joint)
+            self._add_joint(joint)
         self._add_drives()
 
     def iteration(self, before: tuple[Step, ...]) -> Iteration:
