@@ -212,27 +212,6 @@ def test_after_its_turns_a_branch_begins_again_and_angles_have_grown_by_them() -
     assert seen
 
 
-def test_a_branch_of_several_turns_repeats_after_them() -> None:
-    """Found among 3,000 random platforms: a turn of the crank leads to another assembly."""
-    rng = random.Random(20)
-    found = None
-    for _ in range(400):
-        made = platform(rng)
-        linkage = linkage_of(made, rng)
-        (interval,) = Closure(linkage).input_ranges
-        if interval.whole and interval.turns > 1:
-            found = made, linkage, interval
-            break
-    assert found is not None
-    made, linkage, interval = found
-    closure, x = Closure(linkage), made.pose[2]
-    (walked,) = walks([made], [1.0], turns=interval.turns + 0.2)
-    assert not off_branch(closure, walked)
-    there = closure.position(x + tau).joints[0]
-    assert abs(remainder(there - made.pose[1], tau)) > 1e-3
-    assert Way(closure).ranges[0].highest == pytest.approx(interval.turns * tau)
-
-
 @pytest.mark.parametrize('name', DEFECTS)
 def test_what_once_leapt_stays_on_its_branch(name: str) -> None:
     closure = defect(name)
