@@ -39,7 +39,8 @@ def test_each_assembly_that_check_lists_is_a_pose_to_paste(linkage: Run, tmp_pat
     for number, pose in enumerate(['', *listed]):
         file = tmp_path / f'{number}.yaml'
         # The line `pose: …` of the file in the place of that which it has.
-        file.write_text(re.sub('^pose: .*$', f'pose: {pose}', text, flags=re.MULTILINE) if pose else text)
+        changed = re.sub('^pose: .*$', f'pose: {pose}', text, flags=re.MULTILINE)
+        file.write_text(changed if pose else text, 'utf-8')
         (at,) = yaml.safe_load(file.read_text('utf-8'))['pose']['inputs']
         solved = linkage('solve', str(file), '--radians', f'--at={at!r}')
         cells = solved.stdout.splitlines()[1].split()
