@@ -119,7 +119,7 @@ def _places(closure: Closure, group: Iterated, unknowns: Array) -> dict[str, com
         for body, link in enumerate(group.links):
             points = closure.structure.links[link]
             if name in points:
-                angle, x, y = unknowns[3 * body : 3 * body + 3].tolist()
+                angle, x, y = unknowns.reshape(-1, 3)[body].tolist()
                 arm = complex(*points[name]) - complex(*next(iter(points.values())))
                 found[name] = complex(x, y) * closure.scale + arm * rect(1.0, angle)
                 break

@@ -141,12 +141,13 @@ class Iteration:
 
     @property
     def inputs(self) -> tuple[float, ...]:
-        """Inputs of the pose, as coordinates."""
+        """Return the inputs of the pose, as coordinates."""
         return self._inputs
 
     def close(self, known: State) -> IteratedPose:
         """Append the angles of the bodies, the slides, and the places of the bodies."""
-        inputs = known[0][1 : 1 + len(self._inputs)]
+        end = 1 + len(self._inputs)
+        inputs = known[0][1:end]
         start = self._start_at(inputs)
         if start is None:
             return self._open(known, inputs)

@@ -132,8 +132,8 @@ def _on_a_branch(closure: Closure, branch: Branch | None) -> Iterator[InputRange
     """Yield the intervals of a branch in which what comes behind it closes, too."""
     if branch is None:
         return
-    last = max(i for i, step in enumerate(closure.steps) if hasattr(step, 'branch'))
-    behind = [s for s in closure.steps[last + 1 :] if not isinstance(s, _CLOSE_EVERYWHERE)]
+    after = 1 + max(i for i, step in enumerate(closure.steps) if hasattr(step, 'branch'))
+    behind = [s for s in closure.steps[after:] if not isinstance(s, _CLOSE_EVERYWHERE)]
     turning = not closure.linkage.inputs[0].slider
     unit = 1.0 if turning else closure.scale
     low, high, limited, turns = branch.interval

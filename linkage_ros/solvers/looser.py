@@ -40,7 +40,8 @@ class _Looser(Iteration):
 
     def close(self, known: State) -> IteratedPose:
         """Append as `Iteration.close`; where the first steps do not contract, it does."""
-        inputs = known[0][1 : 1 + len(self._inputs)]
+        end = 1 + len(self._inputs)
+        inputs = known[0][1:end]
         start = self._start_at(inputs) if len(inputs) == 1 else None
         if start is None or start.ends:
             return super().close(known)

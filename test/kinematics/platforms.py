@@ -331,6 +331,9 @@ def everything(made: Platform, x: float) -> list[tuple[complex, float]]:
             low, high = (middle, high) if keeps(middle) else (low, middle)
         return low
 
+    def same_sign(side: int, value: float) -> Callable[[float], bool]:
+        return lambda angle: (off(angle, side) or 0.0) * value > 0.0
+
     angles = [tau * k / 20000 for k in range(20001)]
     reached = [bool(places(angle)) for angle in angles]
     # The ends of where the two legs reach, too: next to them are the toggles of the two.
@@ -345,10 +348,6 @@ def everything(made: Platform, x: float) -> list[tuple[complex, float]]:
         for k, (low, high) in enumerate(pairwise(values)):
             if low is None or high is None or low * high > 0.0:
                 continue
-            found = halved(
-                angles[k],
-                angles[k + 1],
-                lambda angle, low=low, side=side: (off(angle, side) or 0.0) * low > 0.0,  # type: ignore[misc]
-            )
+            found = halved(angles[k], angles[k + 1], same_sign(side, low))
             poses.append((places(found)[side], found))
     return poses
