@@ -234,6 +234,9 @@ class Branch:
             side.end = at
         elif side.sign * (last - at) > 0.0:
             side.end = self._last_known(at, side.sign)
+            if side.end == at and side.cells:
+                # Where branches cross the group is singular, too: which one goes on is not told.
+                side.cells[-1] = side.cells[-1]._replace(folds=True)
         return side.end is None
 
     def _last_known(self, x: float, sign: float) -> float:
@@ -243,7 +246,7 @@ class Branch:
             inside, step = inside + sign * step, 2.0 * step
         outside = inside + sign * step
         if self._known_at(outside) is not None:
-            return x  # A change point of the group: what is behind it is told by nothing.
+            return x
         while abs(outside - inside) > 0.0 and nextafter(inside, outside) != outside:
             middle = 0.5 * (inside + outside)
             if self._known_at(middle) is None:

@@ -25,10 +25,11 @@ by entry, of how much it changes within the box about the cubic::
     |B⁻¹|·δB contracts: some w > 0 has |B⁻¹|·δB·w ≤ q·w, with q ≤ 0.6
     |B⁻¹·(F(c(h/2)), 0)| is small against the box
 
-Then B is regular all over the box, and for each s there is one solution in it (Krawczyk's test: A.
-Neumaier, Interval Methods for Systems of Equations, Cambridge 1990, theorem 5.1.8). Another
-assembly cannot be in the box, however near it comes. The bound by the unknowns is one of the sines
-and cosines themselves; what known links do within a cell is taken from its ends and its middle.
+Then B is regular all over the box, and for each s there is at most one solution in it (Krawczyk's
+test: A. Neumaier, Interval Methods for Systems of Equations, Cambridge 1990, theorem 5.1.8).
+Another assembly cannot be in the box, however near it comes. The bound by the unknowns is one of
+the sines and cosines themselves; what known links do within a cell is taken from its ends and its
+middle, and the residual from the middle, where that of a cubic through both ends is largest.
 """
 
 from __future__ import annotations
@@ -48,6 +49,9 @@ _CONTRACTS = 0.6
 _LONGEST = 0.25
 _SHORTEST = 2.0**-36
 """Of a step, in [rad] or lengths; the longest grows with how far away the links are."""
+
+_MOST_CELLS = 2**13
+"""Of a call: some 27 are usual for a turn, and 300 for links that go far away on lines."""
 
 _AWAY = 2.0**20
 """In lengths: what is so far away, on lines that get parallel, does not come back."""
@@ -178,6 +182,8 @@ class Continuation:
         """
         Yield cell after cell, up to a toggle, or to an input that is not passed.
 
+        They end, too, where no cell can be shown to hold one curve alone, as where two cross.
+
         Parameters
         ----------
         node
@@ -191,7 +197,8 @@ class Continuation:
         if node.tangent[-1] * sign < 0.0:
             node = Node(node.place, -node.tangent)
         step = 2.0**-5
-        while sign * (last - node.place[-1]) > 0.0:
+        count = 0
+        while sign * (last - node.place[-1]) > 0.0 and count < _MOST_CELLS:
             far = float(max(np.abs(node.place[1:-1:3]).max(), np.abs(node.place[2:-1:3]).max()))
             if far > _AWAY:
                 return
@@ -212,6 +219,7 @@ class Continuation:
                 yield self._folded(cell)
                 return
             yield cell
+            count += 1
             node = cell.end
             step = cell.width * growth
 
