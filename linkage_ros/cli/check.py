@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import tau
 from threading import Event
 
@@ -27,7 +27,7 @@ from linkage_ros.cli.tables import show, Table
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.four_bars import four_bars
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.structure import Driven, Dyad, Group
+from linkage_ros.kinematics.structure import Driven, Dyad, Group, Iterated
 from linkage_ros.kinematics.survey import (
     conditionings,
     Extreme,
@@ -70,6 +70,7 @@ def tables(closure: Closure, title: str) -> Iterator[Table]:
     yield Table(
         'Solved in this order', ('>', 'group', 'links', 'how', 'assembly'), _groups(closure)
     )
+    yield from _other_assemblies(closure)
     loops = [
         (
             str(bar.group + 1),
@@ -160,11 +161,15 @@ def _reach(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
         yield 'range', 'no single one: it depends on every input'
         return
     for interval in way.ranges:
+        turns = round((interval.highest - interval.lowest) / tau)
         if not interval.whole:
             low, high = (value_text(value, way.turning) for value in interval[:2])
-            yield 'range', f'{low} to {high}'
-        elif interval.highest > 1.5 * tau:
-            yield 'range', 'every angle; the motion repeats after two turns'
+            each = '; each turn has poses of its own' if way.turning and not interval.turns else ''
+            ends = '' if any(interval.limited) or not each else ', and was not followed farther'
+            yield 'range', f'{low} to {high}{each}{ends}'
+        elif turns > 1:
+            count = 'two' if turns == 2 else str(turns)
+            yield 'range', f'every angle; the motion repeats after {count} turns'
         else:
             yield 'range', 'every angle'
     places: dict[Status, list[str]] = {status: [] for _, status in _SINGULAR}
@@ -193,6 +198,42 @@ def _assembly(closure: Closure, dyad: Dyad) -> str:
         side = closure.linkage.assembly[second.name]
         return f'slider {second.name}: pin {closing} {side} of {first.name}'
     return 'the only one'
+
+
+def _other_assemblies(closure: Closure) -> Iterator[Table]:
+    """Yield for each group that is iterated what else a pose could name at the same inputs."""
+    pose = closure.linkage.pose
+    for number, group in enumerate(closure.structure.groups):
+        if not isinstance(group, Iterated) or pose is None:
+            continue
+        # local import: it loads numpy
+        from linkage_ros.kinematics.assemblies import other_assemblies, STARTS
+
+        others = other_assemblies(closure, number)
+        inputs = ', '.join(f'{value + 0.0:.9g}' for value in pose.inputs)
+        rows = [
+            (f'{{inputs: [{inputs}], points: {{{_points(one.points)}}}}}', _turns(one.turns))
+            for one in others
+        ]
+        yield Table(
+            f'Other assemblies of group {number + 1} at the inputs of the pose: '
+            f'{len(others)} found from {STARTS} starts',
+            ('pose', "on the pose's branch") if rows else ('',),
+            rows or [('none',)],
+        )
+
+
+def _points(points: Mapping[str, complex]) -> str:
+    return ', '.join(
+        f'{name}: [{place.real + 0.0:.7g}, {place.imag + 0.0:.7g}]'
+        for name, place in points.items()
+    )
+
+
+def _turns(turns: int) -> str:
+    if not turns:
+        return 'no'
+    return f'{abs(turns)} turn{"s" if abs(turns) > 1 else ""} {"on" if turns > 0 else "back"}'
 
 
 def _links(closure: Closure, number: int) -> str:

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
-from math import floor, inf, isfinite, tau
+from math import inf, isfinite
 
 from linkage_ros.drives.drive import Context, CrankState, Reader
 from linkage_ros.dynamics.integrators.method import METHODS
@@ -140,8 +140,8 @@ def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]
     for each in closure.input_ranges:
         if each.whole:
             return -inf, inf
-        turns = floor((start - each.lowest) / tau) * tau if each.turning else 0.0
-        low, high = each.lowest + turns, each.highest + turns
+        turns = each.shift(start)
+        low, high = each.lowest - turns, each.highest - turns
         within = margin * (high - low)
         low, high = (
             end + inwards if limited else copy

@@ -102,8 +102,23 @@ def nearness(closure: Closure, position: Position) -> Nearness:
         unit = closure.scale if sliding else 1.0
         value = position.state.coordinates[1] * unit
         for singular in closure.singular_inputs:
-            distance = min(distance, abs(_away(value - singular.value, not sliding)))
+            distance = min(distance, abs(away(closure, value, singular.value)))
     return Nearness(angle, conditioning, distance, weakest)
+
+
+def away(closure: Closure, value: float, place: float) -> float:
+    """
+    Return how far a value of the single input is from a place, in [rad] or [m].
+
+    Whole turns do not count, but from an end of a range where each turn has poses of its own.
+    """
+    if closure.linkage.inputs[0].slider:
+        return value - place
+    for interval in closure.input_ranges:
+        if not interval.whole and place in interval[:2]:
+            period = interval.turns * tau
+            return remainder(value - place, period) if period else value - place
+    return remainder(value - place, tau)
 
 
 def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
@@ -126,7 +141,6 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
         for end, limited in zip(interval[:2], interval.limited, strict=True)
         if limited
     ]
-    turning = not given[0].slider
     found = [SingularInput(end, Status.TOGGLE) for end in ends]
     for number, step in enumerate(closure.steps):
         if not hasattr(step, 'transmission_angle') or isinstance(step, RPPDyad):
@@ -136,7 +150,7 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
             places = zeros(partial(_transmission_angle, closure, number), closure.input_ranges)
         for place in places:
             status = _met(closure, number, place)
-            distances = (abs(_away(place - one.value, turning)) for one in found)
+            distances = (abs(away(closure, place, one.value)) for one in found)
             if status is not None and all(apart > _SAME for apart in distances):
                 found.append(SingularInput(place, status))
     return tuple(sorted(found, key=attrgetter('value')))
@@ -178,7 +192,3 @@ def _transmission_angle(closure: Closure, number: int, value: float) -> float:
         return 0.0
     step: Any = closure.steps[number]
     return float(step.transmission_angle(position.poses[number]))
-
-
-def _away(difference: float, turning: bool) -> float:
-    return remainder(difference, tau) if turning else difference

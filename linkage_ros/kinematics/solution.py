@@ -102,7 +102,7 @@ class Planner(KnownLinks):
 
     def __init__(self, linkage: Linkage, structure: Structure) -> None:
         super().__init__(linkage, structure)
-        self._joints = structure.joints
+        self._structure = structure
         self._assembly = dict(linkage.assembly)
         self._keys: list[str] = []
         for self.group, group in enumerate(structure.groups):
@@ -330,7 +330,8 @@ class Planner(KnownLinks):
     def _iterate(self, group: Iterated) -> None:
         from linkage_ros.kinematics.constraints import Constraints  # local import: it loads numpy
 
-        constraints = Constraints(self._linkage, self._joints, group.links, self)
+        joints = self._structure.joints_of(group)
+        constraints = Constraints(self._linkage, joints, group.links, self)
         slides = constraints.slides
         self.add(constraints.iteration(tuple(self.steps)))
         k = self.new_coordinates(len(group.links) + len(slides))

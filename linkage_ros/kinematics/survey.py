@@ -124,11 +124,10 @@ class Way:
         for interval in self.ranges:
             if interval.whole or interval.lowest <= value <= interval.highest:
                 return interval
-            if interval.turning:
-                middle = 0.5 * (interval.lowest + interval.highest)
-                shift = tau * round((value - middle) / tau)
-                if shift and interval.lowest <= value - shift <= interval.highest:
-                    return InputRange(interval.lowest + shift, interval.highest + shift)
+            shift = interval.shift(value)
+            if shift and interval.lowest <= value + shift <= interval.highest:
+                ends = interval.lowest - shift, interval.highest - shift
+                return interval._replace(lowest=ends[0], highest=ends[1])
         return None
 
     @property
@@ -143,19 +142,23 @@ class Way:
     def _usual(self, interval: InputRange) -> InputRange:
         if not interval.turning:
             return interval
+        if not interval.turns:
+            return interval
         if interval.whole:
-            turns = 1 if all(self._repeats(0.1 + i, tau) for i in range(6)) else 2
-            return InputRange(0.0, turns * tau)
-        middle = 0.5 * (interval.lowest + interval.highest)
-        shift = -tau * round(middle / tau)
-        if shift and self._repeats(middle, shift):
-            return InputRange(interval.lowest + shift, interval.highest + shift)
+            period = interval.turns * tau
+            once = all(self._repeats(0.1 + i, period) for i in range(6 * interval.turns))
+            return interval._replace(lowest=0.0, highest=period if once else 2.0 * period)
+        shift = interval.shift(0.0)
+        if shift and self._repeats(0.5 * (interval.lowest + interval.highest), -shift):
+            return interval._replace(
+                lowest=interval.lowest - shift, highest=interval.highest - shift
+            )
         return interval
 
     def _repeats(self, value: float, shift: float) -> bool:
         """Return whether all joints are the same again after a shift, but for whole turns."""
         here, there = self.position(value).joints, self.position(value + shift).joints
-        return all(
+        return len(here) == len(there) and all(
             abs(remainder(p - q, tau) if turns else p - q)
             < _SAME * (1.0 if turns else self.closure.scale)
             for p, q, turns in zip(here, there, self.closure.turning, strict=True)
