@@ -99,7 +99,9 @@ def view(
     position = _closed(closure, inputs)
     way = Way(closure, inputs)
     value = inputs[0]
-    interval = way.range_about(value) or InputRange(value, value, way.turning)
+    # A pose beyond the limits lies in no range, and is drawn before the widest.
+    interval = way.range_about(value) or way.widest_range
+    interval = interval or InputRange(value, value, way.turning)
     if ghosts:
         behind = [_closed(closure, given) for given in ghosts]
     elif interval.whole:

@@ -384,6 +384,19 @@ class Closure:
             for name, slide in self.slides.items()
         }
 
+    def beyond(self, position: Position) -> str:
+        """Return of a pose which joint is beyond its limits, in words; '' where none is."""
+        factors = self._factors or [1.0] * len(self.linkage.inputs)
+        driven = zip(position.state.coordinates[1:], factors, strict=False)
+        inputs = [value / factor for value, factor in driven]
+        joints = position.joints or self.position(*inputs).joints
+        bound = self.bounds.exceeded(inputs, joints) if joints else None
+        if bound is None:
+            return ''
+        driven_one = bound in self.bounds.inputs
+        value = bound.turned((inputs if driven_one else joints)[bound.number])
+        return f'{bound.name} at {value:.6g}, limits {self.linkage.limits[bound.name]}'
+
     def residual(self, position: Position) -> float:
         """
         Return what is left open by a closed position, in [m].

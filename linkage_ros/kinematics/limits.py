@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.batch.arrays import Array, Mask
     from linkage_ros.kinematics.closure import Position
 
-UNDISTURBED = (Status.CLOSED, Status.CHANGE_POINT)
+_UNDISTURBED = (Status.CLOSED, Status.CHANGE_POINT)
 """What a state beyond the limits would be without them; a toggle stays one, without rates."""
 
 _ROUNDINGS = 4.0
@@ -153,7 +153,7 @@ def limited(position: Callable[..., Position], bounds: Bounds) -> Callable[..., 
 
     def close(*inputs: float) -> Position:
         found = position(*inputs)
-        if found[0] in UNDISTURBED and exceeded(inputs, found[2]) is not None:
+        if found[0] in _UNDISTURBED and exceeded(inputs, found[2]) is not None:
             return found._replace(status=Status.LIMITED)
         return found
 

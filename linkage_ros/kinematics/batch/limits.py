@@ -20,15 +20,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from linkage_ros.kinematics.batch.arrays import BLOCK, CODES
+from linkage_ros.kinematics.batch.arrays import BLOCK, LIMITED
 from linkage_ros.kinematics.batch.solve import Batch
-from linkage_ros.kinematics.limits import Bounds, UNDISTURBED
-from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.limits import Bounds
 import numpy as np
 from numpy.typing import ArrayLike
-
-_LIMITED = CODES[Status.LIMITED]
-_UNDISTURBED = tuple(CODES[status] for status in UNDISTURBED)
 
 
 def mark_limited(bounds: Bounds, inputs: Sequence[ArrayLike], batch: Batch) -> None:
@@ -51,4 +47,4 @@ def mark_limited(bounds: Bounds, inputs: Sequence[ArrayLike], batch: Batch) -> N
         part = slice(start, start + BLOCK)
         status = batch.status[part]
         beyond = bounds.beyond([values[part] for values in given], batch.positions[:, part])
-        status[beyond & np.isin(status, _UNDISTURBED)] = _LIMITED
+        status[beyond & (status < LIMITED)] = LIMITED
