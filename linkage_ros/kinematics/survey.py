@@ -135,11 +135,21 @@ class Way:
             if interval.whole or interval.lowest <= value <= interval.highest:
                 return interval
             if interval.turning and not self.input.limits.bounded:
-                middle = 0.5 * (interval.lowest + interval.highest)
-                shift = tau * round((value - middle) / tau)
-                if shift and interval.lowest <= value - shift <= interval.highest:
+                shift = self._shift(interval, value)
+                if shift:
                     return interval.shifted(shift)
         return None
+
+    def _shift(self, interval: InputRange, value: float) -> float:
+        """Return the turns by which a value lies beyond a range and in it all the same, or 0."""
+        middle = 0.5 * (interval.lowest + interval.highest)
+        turns = round((value - middle) / tau)
+        # Where only two turns lead back to where it was, one leads to another pose.
+        for shift in (turns * tau, (turns - 1) * tau, (turns + 1) * tau):
+            within = interval.lowest <= value - shift <= interval.highest
+            if shift and within and repeats(self.closure, self.position, value, -shift):
+                return shift
+        return 0.0
 
     @property
     def widest_range(self) -> InputRange | None:
