@@ -175,7 +175,7 @@ def _reach(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
     places: dict[Status, list[str]] = {status: [] for _, status in _SINGULAR}
     for singular in closure.singular_inputs:
         said = value_text(singular.value, way.turning)
-        beyond = '' if _is_reached(way, singular.value) else ', beyond the limits'
+        beyond = '' if _is_reached(way, singular.value) else ' beyond the limits'
         places[singular.status].append(said + beyond)
     for name, status in _SINGULAR:
         if places[status] or status is not Status.INDETERMINATE:
