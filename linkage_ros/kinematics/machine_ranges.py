@@ -66,7 +66,21 @@ def within_published(
     closure: Closure, ranges: Sequence[InputRange], bounds: Sequence[Bound]
 ) -> tuple[InputRange, ...]:
     """Return what limits of published joints leave of ranges of the single input."""
+    if not closure.bounds.inputs:
+        ranges = [copy for one in ranges for copy in _assemblies(closure, one)]
     return tuple(part for one in ranges for part in _searched(closure, one, bounds))
+
+
+def _assemblies(closure: Closure, interval: InputRange) -> Iterator[InputRange]:
+    """Yield a range, and the same a turn on where the poses there are others."""
+    yield interval
+    if not interval.turning or interval.whole:
+        return
+    # In the middle of a symmetrical range two pins may lie in one place.
+    place = 0.6 * interval.lowest + 0.4 * interval.highest
+    copy = _copied(closure, interval, tau)
+    if copy is not None and not repeats(closure, closure.position, place, tau):
+        yield copy
 
 
 def turns(closure: Closure, position: Callable[[float], Position]) -> int:
@@ -114,16 +128,16 @@ def _cut(closure: Closure, interval: InputRange, bound: Bound) -> Iterator[Input
 
 
 def _copied(closure: Closure, interval: InputRange, shift: float) -> InputRange | None:
-    """Return a range some turns on, none where the linkage is another one there."""
-    middle = 0.5 * (interval.lowest + interval.highest)
-    if not repeats(closure, closure.position, middle, shift):
-        return None
+    """Return a range some turns on, none where the linkage does not close there."""
+    inside = 0.6 * interval.lowest + 0.4 * interval.highest
 
     def closes(value: float) -> bool:
         return bool(closure.position(value).joints)
 
+    if not closes(inside + shift):
+        return None
     low, high = (
-        end if closes(end) else last_inside(closes, middle + shift, end)
+        end if closes(end) else last_inside(closes, inside + shift, end)
         for end in (interval.lowest + shift, interval.highest + shift)
     )
     return interval._replace(lowest=low, highest=high)

@@ -147,7 +147,10 @@ class Way:
         # Where only two turns lead back to where it was, one leads to another pose.
         for shift in (turns * tau, (turns - 1) * tau, (turns + 1) * tau):
             within = interval.lowest <= value - shift <= interval.highest
-            if shift and within and repeats(self.closure, self.position, value, -shift):
+            if not (shift and within):
+                continue
+            limited = bool(self.closure.bounds.joints)
+            if not limited or repeats(self.closure, self.position, value, -shift):
                 return shift
         return 0.0
 
