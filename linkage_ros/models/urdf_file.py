@@ -195,7 +195,11 @@ class _Reader:
             key: self._value(limit, key, where, default='0')
             for key in ('lower', 'upper', 'velocity', 'effort')
         }
-        for key, text in (made_up or {}).items():
+        book = dict(made_up or {})
+        if any(book.get(key, limit.get(key)) != limit.get(key) for key in ('lower', 'upper')):
+            # Somebody has put one of the two right, and left the other as it was.
+            book = {key: text for key, text in book.items() if key not in ('lower', 'upper')}
+        for key, text in book.items():
             if key in told and text == limit.get(key):
                 del told[key]
         low, high = told.get('lower', -inf), told.get('upper', inf)

@@ -134,7 +134,7 @@ REFUSED = {
     ),
     'never met by a joint': (
         ['', ', limits: [0.1, 0.2]'],
-        " [0.1, 0.2] of 'rocker_joint' are never met: it goes from 0.958196 to 2.24593; widen them",
+        " [0.1, 0.2] of 'rocker_joint' are never met: it goes from 0.958196 to 2.24593; widen",
     ),
     'never met by a joint while the input is within its own': (
         [', limits: [2, 2.5]', ', limits: [1, 1.2]'],
