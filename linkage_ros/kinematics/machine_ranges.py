@@ -222,7 +222,7 @@ def parts_within(
     margins = [margin(value) for value in values]
     places = set(values)
     for i in range(1, _SAMPLES):
-        before, here, after = margins[i - 1 : i + 2]
+        before, here, after = margins[i - 1], margins[i], margins[i + 1]
         # A valley or a summit that may reach to the other side of zero between two samples.
         if 0.0 < here <= min(before, after):
             places.add(golden(margin, values[i - 1], values[i + 1])[1])
