@@ -134,20 +134,14 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
     given = closure.linkage.inputs
     if len(given) > 1:
         return ()
-    ends = [
-        end
-        for interval in closure.input_ranges
-        if not interval.whole
-        for end, limited in zip(interval[:2], interval.limited, strict=True)
-        if limited
-    ]
+    ends = [end for interval in closure.closing_ranges for end in interval.toggles]
     found = [SingularInput(end, Status.TOGGLE) for end in ends]
     for number, step in enumerate(closure.steps):
         if not hasattr(step, 'transmission_angle') or isinstance(step, RPPDyad):
             continue
         places = _turned_by_input(closure, step)
         if places is None:
-            places = zeros(partial(_transmission_angle, closure, number), closure.input_ranges)
+            places = zeros(partial(_transmission_angle, closure, number), closure.closing_ranges)
         for place in places:
             status = _met(closure, number, place)
             distances = (abs(away(closure, place, one.value)) for one in found)
@@ -171,8 +165,8 @@ def _turned_by_input(closure: Closure, step: Any) -> list[float] | None:
 
 def _met(closure: Closure, number: int, place: float) -> Status | None:
     """Return what a dyad meets where it is singular; nothing where no loops close next to it."""
-    status = closure.position(place).status
-    beside = [closure.position(place + step) for step in (-_BESIDE, _BESIDE)]
+    status = closure.posed(place).status
+    beside = [closure.posed(place + step) for step in (-_BESIDE, _BESIDE)]
     if not any(position.status.has_pose for position in beside):
         return None
     if not status.has_pose:
@@ -187,7 +181,7 @@ def _met(closure: Closure, number: int, place: float) -> Status | None:
 
 def _transmission_angle(closure: Closure, number: int, value: float) -> float:
     """Return the transmission angle of a dyad at an input; 0 where it has no pose."""
-    position = closure.position(value)
+    position = closure.posed(value)
     if len(position.poses) <= number or not position.status.has_pose:
         return 0.0
     step: Any = closure.steps[number]

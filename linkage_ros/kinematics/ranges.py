@@ -44,10 +44,22 @@ class InputRange(NamedTuple):
     """
     An interval of an input in which every loop closes, in [rad] or [m]; turns not wrapped.
 
-    ``limited`` says of each end whether the linkage ends there; a slide may go on, beyond what was
-    searched. ``turns`` is how many whole turns of the input change nothing: one where dyads alone
-    are solved, several where links that are iterated come back after so many, and 0 where they
-    never do, so that each turn has poses of its own.
+    Attributes
+    ----------
+    lowest, highest
+        The ends.
+    turning
+        Whether the input is an angle.
+    limited
+        Of each end whether the linkage ends there; a slide may go on, beyond what was searched,
+        and so may an angle that is limited on one side.
+    turns
+        How many whole turns of the input change nothing: one where dyads alone are solved, several
+        where links that are iterated come back after so many, and 0 where they never do, so that
+        each turn has poses of its own.
+    by
+        Of each end the joint whose limits it is at; '' where there is another reason: a toggle.
+
     """
 
     lowest: float
@@ -55,12 +67,22 @@ class InputRange(NamedTuple):
     turning: bool = True
     limited: tuple[bool, bool] = (True, True)
     turns: int = 1
+    by: tuple[str, str] = ('', '')
 
     @property
     def whole(self) -> bool:
-        """Whether the input turns fully."""
+        """Whether the input turns fully, on and on."""
         width = self.highest - self.lowest
-        return self.turning and self.turns > 0 and width >= self.turns * tau
+        comes_round = self.turning and self.turns > 0 and self.by == ('', '')
+        return comes_round and width >= self.turns * tau
+
+    @property
+    def toggles(self) -> tuple[float, ...]:
+        """Return the ends at which a toggle lies: those that the linkage's lengths set."""
+        if self.whole:
+            return ()
+        ends = zip((self.lowest, self.highest), self.limited, self.by, strict=True)
+        return tuple(end for end, limited, by in ends if limited and not by)
 
     def shift(self, value: float) -> float:
         """Return the whole turns, in [rad], that bring a value nearest the middle of the range."""
@@ -74,11 +96,27 @@ class InputRange(NamedTuple):
             return 'every crank angle'
         if self.limited == (False, False) and not self.turning:
             return 'every slide'
-        return f'{self.lowest:.6g} to {self.highest:.6g} {"rad" if self.turning else "m"}'
+        low, high, unit = f'{self.lowest:.6g}', f'{self.highest:.6g}', self.unit
+        if self.by != ('', '') and self.limited != (True, True):
+            return f'{low} {unit} and more' if self.limited[0] else f'{high} {unit} and less'
+        return f'{low} to {high} {unit}'
+
+    def shifted(self, shift: float) -> InputRange:
+        """Return the range as far away as this."""
+        return self._replace(lowest=self.lowest + shift, highest=self.highest + shift)
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the input."""
+        return 'rad' if self.turning else 'm'
 
 
-def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
-    """Return the intervals of a single input; none where it closes nowhere, or of several."""
+def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:
+    """
+    Return where the lengths let a single input go, whatever limits its joints have.
+
+    None where it closes nowhere, and of several inputs.
+    """
     if len(closure.linkage.inputs) > 1:
         return ()
     branches = _branches(closure)
@@ -204,9 +242,9 @@ def search(
         value = low + (high - low) * i / samples
         if closes(value):
             if begin is None:
-                begin = _limit(closes, value, before) if i else value
+                begin = last_inside(closes, value, before) if i else value
         elif begin is not None:
-            yield begin, _limit(closes, before, value)
+            yield begin, last_inside(closes, before, value)
             begin = None
         before = value
     if begin is not None:
@@ -218,7 +256,7 @@ def _closes(closure: Closure) -> Callable[[float], bool]:
     return lambda value: closure.position(value).status.has_pose
 
 
-def _limit(closes: Callable[[float], bool], inside: float, outside: float) -> float:
+def last_inside(closes: Callable[[float], bool], inside: float, outside: float) -> float:
     """Return the last value at which the loops close, on the way to one at which they do not."""
     for _ in range(60):
         middle = 0.5 * (inside + outside)
