@@ -50,6 +50,7 @@ from linkage_ros.look import (
     observer,
     plain_look,
     sensing,
+    silent_beyond,
 )
 from linkage_ros.scene.scene import Member, Scene
 from linkage_ros.solvers.registry import SOLVERS
@@ -183,13 +184,15 @@ class Line:
             *before, delay = sensors
             sensors = [Delayed(before, delay)]
         with_rates = 'velocity' in named or 'velocity' not in computed
-        line = in_line([*sensors, *faulty], self.closure.turning, scene.wrapped, with_rates)
+        line = in_line([*sensors, *faulty], self.closure, scene.wrapped, with_rates)
         sense, gap = sensing(line), gap_seen(line)
         self._seeing_gaps: list[Any] = [sensor for sensor in line if hasattr(sensor, 'gap')]
         stages = list(built('stage').values())
         drive_stages = list(built('drive_stage').values())
         begin = built('begin').get('velocity', at_rest)
         state, close = self.drive.state, self.closure.position
+        if member.silent_beyond_limits and self.closure.bounds:
+            close = silent_beyond(close, self.closure)
         self.look: Callable[[int], Look]
         """Returns what the linkage comes to at a time, in [ns]."""
         publishing = {

@@ -28,8 +28,9 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.effects.stage import Begin, DriveStage, Motion, Reading, Sensor, Stage
-from linkage_ros.effects.turns import all_wrapped, continuous
-from linkage_ros.kinematics.closure import Position
+from linkage_ros.effects.turns import all_wrapped, beginnings, continuous
+from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.status import Status
 from linkage_ros.tuples import new
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ Gap = Callable[[int], Reading | None]
 
 
 def in_line(
-    sensors: Sequence[Sensor], turning: Sequence[bool], wrapped: bool, with_rates: bool
+    sensors: Sequence[Sensor], closure: Closure, wrapped: bool, with_rates: bool
 ) -> list[Sensor]:
     """
     Return all that a reading passes.
@@ -76,8 +77,8 @@ def in_line(
     ----------
     sensors
         What the scene calls for, in order.
-    turning
-        For each joint whether it is an angle.
+    closure
+        The linkage, which says of each joint whether it is an angle, and where that begins.
     wrapped
         Whether angles are published within a turn; before the sensors they run on.
     with_rates
@@ -86,10 +87,10 @@ def in_line(
     """
     behind: list[Sensor] = [] if with_rates else [_without_rates]
     if wrapped:
-        behind.append(all_wrapped(turning))
+        behind.append(all_wrapped(closure.turning))
         if not sensors:
             return behind
-    return [continuous(turning), *sensors, *behind]
+    return [continuous(closure.turning, beginnings(closure)), *sensors, *behind]
 
 
 def _without_rates(_now: int, reading: Reading) -> Reading:
@@ -174,6 +175,19 @@ def _chain(sensors: Sequence[Sensor]) -> Sensor:
         return found
 
     return chain
+
+
+def silent_beyond(close: Callable[..., Position], closure: Closure) -> Callable[..., Position]:
+    """Return what closes the loops, and has no joints to publish where one is beyond limits."""
+    exceeded = closure.bounds.exceeded
+
+    def within(*inputs: float) -> Position:
+        position = close(*inputs)
+        if position[2] and exceeded(inputs, position[2]) is not None:
+            return position._replace(status=Status.LIMITED, joints=())
+        return position
+
+    return within
 
 
 def plain_look(
