@@ -57,6 +57,7 @@ PLACES = {
 
 _UNIT = 1 / 64
 _LEAST_SPARE = 0.01
+_NEARLY_FLAT = 1e-3
 
 
 def _length(rng: random.Random) -> float:
@@ -131,7 +132,7 @@ class _Parts:
         """
         Return a side that changes at crank directions 0 and π from a line, or stays.
 
-        The line's direction is ``zero``, if given, which may differ from that of ``line`` by turns.
+        The line's direction is ``zero``, if given: that of ``line`` but for turns.
         """
         if self.chained and at != (True, True):
             return side
@@ -158,10 +159,14 @@ class _Parts:
         topology = Topology(
             linkage, tuple(self.groups), dict(self.sides), (0.0,), {}, (0.3,), flat
         )
-        return _started(topology, self.rng)
+        return _started(topology, self.rng, (line, at) if self.chained else None)
 
 
-def _started(topology: Topology, rng: random.Random) -> Topology | None:
+def _started(
+    topology: Topology,
+    rng: random.Random,
+    chained_line: tuple[complex, tuple[bool, bool]] | None,
+) -> Topology | None:
     """Return a topology that starts where it is farthest from its limits, if it closes."""
     geometry = Geometry(topology.linkage, topology.groups or (), topology.sides)
     inputs = np.array([[rng.uniform(-pi, pi) for _ in range(400)]], Real)
@@ -170,6 +175,13 @@ def _started(topology: Topology, rng: random.Random) -> Topology | None:
     best = int(np.nanargmax(spare))
     if spare[best] < _LEAST_SPARE:
         return None
+    if chained_line is not None:
+        # The rocker has to come by where the dyad lies flat.
+        line, at = chained_line
+        phi = np.angle(places.units['crank'] * np.conj(line))[spare > -_NEARLY_FLAT]
+        away = [np.abs(np.sin(0.5 * (phi - angle))).min() for angle in (0.0, pi)]
+        if not any(passed and off < 0.01 for off, passed in zip(away, at, strict=True)):
+            return None
     pose = {
         link: (
             float(np.angle(places.units[link][best])),

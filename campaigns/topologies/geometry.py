@@ -130,12 +130,16 @@ class Places:
         For each link the direction of its x axis and the place of its origin.
     margins
         Of each dyad that has limits.
+    crossings
+        Of each dyad of two lines the sine of the angle between them: where it passes 0, they are
+        parallel.
 
     """
 
     units: dict[str, Array] = field(default_factory=dict)
     origins: dict[str, Array] = field(default_factory=dict)
     margins: list[Margin] = field(default_factory=list)
+    crossings: list[Array] = field(default_factory=list)
 
 
 class Geometry:
@@ -324,6 +328,7 @@ class Geometry:
             start, line = self._line(name, dyad.pin)
             feet.append(places.origins[along] + places.units[along] * start)
             units.append(places.units[along] * line)
+        places.crossings.append((units[0].conj() * units[1]).imag)
         where = feet[0] + units[0] * _crossing(feet[1] - feet[0], units[0], units[1])
         for name in (dyad.one, dyad.two):
             self._block(places, name, dyad.pin, where)

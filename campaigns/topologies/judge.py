@@ -34,7 +34,7 @@ from campaigns.topologies.constraints import (
 )
 from campaigns.topologies.geometry import Geometry, Places
 from campaigns.topologies.topology import Topology
-from campaigns.topologies.walk import follow
+from campaigns.topologies.walk import follow, Walks
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
@@ -54,6 +54,9 @@ _ILL = 1e9
 
 _GROSS = 1e6
 """In u·κ: a position that is off by more is another one."""
+
+_BESIDE = 1e-4
+"""In [rad], of a change point: the mean of both sides is off by its square."""
 
 _STILL = 2.0**-10
 """Of the greatest κ of a state: that of a joint counts as this much at least."""
@@ -91,11 +94,11 @@ class Findings:
 class Truth:
     """What the equations say of some states: which close, and how the linkage moves there."""
 
-    def __init__(self, topology: Topology, inputs: Array) -> None:
+    def __init__(self, topology: Topology, inputs: Array, walks: Walks | None = None) -> None:
         self.equations = Equations(topology.linkage)
         self.inputs = inputs
         if topology.groups is None:
-            unknowns, self.state = follow(topology, self.equations, inputs)
+            unknowns, self.state = follow(topology, self.equations, inputs, walks)
             self.missed = np.full(inputs.shape[1], np.nan)
         else:
             geometry = Geometry(topology.linkage, topology.groups, topology.sides)
@@ -133,20 +136,38 @@ def _decide(places: Places, count: int) -> tuple[Array, Array]:
     return state, missed
 
 
-def judge_states(topology: Topology, rng: random.Random, findings: Findings) -> Closure | None:
-    """Compare positions, rates, accelerations and statuses; return what solves the linkage."""
-    closure = closure_of(topology, findings)
-    if closure is None:
-        return None
+def judge_states(
+    topology: Topology,
+    closure: Closure,
+    rng: random.Random,
+    findings: Findings,
+    walks: Walks | None,
+) -> None:
+    """
+    Compare positions, rates, accelerations and statuses.
+
+    Parameters
+    ----------
+    topology, closure
+        The linkage.
+    rng
+        Draws the states.
+    findings
+        Where what is found goes.
+    walks
+        The linkage followed, where it has a single input and links that no dyad covers.
+
+    """
     count = len(topology.start)
     inputs = np.array([_values(topology, rng, i) for i in range(count)], Real)
     rates = np.array([[rng.gauss(0.0, 1.0) for _ in range(STATES)] for _ in range(count)], Real)
     pulls = np.array([[rng.gauss(0.0, 1.0) for _ in range(STATES)] for _ in range(count)], Real)
-    truth = Truth(topology, inputs)
+    truth = Truth(topology, inputs, walks)
     answers = _scalar_answers(closure, inputs, rates, pulls, findings)
     _compare_arrays(closure, inputs, rates, pulls, answers, truth, findings)
     _compare(topology, closure, truth, answers, (rates, pulls), findings)
-    return closure
+    for at in topology.change_points:
+        _judge_change_point(topology, closure, at, findings)
 
 
 def closure_of(topology: Topology, findings: Findings) -> Closure | None:
@@ -185,7 +206,7 @@ def _scalar_answers(
         try:
             position = closure.position(*x)
             joints: tuple[tuple[float, ...], ...] = (position.joints,)
-            if position.status is Status.CLOSED:
+            if position.status.has_rates:
                 call = 'velocity'
                 velocity = closure.velocity(position, *v)
                 call = 'acceleration'
@@ -273,7 +294,7 @@ def _compare(
         if not kappa[0][:, column].max() < _ILL * max(1.0, closure.scale):
             findings.counts['states ill'] += 1
             continue
-        if position.status is not Status.CLOSED:
+        if not position.status.has_rates:
             findings.find('missed closure', f'{at}: {position.status.name}, but closes')
             continue
         errors = []
@@ -341,3 +362,39 @@ def _compare_points(
         worst = max(worst, abs(place - true))
     if not worst < 1e-6 * (closure.scale + equations.size):
         findings.find('points', f'{at}: off by {worst:.2g} m')
+
+
+def _judge_change_point(
+    topology: Topology, closure: Closure, value: float, findings: Findings
+) -> None:
+    """Compare a change point that is passed with what lies closely on both sides of it."""
+    beside = np.array([[value - _BESIDE, value + _BESIDE]], Real)
+    one, nought = np.ones_like(beside), np.zeros_like(beside)
+    truth = Truth(topology, beside)
+    if (truth.state != CLOSED).any():
+        return
+    motion = truth.equations.motion(truth.unknowns, beside, one, nought)
+    jumps = np.array(closure.turning)[:, None]
+    places = motion.joints[0] - motion.joints[0][:, :1]
+    places -= np.where(jumps, TURN * np.round(places / TURN), 0.0)
+    wanted = (motion.joints[0][:, 0] + 0.5 * places[:, 1], motion.joints[1].mean(1))
+    try:
+        position = closure.position(value)
+        if position.status is Status.INDETERMINATE:
+            # A straight rod whose pins meet, exactly or within their rounding.
+            findings.counts['pins that meet'] += 1
+            return
+        joints = [position.joints]
+        if position.status.has_rates:
+            joints.append(closure.velocity(position, 1.0).joints)
+    except Exception as error:  # noqa: BLE001 - it is counted
+        findings.find('traceback: change point', f'at {value}: {error!r}')
+        return
+    if not position.status.has_pose or (value == 0.0 and not position.status.has_rates):
+        findings.find('change point: status', f'at {value}: {position.status.name}')
+    for name, found, true in zip(('position', 'velocity'), joints, wanted, strict=False):
+        off = np.array(found, Real) - true if found else np.zeros(1, Real)
+        if found and name == 'position':
+            off -= np.where(jumps[:, 0], TURN * np.round(off / TURN), 0.0)
+        if not np.abs(off).max() < 1e-5 * (1.0 + np.abs(true).max()):
+            findings.find(f'change point: {name}', f'at {value}: off by {np.abs(off).max():.2g}')

@@ -121,7 +121,13 @@ def start_of(topology: Topology, equations: Equations) -> tuple[Array, Array]:
     return equations.correct(rough, begin)[0], begin
 
 
-def follow(topology: Topology, equations: Equations, inputs: Array) -> tuple[Array, Array]:
+Walks = tuple[Walk, Walk]
+"""A linkage with a single input followed down and up from where it was made."""
+
+
+def follow(
+    topology: Topology, equations: Equations, inputs: Array, both: Walks | None
+) -> tuple[Array, Array]:
     """
     Return poses (n, N) at inputs, and whether the linkage can be followed there.
 
@@ -133,8 +139,7 @@ def follow(topology: Topology, equations: Equations, inputs: Array) -> tuple[Arr
     count = inputs.shape[1]
     unknowns = np.zeros((equations.count, count), Real)
     state = np.full(count, 'unknown', object)
-    if len(topology.start) == 1:
-        both = both_ways(topology, equations)
+    if both is not None:
         for k in range(count):
             value = float(inputs[0, k] - begin[0, 0])
             part = both[value > 0]
@@ -162,8 +167,9 @@ def follow(topology: Topology, equations: Equations, inputs: Array) -> tuple[Arr
     return unknowns, state
 
 
-def both_ways(topology: Topology, equations: Equations, turns: float = 0.75) -> tuple[Walk, Walk]:
+def both_ways(topology: Topology, turns: float = 1.25) -> Walks:
     """Return a linkage with a single input followed down and up from where it was made."""
+    equations = Equations(topology.linkage)
     start, begin = start_of(topology, equations)
     length, spacing = turns * tau, tau / _KNOTS
     if topology.linkage.inputs[0].slider:
