@@ -25,11 +25,13 @@ from pathlib import Path
 import random
 import signal
 import tempfile
+from threading import Event
 import traceback
 from typing import Any
+from unittest import mock
 
 from campaigns.topologies.judge import Findings
-from linkage_ros.cli.main import main
+from linkage_ros.cli import main as command_line
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.scene.linkage_text import linkage_text
 
@@ -87,7 +89,7 @@ def _run(arguments: list[str]) -> tuple[Any, str]:
     said, shown = io.StringIO(), io.StringIO()
     try:
         with redirect_stdout(shown), redirect_stderr(said), _bounded():
-            return main(arguments), said.getvalue()
+            return command_line.main(arguments), said.getvalue()
     except _TooLongError:
         return 'no end', f'more than {_SECONDS} s'
     except SystemExit as stopped:
@@ -112,7 +114,9 @@ def _bounded() -> Iterator[None]:
     before = signal.signal(signal.SIGALRM, stop)
     signal.setitimer(signal.ITIMER_REAL, _SECONDS)
     try:
-        yield
+        # The signals stay the campaign's: a pool ends its processes by them.
+        with mock.patch.object(command_line, 'stop_on_signals', Event):
+            yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)

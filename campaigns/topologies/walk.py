@@ -33,7 +33,7 @@ import numpy as np
 _KNOTS = 180
 """Steps to a turn, or to three lengths of a slide."""
 
-_SMALLEST = 2.0**-36
+_SMALLEST = 2.0**-26
 _CLOSE = 0.05
 """What a correction may be, of what the step moves by, and at most of the linkage's size."""
 
