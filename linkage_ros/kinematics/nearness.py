@@ -18,11 +18,13 @@
 from __future__ import annotations
 
 from functools import partial
-from math import inf, pi, remainder, sin, sqrt, tau
+from math import atan, inf, pi, remainder, sin, sqrt, tau
 from operator import attrgetter
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.kinematics.dyads.prp import PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
+from linkage_ros.kinematics.dyads.rpr import RPRDyad
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
@@ -127,7 +129,8 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
 
     Toggles end the ranges of the input. Where the links of a dyad's two outer pins turn with the
     input, its constants tell at which angles its links lie in one line, or its lines are parallel.
-    Of all other dyads the transmission angle is searched over the ranges for where it is 0.
+    Of all other dyads the transmission angle is searched over the ranges for where it is 0, and of
+    a straight rod in a swivel, whose angle never is, the distance of the two pins.
     """
     from linkage_ros.kinematics.survey import zeros  # local import: it needs the closure
 
@@ -147,7 +150,7 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
             continue
         places = _turned_by_input(closure, step)
         if places is None:
-            places = zeros(partial(_transmission_angle, closure, number), closure.input_ranges)
+            places = zeros(partial(_room, closure, number), closure.input_ranges)
         for place in places:
             status = _met(closure, number, place)
             distances = (abs(away(closure, place, one.value)) for one in found)
@@ -175,7 +178,8 @@ def _met(closure: Closure, number: int, place: float) -> Status | None:
     beside = [closure.position(place + step) for step in (-_BESIDE, _BESIDE)]
     if not any(position.status.has_pose for position in beside):
         return None
-    if not status.has_pose:
+    if not status.has_pose or _never_toggles(closure.steps[number]):
+        # The float next to where lines are parallel, or pins meet, may have a pose.
         return Status.INDETERMINATE
     if status is Status.CLOSED and all(position.status.has_pose for position in beside):
         # The floats next to it, of a dyad that follows others: does it come out on its other side?
@@ -185,10 +189,18 @@ def _met(closure: Closure, number: int, place: float) -> Status | None:
     return status if status is Status.CHANGE_POINT else Status.TOGGLE
 
 
-def _transmission_angle(closure: Closure, number: int, value: float) -> float:
-    """Return the transmission angle of a dyad at an input; 0 where it has no pose."""
+def _never_toggles(step: Any) -> bool:
+    """Return whether a dyad is singular only where its lines are parallel or its pins meet."""
+    return isinstance(step, PRPDyad) or (isinstance(step, RPRDyad) and not step.offset)
+
+
+def _room(closure: Closure, number: int, value: float) -> float:
+    """Return how far a dyad is from being singular at an input, in [rad]; 0 without a pose."""
     position = closure.position(value)
     if len(position.poses) <= number or not position.status.has_pose:
         return 0.0
     step: Any = closure.steps[number]
-    return float(step.transmission_angle(position.poses[number]))
+    pose: Any = position.poses[number]
+    if isinstance(step, RPRDyad) and not step.offset:
+        return atan(abs(pose.slide))
+    return float(step.transmission_angle(pose))

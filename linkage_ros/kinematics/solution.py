@@ -395,8 +395,12 @@ class Planner(KnownLinks):
                 arm = self.arm(link, pivot, pin) * angle.unit * base.unit.conjugate()
                 place = (self.points[on][pivot] - line.start) * line.direction.conjugate()
                 arms = angle.coordinate, base.coordinate
-                kind = CrankRail if self._driven_only(arms) else UnsignedRail
-                return kind(arm, place, length, arms)
+                rail = CrankRail(arm, place, length, arms)
+                # As a parallelogram: both roots change their sign with a whole turn.
+                turns_matter = len(rail.singular_angles) < 2
+                if turns_matter and not self._driven_only(arms):
+                    return UnsignedRail(arm, place, length, arms)
+                return rail
         ends = self.place(on, line.start), self.place_pin(pin)
         return FreeRail(ends, length, base.coordinate, base.unit)
 

@@ -96,6 +96,11 @@ class RPRDyad:
         self.diagonal = diagonal
         self._constants = (offset, float(sign))
 
+    @property
+    def offset(self) -> float:
+        """Return h; 0 of a straight rail."""
+        return self._constants[0]
+
     def close(self, known: State) -> RPRPose:
         """Append the direction of the rail, and the slide."""
         offset, sign = self._constants
