@@ -20,12 +20,15 @@ from __future__ import annotations
 from math import inf, remainder, tau
 from typing import NamedTuple
 
+from campaigns.accuracy.dyads.rpr import RPR
 from campaigns.topologies.constraints import Array, Real
-from campaigns.topologies.geometry import Geometry, Margin
+from campaigns.topologies.geometry import Geometry, Margin, Passing
 from campaigns.topologies.judge import Findings
 from campaigns.topologies.topology import Topology
 from campaigns.topologies.walk import Walks
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.nearness import SingularInput
+from linkage_ros.kinematics.status import Status
 import numpy as np
 
 SAMPLES = 2400
@@ -69,7 +72,7 @@ def judge_ranges(
     turning = not topology.linkage.inputs[0].slider
     try:
         ranges = closure.input_ranges
-        critical = closure.critical_inputs
+        singular = closure.singular_inputs
         position = closure.position(*topology.start)
         distance = closure.nearness(position).toggle_distance if position.joints else inf
     except Exception as error:  # noqa: BLE001 - it is counted
@@ -97,24 +100,44 @@ def judge_ranges(
         if said and not inside:
             findings.find('range: too wide', f'{value:.9g} is open, but in {ranges}')
             break
-    true = [*travel.ends, *travel.changes]
-    for kind, places in (
-        ('toggle', travel.ends),
-        ('change point', travel.changes),
-        ('parallel lines', travel.parallels),
-    ):
-        for place in places:
-            if not _is_near(place, critical, same, turning):
-                findings.find(f'singular: {kind} not listed', f'{place:.9g}, not in {critical}')
-                break
-    for place in critical:
-        if not _is_near(place, [*true, *travel.parallels], same, turning):
-            findings.find('singular: listed, is none', f'{place:.9g}')
-            break
+    _judge_singular(topology, travel, singular, same, findings)
+    true = [*travel.ends, *travel.changes, *travel.parallels]
     away = [_apart(topology.start[0], place, turning) for place in true]
     nearest = min(away, default=inf)
     if nearest < inf and not abs(distance - nearest) <= same:
         findings.find('singular: distance', f'{distance:.6g}, in truth {nearest:.6g}')
+
+
+def _judge_singular(
+    topology: Topology,
+    travel: Travel,
+    singular: tuple[SingularInput, ...],
+    same: float,
+    findings: Findings,
+) -> None:
+    """Compare the values that are listed with those that there are, by their kind."""
+    turning = not topology.linkage.inputs[0].slider
+    passed = any(isinstance(side, Passing) for side in topology.sides.values())
+    at_changes = {Status.CHANGE_POINT if passed else Status.TOGGLE}
+    if isinstance((topology.groups or ())[-1], RPR):
+        at_changes.add(Status.INDETERMINATE)  # A straight rod whose pins meet.
+    unmatched = list(singular)
+    for kind, places, statuses in (
+        ('toggle', travel.ends, {Status.TOGGLE}),
+        ('change point', travel.changes, at_changes),
+        ('parallel lines', travel.parallels, {Status.INDETERMINATE}),
+    ):
+        for place in places:
+            near = [one for one in singular if _apart(place, one.value, turning) <= same]
+            unmatched = [one for one in unmatched if one not in near]
+            said = [one.value for one in singular]
+            if not near:
+                findings.find(f'singular: {kind} not listed', f'{place:.9g}, not in {said}')
+            elif not any(one.status in statuses for one in near):
+                note = f'{place:.9g} is a {near[0].status.value}'
+                findings.find(f'singular: {kind} called other', note)
+    if unmatched:
+        findings.find('singular: listed, is none', f'{unmatched[0].value:.9g}')
 
 
 def _judge_branch(topology: Topology, closure: Closure, walks: Walks, findings: Findings) -> None:
@@ -186,7 +209,11 @@ def _travel(geometry: Geometry, start: float, far: float, turning: bool) -> Trav
     if turning and closes[0] != closes[-1]:
         # The border lies at half a turn, where the samples begin again.
         ends.append(np.pi)
-    parallels = _parallel(places.crossings, values, closes)
+    # Lines may be parallel between an end and the sample next to it.
+    fine = np.sort(np.concatenate([values, inner]))
+    there = geometry.place(fine[None, :].astype(Real))
+    open_ones = (_spare(there.margins, len(fine)) < -_FLAT).any(0)
+    parallels = _parallel(geometry, there.crossings, fine, ~open_ones)
     # Next to parallel lines a dyad is far away, and small against that.
     changes = _flat(geometry, values, spare, closes, [*ends, *parallels])
     return Travel(parts, ends, changes, parallels)
@@ -224,13 +251,21 @@ def _flat(
     return found
 
 
-def _parallel(crossings: list[Array], values: Array, closes: Array) -> list[float]:
-    found = []
-    for row in crossings:
+def _parallel(
+    geometry: Geometry, crossings: list[Array], values: Array, closes: Array
+) -> list[float]:
+    """Return where two lines of a dyad are parallel."""
+    found: list[float] = []
+    for k, row in enumerate(crossings):
         both = closes[:-1] & closes[1:]
-        for i in np.flatnonzero(both & (row[:-1] * row[1:] < 0.0)):
-            part = float(row[i] / (row[i] - row[i + 1]))
-            found.append(float(values[i] + part * (values[i + 1] - values[i])))
+        borders = np.flatnonzero(both & (row[:-1] * row[1:] < 0.0))
+        low, high, below = values[borders], values[borders + 1], row[borders]
+        for _ in range(50 if len(borders) else 0):
+            middle = 0.5 * (low + high)
+            at = geometry.place(middle[None, :].astype(Real)).crossings[k]
+            same = at * below > 0.0
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        found += low.tolist()
     return found
 
 
@@ -244,7 +279,3 @@ def _reach(topology: Topology) -> float:
 
 def _apart(one: float, other: float, turning: bool) -> float:
     return abs(remainder(one - other, tau) if turning else one - other)
-
-
-def _is_near(place: float, places: object, same: float, turning: bool) -> bool:
-    return any(_apart(place, other, turning) <= same for other in places)  # type: ignore[attr-defined]

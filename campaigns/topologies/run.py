@@ -161,16 +161,17 @@ def parts(
         By how much fewer linkages of class III are tried: each is followed step by step.
 
     """
-    families = list(families)
+    weights = {family: 1 if family.startswith('class III') else slow for family in families}
     work = []
     for what, count in wanted.items():
-        for i, family in enumerate(families):
-            share = count
+        done, passed = 0, 0
+        for family, weight in weights.items():
+            passed += weight
+            share = -(-count * weight // slow)
             if what != KINEMATICS:
-                # The first families have what does not divide.
-                share = count // len(families) + (i < count % len(families))
-            elif family.startswith('class III'):
-                share = -(-count // slow)
+                # So that all shares come to the whole.
+                share = count * passed // sum(weights.values()) - done
+            done += share
             work += [
                 Part(seed, family, first, min(_PART, share - first), what)
                 for first in range(0, share, _PART)

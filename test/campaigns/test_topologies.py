@@ -40,14 +40,16 @@ from campaigns.topologies.run import (
 from campaigns.topologies.topology import Topology
 from campaigns.topologies.walk import start_of
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.nearness import SingularInput
 from linkage_ros.kinematics.ranges import InputRange
+from linkage_ros.kinematics.status import Status
 import numpy as np
 import pytest
 
 SEED = 20261122
 """Not the campaign's own: its findings went into the code."""
 
-WANTED = {KINEMATICS: 2, CHECK: 60, CHECK_SPOILT: 60, FILE: 6}
+WANTED = {KINEMATICS: 3, CHECK: 120, CHECK_SPOILT: 120, FILE: 9}
 
 
 @pytest.fixture(scope='module')
@@ -146,11 +148,14 @@ def test_wrong_ranges_and_singular_inputs_are_found() -> None:
     topology = topology_of('RRR input–ground', has_limits)
     closure = Closure(topology.linkage)
     (low, high, *_), *_ = closure.input_ranges
+    other = SingularInput(0.5 * (low + high), Status.TOGGLE)
+    passed = [one._replace(status=Status.CHANGE_POINT) for one in closure.singular_inputs]
     for wrong, finding in (
         ({'input_ranges': (InputRange(low, high - 0.01),)}, 'range: a part is missing'),
         ({'input_ranges': (InputRange(low, high + 0.01),)}, 'range: too wide'),
-        ({'critical_inputs': ()}, 'singular: toggle not listed'),
-        ({'critical_inputs': (*closure.critical_inputs, 0.3)}, 'singular: listed, is none'),
+        ({'singular_inputs': ()}, 'singular: toggle not listed'),
+        ({'singular_inputs': (*closure.singular_inputs, other)}, 'singular: listed, is none'),
+        ({'singular_inputs': passed}, 'singular: toggle called other'),
     ):
         findings = Findings()
         judge_ranges(topology, Wrong(closure, **wrong), findings, None)  # type: ignore[arg-type]
