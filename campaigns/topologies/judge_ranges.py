@@ -146,11 +146,11 @@ def _judge_branch(topology: Topology, closure: Closure, walks: Walks, findings: 
     start = topology.start[0]
     down, up = walks
     ranges = closure.input_ranges
-    turns = (-tau, 0.0, tau) if turning else (0.0,)
+    turns = (0.0, -tau, tau) if turning else (0.0,)
     about = [
         (interval, turn)
-        for interval in ranges
         for turn in turns
+        for interval in ranges
         if interval.whole or interval.lowest <= start + turn <= interval.highest
     ]
     if not about:
@@ -167,13 +167,17 @@ def _judge_branch(topology: Topology, closure: Closure, walks: Walks, findings: 
         true, said = start + sign * walk.end, end - turn
         same = _SAME * max(1.0, abs(true))
         short = sign * (true - said)
-        if short > same and not (turning and interval.highest - interval.lowest >= tau):
-            # A slide is looked at only as far as some length.
-            limited = interval.limited[sign > 0]
-            if limited:
-                findings.find('range: a part is missing', f'to {true:.9g}, said {said:.9g}')
+        # A slide is looked at only as far as some length.
+        if short > same and interval.limited[sign > 0]:
+            findings.find('range: a part is missing', f'to {true:.9g}, said {said:.9g}')
         elif short < -same and not walk.complete:
             findings.find('range: too wide', f'to {true:.9g}, said {said:.9g}')
+        listed = [one.value for one in closure.singular_inputs]
+        if (
+            not walk.complete
+            and min((_apart(true, v, turning) for v in listed), default=inf) > same
+        ):
+            findings.find('singular: toggle not listed', f'{true:.9g}, not in {listed}')
 
 
 def _samples(start: float, far: float, turning: bool) -> Array:
