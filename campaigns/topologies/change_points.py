@@ -334,7 +334,7 @@ def _families() -> dict[str, tuple[str, Callable[[random.Random], Topology]]]:
             for crank in (True, False):
                 carrier = 'the crank' if crank else 'the ground'
                 found[f'RPR {name}, rail on {carrier}{place}'] = (
-                    f'an RPR dyad {where}, its rail {name} and pinned to {carrier}, |d − a| = |h|',
+                    f'an RPR dyad {where}, its rail {name} and pinned to {carrier}, flat exactly',
                     _until_it_closes(_rpr(bent, crank, place)),
                 )
         for name, below, above in (

@@ -38,8 +38,8 @@ from linkage_ros.scene.linkage_text import linkage_text
 FILES = ('draw', 'urdf', 'mjcf')
 """Commands that write a file; beside these there are `check`, and `accuracy`, which is slow."""
 
-_SECONDS = 120
-"""A command that takes longer has not ended."""
+_SECONDS = 600
+"""A command that takes longer has not ended; on a free machine the slowest takes some 15 s."""
 
 
 class _TooLongError(BaseException):

@@ -52,6 +52,9 @@ _AT_LIMIT = 1e-12
 _ILL = 1e9
 """From this condition on, nothing is compared: 1e-7 of a position would be rounding."""
 
+LIMIT = 16.0
+"""In u·κ, beyond which an error is a finding: κ is drawn five times, and may come out small."""
+
 _GROSS = 1e6
 """In u·κ: a position that is off by more is another one."""
 
@@ -316,6 +319,8 @@ def _compare(
             continue
         for name, error in zip(QUANTITIES, errors, strict=True):
             findings.errors.setdefault(name, []).append(error)
+            if error > LIMIT:
+                findings.find(f'error: {name}', f'{at}: {error:.3g} u·κ')
         if column == 0:
             _compare_points(closure, truth.equations, motion, position, at, findings)
 

@@ -46,10 +46,10 @@ and the worst.
   misses by. *arrays*: not the same as one by one. *points*: places of points.
 - *range*: a part of it is missing, or it is too wide. *singular*: a toggle, a change point or two
   parallel lines of a dyad that are not listed, or what is listed and is none.
-- *traceback*: an exception that no user should see.
+- *error*: one of more than 16 u·κ. *traceback*: an exception that no user should see.
 """
 
-OUTCOMES = ('linkages', 'states closed', 'states open', 'states at limit', 'states ill')
+OUTCOMES = ('linkages', 'states closed', 'states open')
 
 
 def kinematics_table(tallies: Mapping[str, Tally]) -> Table:
@@ -61,16 +61,18 @@ def kinematics_table(tallies: Mapping[str, Tally]) -> Table:
     total: Counter[str] = Counter()
     for family, tally in tallies.items():
         total += tally.counts
-        found = max(tally.found_with.values(), default=0)
+        found = tally.counts['linkages with findings']
         table.rows.append(
             [
                 family,
-                *(f'{tally.counts[name]:,}' for name in OUTCOMES[:3]),
+                *(f'{tally.counts[name]:,}' for name in OUTCOMES),
                 *(_worst(tally, name) for name in QUANTITIES),
                 f'{found:,}' if found else '',
             ]
         )
-    table.rows.append(['all', *(f'{total[name]:,}' for name in OUTCOMES[:3]), '', '', '', ''])
+    found = total['linkages with findings']
+    ends = ['', '', '', f'{found:,}' if found else '']
+    table.rows.append(['all', *(f'{total[name]:,}' for name in OUTCOMES), *ends])
     return table
 
 

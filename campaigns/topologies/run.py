@@ -82,6 +82,7 @@ class Tally:
         """Add the findings of one linkage."""
         self.counts += findings.counts
         self.counts['linkages'] += 1
+        self.counts['linkages with findings'] += bool(findings.notes)
         for name, text in findings.notes:
             self.found_with[name] += 1
             self._keep(name, [Note(name, linkage, text)])
