@@ -32,7 +32,7 @@ from linkage_ros.kinematics.status import Status
 import numpy as np
 
 SAMPLES = 2400
-"""Of the walk, over a turn or over as far as a slide may reach; the pose is one of them."""
+"""Of the walk, over a turn from end to end, or as far as a slide may reach; the pose is one."""
 
 _FLAT = 1e-13
 """Of a dyad's lengths: what it has to spare at a change point, but for rounding."""
@@ -182,7 +182,8 @@ def _judge_branch(topology: Topology, closure: Closure, walks: Walks, findings: 
 
 def _samples(start: float, far: float, turning: bool) -> Array:
     if turning:
-        return np.sort((start + np.arange(SAMPLES) * (tau / SAMPLES) + np.pi) % tau - np.pi)
+        first = (start + np.pi) % (tau / SAMPLES) - np.pi
+        return np.asarray(first + np.arange(SAMPLES + 1) * (tau / SAMPLES))
     return np.sort(np.append(np.linspace(-far, far, SAMPLES), start))
 
 
@@ -210,16 +211,13 @@ def _travel(geometry: Geometry, start: float, far: float, turning: bool) -> Trav
             low = edge
     if low is not None:
         parts.append((low, inf))
-    if turning and closes[0] != closes[-1]:
-        # The border lies at half a turn, where the samples begin again.
-        ends.append(np.pi)
     # Lines may be parallel between an end and the sample next to it.
     fine = np.sort(np.concatenate([values, inner]))
     there = geometry.place(fine[None, :].astype(Real))
     open_ones = (_spare(there.margins, len(fine)) < -_FLAT).any(0)
     parallels = _parallel(geometry, there.crossings, fine, ~open_ones)
     # Next to parallel lines a dyad is far away, and small against that.
-    changes = _flat(geometry, values, spare, closes, [*ends, *parallels])
+    changes = _flat(geometry, values, spare, closes, [*ends, *parallels], turning)
     return Travel(parts, ends, changes, parallels)
 
 
@@ -232,14 +230,21 @@ def _spare(margins: list[Margin], count: int) -> Array:
 
 
 def _flat(
-    geometry: Geometry, values: Array, spare: Array, closes: Array, borders: list[float]
+    geometry: Geometry,
+    values: Array,
+    spare: Array,
+    closes: Array,
+    borders: list[float],
+    turning: bool,
 ) -> list[float]:
     """Return where a dyad has nothing to spare and goes on."""
     found: list[float] = []
     for k, row in enumerate(spare):
         for i in range(len(row)):
-            # A turn begins where it ends.
-            before, after = row[i - 1], row[(i + 1) % len(row)]
+            # A turn begins where it ends: at one value twice.
+            last = len(row) - 1
+            before = row[i - 1 if i or not turning else last - 1]
+            after = row[i + 1 if i < last else 1 if turning else last]
             if not (closes[i] and row[i] < _NEARLY_FLAT and row[i] <= min(before, after)):
                 continue
             width = float(values[1] - values[0])
