@@ -69,6 +69,7 @@ def judge_command(command: str, linkage: Linkage, findings: Findings, closes: bo
         arguments = [command, str(file)]
         if command == 'accuracy':
             arguments.append('--quick')
+            arguments += ['-o', str(Path(folder) / 'page')]
         if output:
             arguments += ['-o', str(Path(folder) / f'out.{output}')]
         code, said = _run(arguments)

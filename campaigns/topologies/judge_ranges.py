@@ -240,7 +240,8 @@ def _flat(
     """Return where a dyad has nothing to spare and goes on."""
     found: list[float] = []
     for k, row in enumerate(spare):
-        for i in range(len(row)):
+        # Where a slide is looked at no farther, it may be stretched, and need not go on.
+        for i in range(0 if turning else 1, len(row) - (0 if turning else 1)):
             # A turn begins where it ends: at one value twice.
             last = len(row) - 1
             before = row[i - 1 if i or not turning else last - 1]
