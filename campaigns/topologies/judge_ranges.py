@@ -27,6 +27,7 @@ from campaigns.topologies.judge import Findings
 from campaigns.topologies.topology import Topology
 from campaigns.topologies.walk import Walks
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.nearness import SingularInput
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -83,7 +84,12 @@ def judge_ranges(
         return
     far = np.pi if turning else _reach(topology)
     geometry = Geometry(topology.linkage, topology.groups or (), topology.sides)
-    travel = _travel(geometry, topology.start[0], far, turning)
+    start = topology.start[0]
+    travel = _travel(geometry, start, far, turning)
+    zero = _zero_length(topology)
+    if zero is not None:
+        start = abs(start - zero) + zero
+        travel = _longer(travel, zero)
     same = _SAME * (1.0 if turning else far)
     values = _samples(topology.start[0], far, turning)
     for value in values:
@@ -102,10 +108,40 @@ def judge_ranges(
             break
     _judge_singular(topology, travel, singular, same, findings)
     true = [*travel.ends, *travel.changes, *travel.parallels]
-    away = [_apart(topology.start[0], place, turning) for place in true]
+    away = [_apart(start, place, turning) for place in true]
     nearest = min(away, default=inf)
     if nearest < inf and not abs(distance - nearest) <= same:
         findings.find('singular: distance', f'{distance:.6g}, in truth {nearest:.6g}')
+
+
+def _zero_length(topology: Topology) -> float | None:
+    """Return the slide at which the two pins of a cylinder meet, None where there is none."""
+    linkage = topology.linkage
+    slider = linkage.sliders.get(linkage.inputs[0].slider)
+    if slider is None or GROUND in (slider.along, slider.block):
+        return None
+    others = [name for one in linkage.sliders.values() for name in (one.along, one.block)]
+    shared = [name for points in linkage.links.values() for name in points]
+    ends = []
+    for link in (slider.along, slider.block):
+        pins = [name for name in linkage.links.get(link, {}) if shared.count(name) > 1]
+        if len(pins) != 1 or others.count(link) > 1:
+            return None
+        ends.append(complex(*linkage.links[link][pins[0]]))
+    tube, rod = linkage.links[slider.along], linkage.links[slider.block]
+    line = complex(*slider.direction) / abs(complex(*slider.direction))
+    arm = (ends[1] - complex(*rod[slider.point])) * np.exp(1j * slider.angle)
+    between = complex(*tube[slider.through]) + arm - ends[0]
+    across = (between * line.conjugate()).imag
+    return None if abs(across) > 1e-12 * abs(between) else -(between * line.conjugate()).real
+
+
+def _longer(travel: Travel, zero: float) -> Travel:
+    """Return what of a cylinder's way lies beyond the slide at which its pins meet."""
+    return Travel(
+        [(max(low, zero), high) for low, high in travel.parts if high > zero],
+        *([one for one in places if one > zero] for places in travel[1:]),
+    )
 
 
 def _judge_singular(

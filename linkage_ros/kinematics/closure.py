@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import quoted
 from linkage_ros.kinematics.checks import check
-from linkage_ros.kinematics.cylinder import without_mirrored
+from linkage_ros.kinematics.cylinder import without_mirrored, zero_length
 from linkage_ros.kinematics.groups import find_groups
 from linkage_ros.kinematics.limits import Bounds, limited
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
@@ -441,6 +441,11 @@ class Closure:
         """
         found = closing_ranges(self)
         return without_mirrored(self.linkage, self.structure, 0, found) if found else ()
+
+    @cached_property
+    def zero_length(self) -> float | None:
+        """Slide at which the two pins of a cylinder meet, in [m]; None without one."""
+        return zero_length(self.linkage, self.structure, 0)
 
     def nearness(self, position: Position) -> Nearness:
         """Return how near trouble a closed position is."""

@@ -103,7 +103,7 @@ def nearness(closure: Closure, position: Position) -> Nearness:
     if len(closure.linkage.inputs) == 1:
         sliding = bool(closure.linkage.inputs[0].slider)
         unit = closure.scale if sliding else 1.0
-        value = position.state.coordinates[1] * unit
+        value = _within(closure, position.state.coordinates[1] * unit)
         for singular in closure.singular_inputs:
             distance = min(distance, abs(away(closure, value, singular.value)))
     return Nearness(angle, conditioning, distance, weakest)
@@ -152,6 +152,15 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
             if status is not None and all(apart > _SAME for apart in distances):
                 found.append(SingularInput(place, status))
     return tuple(sorted(found, key=attrgetter('value')))
+
+
+def _within(closure: Closure, value: float) -> float:
+    """Return the input of the same pose within the ranges: of a cylinder its other length."""
+    zero = closure.zero_length
+    ranges = closure.closing_ranges
+    if zero is None or any(one.lowest <= value <= one.highest for one in ranges):
+        return value
+    return 2.0 * zero - value
 
 
 def _turned_by_input(closure: Closure, step: Any) -> list[float] | None:

@@ -115,7 +115,7 @@ def four_bar(rng: random.Random) -> Flat:
         'coupler': {'A': (0.0, 0.0), 'B': (b, 0.0)},
         'rocker': {'D': (0.0, 0.0), 'B': (c, 0.0)},
     }
-    linkage, sign = _linkage(rng, links, {'B': side}, {}, 'rocker')  # type: ignore[dict-item]
+    linkage, sign = _linkage(rng, links, {'B': side}, {}, 'rocker')
 
     def left(points: Points) -> float:
         pin, pivot = points['crank', 'A'], points['ground', 'D']
@@ -142,7 +142,7 @@ def swivel(rng: random.Random) -> Flat:
         'rail': {pin: (0.0, 0.0), 'Q': (0.0, offset), 'T': (1.0, 0.0)},
     }
     slider = Slider(swivelled, 'rail', 'Q' if offset else pin, (1.0, 0.0))
-    linkage, sign = _linkage(rng, links, {'slide': side}, {'slide': slider}, 'rail')  # type: ignore[dict-item]
+    linkage, sign = _linkage(rng, links, {'slide': side}, {'slide': slider}, 'rail')
 
     def ahead(points: Points) -> float:
         start, end = points['crank', 'A'], points['ground', 'D']
@@ -172,7 +172,7 @@ def slider_crank(rng: random.Random) -> Flat:
     if not e:
         links['ground'] = {'O': (0.0, 0.0)}
     slider = Slider('B', 'ground', 'Q' if e else 'O', (1.0, 0.0))
-    linkage, sign = _linkage(rng, links, {'slide': side}, {'slide': slider}, 'rod')  # type: ignore[dict-item]
+    linkage, sign = _linkage(rng, links, {'slide': side}, {'slide': slider}, 'rod')
 
     def ahead(points: Points) -> float:
         return (points['rod', 'B'] - points['crank', 'A']).real
