@@ -262,11 +262,11 @@ masses: {ram: {mass: 4, center: [0, 0], inertia: 0.001}}
 
 def test_torque_with_backlash_is_refused_in_one_line():
     for effects in ('{backlash: {play: 0.1}}', '{velocity: {}, backlash: {play: 0}}'):
+        files = {
+            'scene.yaml': f'linkage: l\ndrive: {{torque: {{}}}}\neffects: {effects}'.encode(),
+            'linkage.yaml': CRANK.encode(),
+        }
         with pytest.raises(FileError) as refused:
-            files = {
-                'scene.yaml': f'linkage: l\ndrive: {{torque: {{}}}}\neffects: {effects}'.encode(),
-                'linkage.yaml': CRANK.encode(),
-            }
             parse_scene('scene', 'here', files)
         assert str(refused.value) == (
             'here: scene.yaml:3: effects.backlash: needs a model of motor and crank as two '
@@ -289,5 +289,5 @@ def test_of_several_linkages_that_with_torque_may_have_none():
 
     turning = 'drive: {constant_rate: {rate: 1}}'
     assert len(scene(turning, 'drive: {torque: {}}, effects: {}').members) == 2
-    with pytest.raises(FileError, match='effects.backlash: needs a model'):
+    with pytest.raises(FileError, match=r'effects\.backlash: needs a model'):
         scene(turning, 'drive: {torque: {}}')
