@@ -47,7 +47,7 @@ from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.tuples import new
 
 _ROUNDING = 1e-9
-"""A slip below this part of the rates that it is a difference of is 0."""
+"""A slip below this part of the rates that it comes from is none."""
 
 
 class Terms(NamedTuple):
@@ -181,8 +181,7 @@ class Mechanics:
             viscous += drag * slip * slip
             coulomb += limit * abs(slip)
             if limit:
-                least = _ROUNDING * (abs(v[one]) + abs(v[other]) + abs(v[1]))
-                slips += (limit * slip if abs(v[one] - v[other]) > least else 0.0,)
+                slips += (0.0 if _stands(v, one, other) else limit * slip,)
         if not (isfinite(inertia) and isfinite(half_slope)):
             return None
         return new(Terms, (inertia, half_slope, slope, viscous, coulomb, slips))
@@ -298,10 +297,21 @@ class Mechanics:
 
 
 def resistance(rubbing: Rubbing, v: list[float]) -> float:
-    """Return what a joint resists its motion with, in [N·m] or [N], of the sign of its rate."""
+    """
+    Return what a joint resists its motion with, in [N·m] or [N], of the sign of its rate.
+
+    Coulomb friction is 0 in a joint that stands, rounding apart.
+    """
     _, viscous, coulomb, one, other, factor = rubbing
     slip = factor * (v[one] - v[other])
-    return viscous * slip + (copysign(coulomb, slip) if slip else 0.0)
+    dry = copysign(coulomb, slip) if coulomb and not _stands(v, one, other) else 0.0
+    return viscous * slip + dry
+
+
+def _stands(v: list[float], one: int, other: int) -> bool:
+    """Return whether the difference of two rates is 0 but for rounding."""
+    rates = abs(v[one]) + abs(v[other]) + abs(v[1])
+    return abs(v[one] - v[other]) <= _ROUNDING * rates
 
 
 def stretched(
