@@ -17,12 +17,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter_ns
 
 from linkage_ros.effects.stage import brings, in_order, LOADED, module_of
 from linkage_ros.errors import FileError
+from linkage_ros.faults.fault import Fault
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.scene import Member, Scene
@@ -43,10 +44,14 @@ class Variant:
         self.published = 0
 
     def run(self, nows: Sequence[int], messages: Sequence[bytes]) -> None:
-        """Tick at these times, in [ns], each after its message."""
+        """Tick at these times, in [ns], each after its message, as the node does."""
         offer, tick, clock = self.pipeline.offer, self.pipeline.tick, perf_counter_ns
+        injection = self.pipeline.injection
         for now, message in zip(nows, messages, strict=True):
             begin = clock()
+            if injection is not None:
+                injection.advance(now)
+                now = injection.clock(now)  # noqa: PLW2901 (the time by which the tick goes)
             if message:
                 offer(message, now)
                 self.offers.append(clock() - begin)
@@ -80,7 +85,7 @@ class Variants:
         scene = replace(
             self.scene,
             members=tuple(_with(member, named) for member in self.scene.members),
-            faults=self.scene.faults if FAULTS in named else {},
+            faults=not_injected(self.scene.faults) if FAULTS in named else {},
             record=None,
         )
         # To solve a linkage for the first time may take a second where it is iterated.
@@ -95,6 +100,11 @@ class Variants:
             return self.build(named)
         except FileError:
             return None
+
+
+def not_injected(faults: Mapping[str, Fault]) -> dict[str, Fault]:
+    """Return faults that nobody injects, and no timeline."""
+    return {name: replace(fault, at=(), seconds=0.0) for name, fault in faults.items()}
 
 
 def _with(member: Member, named: Names) -> Member:
