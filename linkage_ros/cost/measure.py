@@ -31,7 +31,7 @@ from statistics import median, quantiles
 from typing import NamedTuple
 
 from linkage_ros.cost.feed import feed
-from linkage_ros.cost.variants import FAULTS, Names, Variant, Variants
+from linkage_ros.cost.variants import faults_of, Names, Variant, Variants
 from linkage_ros.effects.stage import bringing, EFFECTS, in_order, LOADED
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
@@ -73,7 +73,7 @@ class EffectCost:
     Attributes
     ----------
     name
-        Of the effect, or `FAULTS`.
+        Of the effect; of a fault, which nobody injects, one of `faults_of`.
     adds
         What it, and what it starts from, add to the scene without effects; nothing where it
         cannot be measured alone.
@@ -152,11 +152,13 @@ def measure(
 
     """
     named = Names(name for member in scene.members for name in member.effects)
-    named |= {FAULTS} if scene.faults else set()
+    faults = faults_of(scene)
+    named |= faults
     variants = Variants(scene)
     bare, whole = variants.build(Names()), variants.build(named)
-    effects_of = in_order({*EFFECTS, *named} - {FAULTS})
-    computed = [n for n in (*effects_of, FAULTS) if n in named or bringing(n, named)]
+    effects_of = in_order({*EFFECTS, *named} - faults)
+    computed = [n for n in effects_of if n in named or bringing(n, named)]
+    computed += sorted(faults)
     added = {name: _added(name, named, variants) for name in computed}
     without = {
         name: _left_out(name, named, variants)

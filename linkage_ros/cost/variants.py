@@ -17,21 +17,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter_ns
 
 from linkage_ros.effects.stage import brings, in_order, LOADED, module_of
 from linkage_ros.errors import FileError
-from linkage_ros.faults.fault import Fault
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.scene import Member, Scene
 
-FAULTS = 'faults'
-"""What stands in the place of an effect for all faults of a scene, while none is injected."""
+_FAULT = 'fault '
+"""With the name of a fault, what stands in the place of an effect for it: it is not injected."""
 
 Names = frozenset[str]
+
+
+def faults_of(scene: Scene) -> Names:
+    """Return the faults of a scene, as they stand among the names of effects."""
+    return Names(f'{_FAULT}{name}' for name in scene.faults)
 
 
 class Variant:
@@ -85,7 +89,12 @@ class Variants:
         scene = replace(
             self.scene,
             members=tuple(_with(member, named) for member in self.scene.members),
-            faults=not_injected(self.scene.faults) if FAULTS in named else {},
+            faults={
+                # Nobody injects it, nor does a timeline.
+                name: replace(fault, at=(), seconds=0.0)
+                for name, fault in self.scene.faults.items()
+                if f'{_FAULT}{name}' in named
+            },
             record=None,
         )
         # To solve a linkage for the first time may take a second where it is iterated.
@@ -100,11 +109,6 @@ class Variants:
             return self.build(named)
         except FileError:
             return None
-
-
-def not_injected(faults: Mapping[str, Fault]) -> dict[str, Fault]:
-    """Return faults that nobody injects, and no timeline."""
-    return {name: replace(fault, at=(), seconds=0.0) for name, fault in faults.items()}
 
 
 def _with(member: Member, named: Names) -> Member:

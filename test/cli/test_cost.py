@@ -99,19 +99,31 @@ def test_what_is_brought_in_cannot_be_left_out(tmp_path):
     found = effects_of(measure(scene, FEW))
     assert list(found) == [
         'velocity', 'acceleration', 'friction', 'effort', 'pin_forces', 'clearance', 'bias',
-        'faults',
+        'fault f',
     ]  # fmt: skip
     assert found['velocity'].needed_by == ('effort', 'clearance')
     assert found['acceleration'].needed_by == ('effort', 'clearance')
     assert found['pin_forces'].needed_by == ('clearance',)
     for name in ('velocity', 'acceleration', 'pin_forces'):
         assert found[name].saves is None
-    for name in ('friction', 'effort', 'clearance', 'bias', 'faults'):
+    for name in ('friction', 'effort', 'clearance', 'bias', 'fault f'):
         assert found[name].needed_by == ()
         assert found[name].saves is not None
     # Friction alone acts on nothing.
     assert found['friction'].beside == 'effort'
     assert all(effect.beside == '' for name, effect in found.items() if name != 'friction')
+
+
+def test_each_fault_has_its_price(tmp_path):
+    scene = scene_of(
+        tmp_path,
+        f'linkage: {FOUR_BAR}\nfaults: {{quiet: {{silence: {{}}}}, hung: {{freeze: {{}}}}}}\n',
+    )
+    found = effects_of(measure(scene, FEW))
+    assert list(found) == ['fault hung', 'fault quiet']
+    assert all(fault.adds is not None and fault.saves is not None for fault in found.values())
+    alone = Variants(scene).build(frozenset({'fault hung'}))
+    assert list(alone.pipeline.injection.faults) == ['hung']
 
 
 def test_what_acts_on_nothing_then_is_left_out_too(tmp_path):
@@ -144,7 +156,7 @@ def test_a_variant_consists_of_what_it_is_asked_for(tmp_path):
     assert stages('delay', 'bias') == ('bias', 'delay')
     assert stages('velocity') == ('velocity',)
     assert stages('effort') == ('velocity', 'acceleration', 'effort')
-    assert variants.build(frozenset({'faults'})).pipeline.injection is not None
+    assert variants.build(frozenset({'fault f'})).pipeline.injection is not None
     assert variants.build(frozenset({'bias'})).pipeline.injection is None
     # One that has been built is not built again.
     assert variants.build(frozenset({'bias'})) is variants.build(frozenset({'bias'}))
@@ -262,7 +274,7 @@ def test_a_fault_is_priced_with_its_clock_and_never_injected(tmp_path):
         '  quiet: {silence: {}, at: [0.01], seconds: 1}\n'
         '  clock: {time_jump: {by: 1.0}, at: [0.01], seconds: 1}\n',
     )
-    ticked = Variants(scene).build(frozenset({'faults'}))
+    ticked = Variants(scene).build(frozenset({'fault quiet', 'fault clock'}))
     times = feed(scene, ticked.pipeline)
     ticked.run(*zip(*[next(times) for _ in range(50)], strict=True))
     assert ticked.published == 50
