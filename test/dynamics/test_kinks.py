@@ -37,7 +37,7 @@ from linkage_ros.kinematics.linkage import Mass
 import numpy as np
 import pytest
 
-from .loaded import four_bar, scotch_yoke
+from .loaded import closed, four_bar, scotch_yoke, STATES
 from .test_integrators import ORDER, STEP
 
 GRAVITY = 9.81
@@ -176,6 +176,28 @@ def test_the_order_holds_where_slips_turn(method, steps):
     assert orders == pytest.approx([ORDER[method]] * 2, abs=0.5)
     # Across the kinks errors of orders 4 and 6 were as large at any of these steps.
     assert errors[-1] < {1: 1e-3, 4: 1e-9, 6: 2e-11}[ORDER[method]]
+
+
+@pytest.mark.parametrize(
+    'name', ['four_bar', 'slider_crank', 'scotch_yoke', 'watt_1', 'reversed_yoke']
+)
+def test_the_gallery_keeps_the_highest_order_with_friction_in_every_joint(name):
+    # Against the same motion in steps an eighth as long.
+    closure = closed(name)
+    friction = Friction({j.name: JointFriction(0.01, 0.05) for j in closure.structure.joints})
+    mechanics = Mechanics(closure, Loads((0.0, -GRAVITY), (), 0.5), friction)
+    ends, start = [], STATES[name][0][0]
+    for steps in (50, 100, 400):
+        slips, position, terms = [], closure.position, mechanics.terms
+        crank = OneFreedom(lambda q: terms(position(q)), STEP['gauss_legendre'])  # noqa: B023
+        motion = crank.at(start, 15.0)
+        for _ in range(steps):
+            slips.append(motion.terms.slips)
+            motion = crank.advance(motion, 0.6 / steps, 0.0)
+        ends.append(motion.value)
+    kinks = sum(a * b < 0.0 for one, two in pairwise(slips) for a, b in zip(one, two, strict=True))
+    assert kinks >= 5
+    assert log2(abs(ends[0] - ends[2]) / abs(ends[1] - ends[2])) > 5.0
 
 
 def test_a_step_without_a_kink_is_one_step_to_the_last_bit():
