@@ -68,8 +68,16 @@ def timeline(linkage, torque, commands, until, friction=''):
 
     Parameters
     ----------
+    linkage
+        The text of its file.
+    torque
+        Parameters of the drive.
     commands
         Effort by the time at which it comes, in [ms]; each holds for 100 ms.
+    until
+        Time at which it ends, in [ms].
+    friction
+        Parameters of the effect; '' for none.
 
     """
     text = f'drive: {{torque: {torque}}}\nloads: {{gravity: [0, -9.81], drive_inertia: 0.02}}\n'
