@@ -19,14 +19,15 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test bench accuracy synthesis round_trips gallery schema cost effects docs lint format
+.PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema cost effects docs lint format
 .PHONY: clean damage kills endurance disk accuracy_page report
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
 	@echo 'make test      lint, then all tests'
 	@echo 'make bench     measure'
-	@echo 'make accuracy  prove the kinematics on 11 million cases (30 min)'
+	@echo 'make accuracy  prove the kinematics on 11 million cases, then as topologies (35 min)'
+	@echo 'make topologies  try random linkages of every topology, into docs/accuracy (8 min)'
 	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (9 min)'
 	@echo 'make synthesis compute and draw what docs/synthesis.md says'
 	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
@@ -76,7 +77,13 @@ bench: $(STAMP)
 	@$(BIN)/python -m bench
 
 accuracy: $(STAMP)
-	@$(BIN)/python -m campaigns.accuracy
+	@status=0; \
+	$(BIN)/python -m campaigns.accuracy || status=$$?; \
+	$(BIN)/python -m campaigns.topologies || status=$$?; \
+	exit $$status
+
+topologies: $(STAMP)
+	@$(BIN)/python -m campaigns.topologies
 
 accuracy_page: $(STAMP)
 	@$(BIN)/python -m docs.make_accuracy

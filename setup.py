@@ -56,8 +56,9 @@ ROS = ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces']
 REPORT = ['matplotlib', 'mpmath', 'plotly>=6', 'python-flint>=0.6', 'rich']
 # Where a linkage is fitted or searched for; exact synthesis needs numpy only.
 DESIGN = ['scipy']
-# Bags as Parquet; as CSV they need nothing.
-EXPORT = ['pyarrow']
+# Bags as Parquet; as CSV they need nothing. From 26 on pyarrow refuses numpy 1.x, which Ubuntu
+# 24.04 has, but does not say so to pip.
+EXPORT = ['pyarrow<26']
 # For studies that outgrow one machine.
 DASK = ['distributed']
 # The documentation site, in the theme Furo.

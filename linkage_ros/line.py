@@ -40,7 +40,16 @@ from linkage_ros.effects.stage import (
 from linkage_ros.errors import DefinitionError
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.look import at_rest, delayed, full_look, Look, observer, plain_look, sensing
+from linkage_ros.look import (
+    at_rest,
+    delayed,
+    full_look,
+    Look,
+    observer,
+    plain_look,
+    sensing,
+    silent_beyond,
+)
 from linkage_ros.scene.scene import Member, Scene
 from linkage_ros.solvers.registry import SOLVERS
 
@@ -162,11 +171,13 @@ class Line:
         if 'delay' in modules:
             *before, delay = sensors
             sensors = [delayed(before, delay)]
-        sense = sensing([*sensors, *faulty], self.closure.turning, scene.wrapped)
+        sense = sensing([*sensors, *faulty], self.closure, scene.wrapped)
         stages = built('stage')
         drive_stages = built('drive_stage')
         (begin,) = built('begin') or [at_rest]
         state, close = self.drive.state, self.closure.position
+        if member.silent_beyond_limits and self.closure.bounds:
+            close = silent_beyond(close, self.closure)
         self.look: Callable[[int], Look]
         """Returns what the linkage comes to at a time, in [ns]."""
         publishing = {

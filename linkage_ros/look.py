@@ -28,8 +28,9 @@ from typing import Any, NamedTuple
 
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.effects.stage import Begin, DriveStage, Motion, Reading, Sensor, Stage
-from linkage_ros.effects.turns import all_wrapped, continuous
-from linkage_ros.kinematics.closure import Position
+from linkage_ros.effects.turns import all_wrapped, beginnings, continuous
+from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.status import Status
 from linkage_ros.tuples import new
 
 
@@ -59,11 +60,13 @@ class Look(NamedTuple):
 _NO_CRANK = Look(None, None, None, None)
 
 
-def sensing(sensors: Sequence[Sensor], turning: Sequence[bool], wrapped: bool) -> Sensor:
+def sensing(sensors: Sequence[Sensor], closure: Closure, wrapped: bool) -> Sensor:
     """Put sensors together: what makes angles run on before them, what wraps them behind."""
+    turning = closure.turning
     if wrapped and not sensors:
         return all_wrapped(turning)
-    return _chain([continuous(turning), *sensors, *([all_wrapped(turning)] if wrapped else [])])
+    run_on = continuous(turning, beginnings(closure))
+    return _chain([run_on, *sensors, *([all_wrapped(turning)] if wrapped else [])])
 
 
 def delayed(sensors: Sequence[Sensor], delay: Any) -> Sensor:
@@ -91,6 +94,19 @@ def _chain(sensors: Sequence[Sensor]) -> Sensor:
         return found
 
     return chain
+
+
+def silent_beyond(close: Callable[..., Position], closure: Closure) -> Callable[..., Position]:
+    """Return what closes the loops, and has no joints to publish where one is beyond limits."""
+    exceeded = closure.bounds.exceeded
+
+    def within(*inputs: float) -> Position:
+        position = close(*inputs)
+        if position[2] and exceeded(inputs, position[2]) is not None:
+            return position._replace(status=Status.LIMITED, joints=())
+        return position
+
+    return within
 
 
 def plain_look(

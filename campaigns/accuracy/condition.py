@@ -17,7 +17,23 @@ Condition numbers κ = Σ|xᵢ ∂y/∂xᵢ| + |y| of positions, velocities and 
 
 The sum goes over all coordinates, directions and angles of the linkage, the input angle at its
 size within (-π, π], its rate and its acceleration. A published angle counts as π at least: a
-direction is a sum of angles of up to half a turn, and where they cancel, rounding stays.
+direction is a sum of angles of up to half a turn, and where they cancel, rounding stays. |y| is
+the sum of the sizes of what a joint is the difference of: the angles of two links, or their rates.
+
+A linkage of several dyads is solved one after the other, and what one hands on is a double. So it
+is a datum of all that follow. Let a stage return zₖ with an error of at most C·u·κₖ, κₖ its own
+condition. To first order the error of y is then at most C·u·Σ|∂y/∂zₖ|·κₖ: a sum over stages joins
+that over numbers, and a solver whose dyads are each within C·u·κ stays within it as a whole. No
+solver can do without: two data that come from one number are rounded each by itself, and what
+would cancel between them does not. The stages are
+
+- the angle between what the first dyad sees on crank and ground: φ and a direction of the file,
+  where that is not 0, at the size of the sum;
+- the angles and slides that a dyad finds, their rates and accelerations, with the κ of each;
+- the pins by which links are held, and the points that a later dyad is given, with their
+  velocities and accelerations, each coordinate at its own size: sums of what has been counted.
+
+All of it is the reference's: ∂y/∂zₖ is found by changing zₖ between two of its dyads.
 """
 
 from __future__ import annotations
@@ -25,9 +41,10 @@ from __future__ import annotations
 from math import pi, remainder
 from typing import Any
 
-from campaigns.accuracy.mechanism import Key, Turn
+from campaigns.accuracy.mechanism import GROUND, Key, Spot, Turn
+from campaigns.accuracy.motion import conjugate, Handed, imag, Motion
 from campaigns.accuracy.reference import Outcome, Reference, series, Truth
-from campaigns.accuracy.tangent import Array, Tangent
+from campaigns.accuracy.tangent import Array, handed_on, Tangent, turn_sizes, turn_values
 from flint import arb, ctx
 import numpy as np
 
@@ -68,18 +85,23 @@ def condition_numbers(
         reference.constants(),
         reference.numbers,
         values,
+        {
+            handed.owner: np.array([series(_place(m, handed.owner)) for m in motions]).T
+            for handed in handed_on(mechanism)
+            if handed.what == 'x' and not handed.power
+        },
         np.array([remainder(angle, 2 * pi) for angle in phi]),
         np.array(alpha),
+        np.array([_opening(reference, angle) for angle in phi]),
     )
     kappa = np.empty((len(truths), len(mechanism.joints), 3))
     for j, joint in enumerate(mechanism.joints.values()):
         if isinstance(joint, Turn):
-            change = tangent.turn[joint.child] - tangent.turn[joint.parent]
+            change = tangent.shown[joint.child] - tangent.shown[joint.parent]
         else:
             change = tangent.slide[joint]
         kappa[:, j] = np.abs(change).sum(axis=2).T
-    sizes = np.array([[series(y) for y in truth.joints] for truth in truths]).real
-    return (kappa + _at_least_half_a_turn(reference, sizes)) * FACTORIALS
+    return (kappa + _published(reference, motions)) * FACTORIALS
 
 
 def exact_condition_numbers(
@@ -110,12 +132,16 @@ def exact_condition_numbers(
         ties = tuple({key: value} for key, value in numbers.items() if value)
     kappa = np.zeros((len(base.joints), 3))
     exact = _coefficients(base)
+    found = handed_on(reference.mechanism)
+    conditions = [0.0] * len(found)
 
     def add(changed: Truth) -> None:
         nonlocal kappa
         for j, (one, other) in enumerate(zip(exact, _coefficients(changed), strict=True)):
             for k in range(3):
                 kappa[j, k] += abs(float((other[k] - one[k]) / step))
+        for i, handed in enumerate(found):
+            conditions[i] += abs(float(_change(base.motion, changed.motion, handed) / step))
 
     for tie in ties:
         varied: dict[Key, Any] = dict(numbers)
@@ -124,6 +150,7 @@ def exact_condition_numbers(
         add(Reference(reference.mechanism, varied).solve(phi, alpha, precision))
     turned = remainder(phi, 2 * pi)
     add(reference.solve(arb(phi) + step * arb(turned), alpha, precision))
+    add(reference.solve(arb(phi) + step * arb(_opening(reference, phi)), alpha, precision))
     add(reference.solve(phi, arb(alpha) * (1 + step), precision))
     # By the rate ω, which a motion has as 1: y' is as ω, and y'' = g·ω² + h·α.
     for j, y in enumerate(exact):
@@ -131,8 +158,17 @@ def exact_condition_numbers(
     still = _coefficients(reference.solve(phi, 0.0, precision))
     for j, y in enumerate(still):
         kappa[j, 2] += 2 * abs(float(y[2]))
-    sizes = np.array([[float(c) for c in y] for y in exact])
-    kappa += _at_least_half_a_turn(reference, sizes[None])[0]
+    # Half of the acceleration is what the rate makes of itself: as α is, it counts twice.
+    still_motion = reference.solve(phi, 0.0, precision).motion
+    for i, handed in enumerate(found):
+        if handed.what in {'turn', 'slide'} and handed.power:
+            of = base.motion if handed.power == 1 else still_motion
+            conditions[i] += handed.power * abs(_value(of, handed))
+    for i, handed in enumerate(found):
+        amount = step * arb(_size(base.motion, handed) + conditions[i])
+        changed = Reference(reference.mechanism, numbers, (handed, amount))
+        add(changed.solve(phi, alpha, precision))
+    kappa += _published(reference, [base.motion])[0]
     if ties is reference.mechanism.ties:
         # What hangs together may not move at all: κ would be 0, but terms as great as the
         # crank's own rate and acceleration are rounded to come to that.
@@ -144,10 +180,51 @@ def _coefficients(truth: Truth) -> list[list[Any]]:
     return [[y[0], y[1], y[2]] for y in truth.joints]
 
 
-def _at_least_half_a_turn(reference: Reference, sizes: Array) -> Array:
-    sizes = np.abs(sizes)
+def _opening(reference: Reference, phi: float) -> float:
+    """Return the angle that the first dyad sees where it is a sum, and rounded; else 0."""
+    opening = reference.mechanism.opening()
+    return remainder(phi + opening, 2 * pi) if opening else 0.0
+
+
+def _published(reference: Reference, motions: list[Motion]) -> Array:
+    """Return the sizes of what published joints are differences of, [case, joint, power]."""
+    sizes = np.zeros((len(motions), len(reference.mechanism.joints), 3))
     for j, joint in enumerate(reference.mechanism.joints.values()):
         if isinstance(joint, Turn):
-            # Within (-π, π] none is greater.
+            for link in {joint.child, joint.parent} - {GROUND}:
+                sizes[:, j] += turn_sizes(np.array([series(m.shown[link]) for m in motions]).T).T
             sizes[:, j, 0] = pi
+        else:
+            sizes[:, j] = np.abs([series(m.slide[joint]) for m in motions])
     return sizes
+
+
+def _place(motion: Motion, owner: str | Spot) -> Any:
+    return motion.at(owner) if isinstance(owner, Spot) else motion.held[owner]
+
+
+def _size(motion: Motion, handed: Handed) -> float:
+    """Return the size of what a dyad hands on."""
+    if handed.what == 'turn' and not handed.power:
+        return pi
+    return abs(_value(motion, handed))
+
+
+def _value(motion: Motion, handed: Handed) -> float:
+    owner, what, power = handed
+    if what == 'turn':
+        return float(turn_values(np.array([series(motion.shown[owner])]).T)[power, 0])
+    if what == 'slide':
+        return series(motion.slide[owner])[power].real
+    place = series(_place(motion, owner))[power]
+    return place.real if what == 'x' else place.imag
+
+
+def _change(motion: Motion, changed: Motion, handed: Handed) -> Any:
+    """Return by how much an angle or a slide is another one; of pins only their size counts."""
+    owner, what, power = handed
+    if what == 'turn':
+        return imag(changed.shown[owner] * conjugate(motion.shown[owner]))[power]
+    if what == 'slide':
+        return (changed.slide[owner] - motion.slide[owner])[power]
+    return 0

@@ -43,6 +43,14 @@ AT_TOGGLE = 'position at a toggle'
 _SUSPICIOUS = 1000.0
 """A position that is off by more, in u·κ, may be that of another assembly: a look is taken."""
 
+_BAND = 2.0
+"""
+Above this, in u·κ, it is asked whether a closed case lies at a limit.
+
+κ is of first order: it holds where rounding changes what a dyad reaches by less than that is.
+Nearer to a toggle a rate has no correct digit, whichever status is told.
+"""
+
 _CORRECT = 2.0**-163
 """What the enclosure of a result may be wide, as a part of κ, u being 2⁻⁵³: fifty digits."""
 
@@ -175,8 +183,12 @@ def _measure(
         ):
             findings.count(i, 'wrong')
             continue
-        findings.counts['closed' if quantities is QUANTITIES else 'toggles'] += 1
-        for k, quantity in enumerate(quantities):
+        named = quantities
+        if errors.max() > _BAND and named is QUANTITIES and is_at_limit(reference, phi[i]):
+            findings.count(i, 'at limit')
+            named = (AT_TOGGLE,)
+        findings.counts['closed' if named is QUANTITIES else 'toggles'] += 1
+        for k, quantity in enumerate(named):
             findings.errors.setdefault(quantity, []).extend(
                 (i, j, error) for j, error in enumerate(errors[:, k].tolist())
             )

@@ -21,6 +21,7 @@ made the linkage, so that neither can inherit a mistake from the other.
 
 from __future__ import annotations
 
+from cmath import phase
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, sin
@@ -72,6 +73,17 @@ class Dyad(Protocol):
 
     @property
     def assembly(self) -> tuple[str, Side] | None: ...
+
+    @property
+    def turned(self) -> tuple[str, ...]: ...
+
+    @property
+    def slid(self) -> tuple[str, ...]: ...
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]: ...
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]: ...
 
     def close(self, motion: Any) -> None: ...
 
@@ -132,6 +144,28 @@ class Mechanism:
             found[name, 'direction', 'x'], found[name, 'direction', 'y'] = slide.direction
             found[name, 'direction', 'angle'] = slide.angle
         return found
+
+    def start(self, slider: str) -> Spot:
+        """Return where the line of a slider starts."""
+        slide = self.sliders[slider]
+        return Spot(slide.along, slide.through)
+
+    def opening(self) -> float:
+        """
+        Return the angle between what the first dyad sees on the crank and on the ground, at φ = 0.
+
+        Points are seen from the crank's pivot, lines in their direction.
+        """
+        pivot = next(iter(self.links[CRANK]))
+        opening = 1 + 0j
+        for seen in self.dyads[0].seen:
+            if isinstance(seen, Spot):
+                link, points = seen.link, self.links[seen.link]
+                vector = complex(*points[seen.point]) - complex(*points[pivot])
+            else:
+                link, vector = self.sliders[seen].along, complex(*self.sliders[seen].direction)
+            opening *= vector if link == CRANK else vector.conjugate()
+        return phase(opening)
 
     def size(self) -> float:
         """Return the sum of the distances of each link's points from its first."""

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import frexp
-from typing import Any
+from typing import Any, NamedTuple
 
 from campaigns.accuracy.mechanism import CRANK, GROUND, Key, Mechanism, Spot
 from flint import acb, acb_series, arb, arb_series, ctx
@@ -40,6 +40,27 @@ class OpenError(Exception):
 
 class UndecidedError(Exception):
     """At the working precision a dyad is open as well as closed, or its links are in line."""
+
+
+class Handed(NamedTuple):
+    """
+    A number that one dyad hands on to the next ones: a coefficient of a power series in time.
+
+    Attributes
+    ----------
+    owner
+        A link, a slider, or a point of a link.
+    what
+        ``turn``, the link's angle; ``x`` or ``y``, of the pin by which it is held, or of the point
+        itself; ``slide``.
+    power
+        Of time: 0, 1 or 2, for the position, the rate and half the acceleration.
+
+    """
+
+    owner: str | Spot
+    what: str
+    power: int
 
 
 class Constants:
@@ -81,10 +102,30 @@ class Motion:
         For each slider the series of its point's distance from the start of the line.
     inverse
         For each dyad the inverse of the determinant that its linear equations have.
+    shown
+        As ``unit``, before what is handed on is changed.
+    held
+        For each link the series of where the pin is by which it is held.
+
+    Parameters
+    ----------
+    mechanism, constants
+        What moves.
+    pivot
+        Name of the crank's pin on the ground.
+    changed
+        What is handed on with a change, by how much; for condition numbers.
 
     """
 
-    def __init__(self, mechanism: Mechanism, constants: Constants, pivot: str) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        constants: Constants,
+        pivot: str,
+        changed: tuple[Handed, Any] | None = None,
+    ) -> None:
+        self._changed = changed
         self.mechanism = mechanism
         self.constants = constants
         self._pivot = constants.points[Spot(GROUND, pivot)]
@@ -102,18 +143,25 @@ class Motion:
             GROUND: acb_series([0]),
             CRANK: self._pivot - self._crank_pivot * crank,
         }
+        self.shown = dict(self.unit)
+        self.held: dict[str, Any] = {}
         self.slide: dict[str, Any] = {}
         self.inverse: list[Any] = []
         self.phi = phi
+        self._behind = False
         for dyad in self.mechanism.dyads:
             dyad.close(self)
+            self._behind = True
 
     def at(self, spot: Spot) -> Any:
         """Return where a point of a placed link is."""
         z = self.constants.points[spot]
         if spot.link == GROUND:
             return acb_series([z])
-        return self.origin[spot.link] + self.unit[spot.link] * z
+        place = self.origin[spot.link] + self.unit[spot.link] * z
+        if self._behind and self._changed is not None and self._changed[0].owner == spot:
+            place += self._change()
+        return place
 
     def vector(self, link: str, start: str, end: str) -> Any:
         """Return what leads from one point of a link to another, in its frame."""
@@ -121,8 +169,29 @@ class Motion:
 
     def place(self, link: str, unit: Any, point: str, where: Any) -> None:
         """Note where a link is, by its direction and one of its points."""
+        self.shown[link] = unit
+        self.held[link] = where
+        if self._changed is not None and self._changed[0].owner == link:
+            if self._changed[0].what == 'turn':
+                # To first order, as the differences are that this is for.
+                unit = unit * (1 + self._change() * acb(0, 1))
+            else:
+                where = where + self._change()
         self.unit[link] = unit
         self.origin[link] = where - unit * self.constants.points[Spot(link, point)]
+
+    def ride(self, slider: str, unit: Any, point: str, where: Any) -> None:
+        """Note where a block is that a slide places."""
+        slide = self.mechanism.sliders[slider]
+        if self._changed is not None and self._changed[0].owner == slider:
+            line = self.unit[slide.along] * self.constants.directions[slider]
+            where = where + line * self._change()
+        self.place(str(slide.block), unit, point, where)
+
+    def _change(self) -> Any:
+        assert self._changed is not None
+        (_, what, power), amount = self._changed
+        return acb_series([0] * power + [acb(0, amount) if what == 'y' else acb(amount)])
 
     def line(self, name: str, point: str) -> tuple[Any, Any, Any]:
         """

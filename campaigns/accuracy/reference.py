@@ -24,6 +24,7 @@ from campaigns.accuracy.mechanism import CRANK, Key, Mechanism, Turn
 from campaigns.accuracy.motion import (
     conjugate,
     Constants,
+    Handed,
     Motion,
     OpenError,
     ORDER,
@@ -64,10 +65,18 @@ class Reference:
         What to solve.
     numbers
         Instead of the mechanism's own; balls may be among them.
+    changed
+        As of `Motion`.
 
     """
 
-    def __init__(self, mechanism: Mechanism, numbers: Mapping[Key, Any] | None = None) -> None:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        numbers: Mapping[Key, Any] | None = None,
+        changed: tuple[Handed, Any] | None = None,
+    ) -> None:
+        self._changed = changed
         self.mechanism = mechanism
         self.numbers = mechanism.numbers() if numbers is None else numbers
         self._constants: dict[int, Constants] = {}
@@ -103,7 +112,7 @@ class Reference:
         if precision not in self._constants:
             self._constants[precision] = Constants(self.mechanism, self.numbers)
         pivot = next(iter(self.mechanism.links[CRANK]))
-        return Motion(self.mechanism, self._constants[precision], pivot)
+        return Motion(self.mechanism, self._constants[precision], pivot, self._changed)
 
     def constants(self) -> Constants:
         """Return the numbers as balls, at the lowest precision."""
@@ -115,9 +124,9 @@ class Reference:
         found = []
         for joint in self.mechanism.joints.values():
             if isinstance(joint, Turn):
-                unit = motion.unit[joint.child]
+                unit = motion.shown[joint.child]
                 if joint.parent != 'ground':
-                    unit = unit * conjugate(motion.unit[joint.parent])
+                    unit = unit * conjugate(motion.shown[joint.parent])
                 found.append(turning(unit))
             else:
                 found.append(motion.slide[joint])

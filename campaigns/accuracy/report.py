@@ -30,8 +30,11 @@ LEGEND = """\
 An error is given in units of u·κ: u = 2⁻⁵³, κ = Σ|xᵢ ∂y/∂xᵢ| + |y| over all coordinates, lengths
 and directions xᵢ, the input angle (within (-π, π]), its rate (1 rad/s) and its acceleration
 (normally distributed, 1 rad/s²). A published angle counts as π at least, and as it was published
-where that is more. Lengths that make a change point change together, so that it stays one; their
-rates then count as the crank's at least. What does not move at all counts as 1. The limit is 4.
+where that is more; of a joint between two moving links both count. What a dyad hands on to the
+next one is rounded, and counts as an xᵢ, with its own κ: angles, slides and pins, with their rates
+and accelerations (`condition.py` has the theorem). Lengths that make a change point change
+together, so that it stays one; their rates then count as the crank's at least. What does not move
+at all counts as 1. The limit is 4.
 
 - *closed*: compared; *open*: both say so; *at limit*: within 16 u of all lengths, or of the
   condition of what a dyad may reach farther, of a toggle: any status is right there. Positions

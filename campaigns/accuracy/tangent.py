@@ -28,10 +28,11 @@ Arrays are [power of time, case, number].
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import pi
 from typing import Any
 
 from campaigns.accuracy.mechanism import CRANK, GROUND, Key, Mechanism, Spot
-from campaigns.accuracy.motion import Constants, ORDER
+from campaigns.accuracy.motion import Constants, Handed, ORDER
 import numpy as np
 import numpy.typing as npt
 
@@ -44,6 +45,33 @@ def times(series: Array, change: Array) -> Array:
     product[1:] += series[1] * change[:-1]
     product[2] += series[2] * change[0]
     return product
+
+
+def handed_on(mechanism: Mechanism) -> tuple[Handed, ...]:
+    """Return what dyads hand on to the ones behind them: pins, then angles and slides in order."""
+    if len(mechanism.dyads) < 2:
+        return ()
+    links = [link for link in mechanism.links if link not in {GROUND, CRANK}]
+    spots = {spot for dyad in mechanism.dyads[1:] for spot in dyad.given(mechanism)}
+    pins: list[str | Spot] = [*links, *sorted(spot for spot in spots if spot.link != GROUND)]
+    names: list[tuple[str | Spot, str]] = [(pin, part) for pin in pins for part in 'xy']
+    for dyad in mechanism.dyads:
+        names += [(link, 'turn') for link in dyad.turned]
+        names += [(slider, 'slide') for slider in dyad.slid if mechanism.sliders[slider].block]
+    return tuple(Handed(*name, power) for name in names for power in range(ORDER))
+
+
+def turn_values(unit: Array) -> Array:
+    """Return an angle's rate and half its acceleration, behind a 0, of the series of e^iθ."""
+    back = unit[0].conj()
+    return np.array([np.zeros(len(back)), (unit[1] * back).imag, (unit[2] * back).imag])
+
+
+def turn_sizes(unit: Array) -> Array:
+    """Return their sizes, and π in place of the 0: an angle counts as half a turn at least."""
+    sizes = np.abs(turn_values(unit))
+    sizes[0] = pi
+    return sizes
 
 
 class Tangent:
@@ -60,8 +88,12 @@ class Tangent:
         The same as doubles.
     values
         Series of links, slides and inverse determinants, [power of time, case].
+    held
+        Series of the pins that links are held by, and of the points that dyads are given.
     phi, alpha
         Input angles and accelerations of the cases.
+    opening
+        Of each case the angle that the first dyad sees, as far as it is a sum.
 
     """
 
@@ -71,16 +103,23 @@ class Tangent:
         constants: Constants,
         numbers: Mapping[Key, float],
         values: Mapping[str | int, Array],
+        held: Mapping[str | Spot, Array],
         phi: Array,
         alpha: Array,
+        opening: Array,
     ) -> None:
         self.mechanism = mechanism
         self._constants = constants
         self._values = values
         self._cases = len(phi)
+        self._behind = False
         columns = [key for key, value in numbers.items() if value]
         self._column = {key: i for i, key in enumerate(columns)}
-        self._count = len(columns) + 3
+        self._inputs = len(columns)
+        self.handed = handed_on(mechanism)
+        self._handed = {key: self._inputs + 4 + i for i, key in enumerate(self.handed)}
+        self._count = len(columns) + 4 + len(self.handed)
+        self._held = held
         self.unit = {name: values[name][..., None] for name in ('ground', *self._links())}
         self.slide_value = {name: values[name][..., None] for name in mechanism.sliders}
         self._inverse = iter(range(len(mechanism.dyads)))
@@ -104,15 +143,18 @@ class Tangent:
                 change = self._change((link, point), x * unit, y * unit)
                 self._vectors[link, point] = change
         self.turn = {GROUND: self._zeros(float), CRANK: self._zeros(float)}
-        self.turn[CRANK][0, :, -3] = phi
-        self.turn[CRANK][1, :, -2] = 1.0
-        self.turn[CRANK][2, :, -1] = 0.5 * alpha
+        self.turn[CRANK][0, :, self._inputs] = phi
+        self.turn[CRANK][1, :, self._inputs + 1] = 1.0
+        self.turn[CRANK][2, :, self._inputs + 2] = 0.5 * alpha
+        self.turn[CRANK][0, :, self._inputs + 3] = opening
+        self.shown = dict(self.turn)
         self._origin = {GROUND: self._zeros(complex)}
         self.slide: dict[str, Array] = {}
         pivot = next(iter(mechanism.links[CRANK]))
         self.place(CRANK, self.turn[CRANK], pivot, self.at(Spot(GROUND, pivot)))
         for dyad in mechanism.dyads:
             dyad.vary(self)
+            self._behind = True
 
     def _links(self) -> list[str]:
         return [name for name in self.mechanism.links if name != GROUND]
@@ -141,7 +183,16 @@ class Tangent:
 
     def at(self, spot: Spot) -> Array:
         """Return the change of where a point is."""
-        return self._origin[spot.link] + self._arm(spot)
+        change = self._origin[spot.link] + self._arm(spot)
+        if self._behind:
+            self._round_pin(spot, change)
+        return change
+
+    def _round_pin(self, owner: str | Spot, change: Array) -> None:
+        if (owner, 'x', 0) in self._handed:
+            for power, place in enumerate(self._held[owner]):
+                change[power, :, self._handed[Handed(owner, 'x', power)]] += place.real
+                change[power, :, self._handed[Handed(owner, 'y', power)]] += 1j * place.imag
 
     def _arm(self, spot: Spot) -> Array:
         unit = self.unit[spot.link]
@@ -153,12 +204,28 @@ class Tangent:
 
     def place(self, link: str, turn: Array, point: str, where: Array) -> None:
         """Note the change of a link's angle, and of where one of its points is."""
+        self.shown[link] = turn
+        if (link, 'turn', 0) in self._handed:
+            turn = turn.copy()
+            sizes = turn_sizes(self.unit[link][..., 0]) + np.abs(turn).sum(axis=2)
+            for power, size in enumerate(sizes):
+                turn[power, :, self._handed[Handed(link, 'turn', power)]] += size
+        where = where.copy()
+        self._round_pin(link, where)
         self.turn[link] = turn
         self._origin[link] = where - self._arm(Spot(link, point))
 
-    def place_block(self, slider: str, pin: str, turn: Array, where: Array) -> None:
-        """Note the change of a block."""
-        self.place(str(self.mechanism.sliders[slider].block), turn, pin, where)
+    def ride(self, slider: str, pin: str, turn: Array, where: Array) -> None:
+        """Note the change of a block that a slide places."""
+        slide = self.mechanism.sliders[slider]
+        if (slider, 'slide', 0) in self._handed:
+            moved = self._zeros(float)
+            sizes = np.abs(self.slide[slider]).sum(axis=2)
+            sizes += np.abs(self.slide_value[slider][..., 0])
+            for power, size in enumerate(sizes):
+                moved[power, :, self._handed[Handed(slider, 'slide', power)]] = size
+            where = where + times(self.unit[slide.along] * self.direction[slider], moved)
+        self.place(str(slide.block), turn, pin, where)
 
     def line(self, name: str, point: str) -> tuple[Array, Array, Array, Array | None]:
         """Return a line's direction, its change, that of its start, and the block's turn."""

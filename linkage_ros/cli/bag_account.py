@@ -108,6 +108,7 @@ def worst_account(worst: WorstStates) -> dict[str, Any]:
         ],
         'states': worst.states,
         'toggles': worst.toggles,
+        'limited': worst.limited,
         'worst_residual': None,
         'nearest_to_toggle': None,
     }

@@ -18,16 +18,18 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from math import tau
+from collections.abc import Iterator, Mapping
+from math import isfinite, tau
 from threading import Event
 
 from linkage_ros.cli.linkage_file import angle_text, open_linkage, value_text
 from linkage_ros.cli.tables import show, Table
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.four_bars import four_bars
+from linkage_ros.kinematics.linkage import Limits
+from linkage_ros.kinematics.ranges import InputRange
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.structure import Driven, Dyad, Group
+from linkage_ros.kinematics.structure import Driven, Dyad, Group, Iterated
 from linkage_ros.kinematics.survey import (
     conditionings,
     Extreme,
@@ -70,6 +72,7 @@ def tables(closure: Closure, title: str) -> Iterator[Table]:
     yield Table(
         'Solved in this order', ('>', 'group', 'links', 'how', 'assembly'), _groups(closure)
     )
+    yield from _other_assemblies(closure)
     loops = [
         (
             str(bar.group + 1),
@@ -144,6 +147,10 @@ def _facts(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
             else f'angle of {given.child} to {given.parent}'
         )
         yield 'input', f'{given.joint}: {driven}'
+    turning = dict(zip(linkage.joints, closure.turning, strict=True))
+    turning |= {given.joint: not given.slider for given in linkage.inputs}
+    for name, limits in linkage.limits.items():
+        yield 'limits', f'{name}: {_limits_text(limits, turning[name])}'
     yield from _reach(closure, way)
     found = worst_residual(closure)
     if found is None:
@@ -160,19 +167,57 @@ def _reach(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
         yield 'range', 'no single one: it depends on every input'
         return
     for interval in way.ranges:
+        turns = round((interval.highest - interval.lowest) / tau)
         if not interval.whole:
-            low, high = (value_text(value, way.turning) for value in interval[:2])
-            yield 'range', f'{low} to {high}'
-        elif interval.highest > 1.5 * tau:
-            yield 'range', 'every angle; the motion repeats after two turns'
+            each = '; each turn has poses of its own' if way.turning and not interval.turns else ''
+            ends = '' if any(interval.limited) or not each else ', and was not followed farther'
+            yield 'range', f'{_range_text(interval)}{each}{ends}'
+        elif turns > 1:
+            count = 'two' if turns == 2 else str(turns)
+            yield 'range', f'every angle; the motion repeats after {count} turns'
         else:
             yield 'range', 'every angle'
     places: dict[Status, list[str]] = {status: [] for _, status in _SINGULAR}
     for singular in closure.singular_inputs:
-        places[singular.status].append(value_text(singular.value, way.turning))
+        said = value_text(singular.value, way.turning)
+        beyond = '' if _is_reached(way, singular.value) else ' beyond the limits'
+        places[singular.status].append(said + beyond)
     for name, status in _SINGULAR:
         if places[status] or status is not Status.INDETERMINATE:
             yield name, ', '.join(places[status]) or 'none'
+
+
+def _is_reached(way: Way, value: float) -> bool:
+    """Return whether a value of the input, in one of its turns, is within the limits."""
+    turns = (0.0, -tau, tau) if way.turning else (0.0,)
+    return not way.closure.bounds or any(way.range_about(value + turn) for turn in turns)
+
+
+def _limits_text(limits: Limits, turning: bool) -> str:
+    said = []
+    if limits.bounded:
+        low, high = (
+            value_text(end, turning) if isfinite(end) else '' for end in (limits.low, limits.high)
+        )
+        said.append(f'{low} to {high}' if low and high else f'from {low}' if low else f'to {high}')
+    if isfinite(limits.velocity):
+        said.append(f'at most {limits.velocity:.6g} {"rad" if turning else "m"}/s')
+    if isfinite(limits.effort):
+        said.append(f'at most {limits.effort:.6g} {"N·m" if turning else "N"}')
+    return ', '.join(said)
+
+
+def _range_text(interval: InputRange) -> str:
+    """Return a range; where limits end it, with what ends it."""
+    low, high = (value_text(value, interval.turning) for value in interval[:2])
+    if interval.by == ('', ''):
+        return f'{low} to {high}'
+    ends = []
+    for end, by in zip((low, high), interval.by, strict=True):
+        ends.append(f'{end}, {f"limit of {by}" if by else "toggle"}')
+    if interval.limited == (True, True):
+        return f'{ends[0]}, to {ends[1]}'
+    return f'{ends[0]}, and on' if interval.limited[0] else f'up to {ends[1]}'
 
 
 def _groups(closure: Closure) -> list[tuple[str, ...]]:
@@ -193,6 +238,42 @@ def _assembly(closure: Closure, dyad: Dyad) -> str:
         side = closure.linkage.assembly[second.name]
         return f'slider {second.name}: pin {closing} {side} of {first.name}'
     return 'the only one'
+
+
+def _other_assemblies(closure: Closure) -> Iterator[Table]:
+    """Yield for each group that is iterated what else a pose could name at the same inputs."""
+    pose = closure.linkage.pose
+    for number, group in enumerate(closure.structure.groups):
+        if not isinstance(group, Iterated) or pose is None:
+            continue
+        # local import: it loads numpy
+        from linkage_ros.kinematics.assemblies import other_assemblies, STARTS
+
+        others = other_assemblies(closure, number)
+        inputs = ', '.join(f'{value + 0.0:.9g}' for value in pose.inputs)
+        rows = [
+            (f'{{inputs: [{inputs}], points: {{{_points(one.points)}}}}}', _turns(one.turns))
+            for one in others
+        ]
+        yield Table(
+            f'Other assemblies of group {number + 1} at the inputs of the pose: '
+            f'{len(others)} found from {STARTS} starts',
+            ('pose', "on the pose's branch") if rows else ('',),
+            rows or [('none',)],
+        )
+
+
+def _points(points: Mapping[str, complex]) -> str:
+    return ', '.join(
+        f'{name}: [{place.real + 0.0:.7g}, {place.imag + 0.0:.7g}]'
+        for name, place in points.items()
+    )
+
+
+def _turns(turns: int) -> str:
+    if not turns:
+        return 'no'
+    return f'{abs(turns)} turn{"s" if abs(turns) > 1 else ""} {"on" if turns > 0 else "back"}'
 
 
 def _links(closure: Closure, number: int) -> str:

@@ -22,6 +22,7 @@ import sys
 from time import monotonic
 from typing import Any
 
+from linkage_ros.kinematics.status import Status
 from linkage_ros.ros.node import LinkageNode
 from linkage_ros.ros.tick_loop import TickLoop
 
@@ -93,7 +94,9 @@ def _state(loop: TickLoop) -> tuple[str, list[_Shown]]:
         if crank is None or position is None:
             continue
         if not position.joints:
-            age = f'{position.status.value}, gap {position.gap:.3g} m'
+            age = position.status.value
+            if position.status is Status.OPEN:
+                age += f', gap {position.gap:.3g} m'
             continue
         member = line.member
         age = f'{crank.age * 1e-6:.2f} ms'

@@ -58,6 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='JOINT=VALUE',
         help='value of a joint in a pose in which the loops close, in radians or metres (here 0)',
     )
+    parser.add_argument(
+        '--no-limits', action='store_true', help='leave out what <limit> says of the joints'
+    )
     add_output(parser, 'linkage file')
 
 
@@ -70,7 +73,11 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise LinkageError(file, f'cannot be read ({reason})', 'name a URDF file') from None
     made = imported(
-        read_urdf(data, str(file)), arguments.close, arguments.input, dict(arguments.at)
+        read_urdf(data, str(file)),
+        arguments.close,
+        arguments.input,
+        dict(arguments.at),
+        limits=not arguments.no_limits,
     )
     text = linkage_text(made.linkage, [f'Imported from {file.name} by linkage import.'])
     read_linkage(parse_yaml(text.encode(), f'{file}, as a linkage'))

@@ -196,7 +196,8 @@ def _linkage(linkage: dict[str, Any], begin: int | None) -> Iterator[tuple[str, 
     if 'states' not in linkage:
         return
     toggles = f', {linkage["toggles"]} of them at a toggle' if linkage['toggles'] else ''
-    yield 'states', f'{linkage["states"]} closed{toggles}'
+    limited = f', {linkage["limited"]} beyond limits' if linkage['limited'] else ''
+    yield 'states', f'{linkage["states"]} closed{toggles}{limited}'
     worst, near = linkage['worst_residual'], linkage['nearest_to_toggle']
     if worst:
         yield 'worst residual', f'{worst["residual_m"]:.1e} m, {_place(worst, inputs, begin)}'

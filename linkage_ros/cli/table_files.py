@@ -26,7 +26,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 import csv
-from importlib.util import find_spec
+from importlib import import_module
 import io
 import os
 from pathlib import Path
@@ -91,7 +91,7 @@ def check_kind(file: Path) -> None:
     Raises
     ------
     LinkageError
-        Where its ending is not known, or what writes it is not installed.
+        Where its ending is not known, or what writes it is not installed or does not run here.
 
     """
     ending = file.suffix.lower()
@@ -101,12 +101,21 @@ def check_kind(file: Path) -> None:
             f'ends in {ending!r}' if ending else 'has no ending',
             f'name a file that ends in {" or ".join(KINDS)}',
         )
-    if ending == '.parquet' and find_spec('pyarrow') is None:
+    if ending == '.parquet':
+        _check_pyarrow()
+
+
+def _check_pyarrow() -> None:
+    """Check that pyarrow can be loaded: it is an extra, and from 26 on refuses numpy 1.x."""
+    try:
+        import_module('pyarrow')
+    except ImportError as error:
+        missing = isinstance(error, ModuleNotFoundError) and error.name == 'pyarrow'
         raise LinkageError(
             'pyarrow',
-            'is not installed',
+            'is not installed' if missing else f'cannot be loaded: {error}',
             "pip install 'linkage_ros[export]', or name a file that ends in .csv",
-        )
+        ) from None
 
 
 def block_rows(columns: int) -> int:

@@ -60,8 +60,8 @@ class WorstStates(NamedTuple):
         The linkage, in its scene and as it is solved.
     states
         How many states closed, and so were looked at.
-    toggles
-        How many of them stood at a toggle.
+    toggles, limited
+        How many of them stood at a toggle, and how many beyond limits.
     residual
         The worst of `Closure.residual`, in [m], and where it was; nothing without states.
     nearest
@@ -73,6 +73,7 @@ class WorstStates(NamedTuple):
     closure: Closure
     states: int
     toggles: int
+    limited: int
     residual: tuple[float, Place] | None
     nearest: tuple[Nearness, Place] | None
 
@@ -150,11 +151,21 @@ def examine(
 class _Watch:
     """Remembers the worst of what it has been shown of a linkage."""
 
-    __slots__ = ('_least', '_nearest', '_place', '_states', '_toggles', '_worst', 'closure', 'of')
+    __slots__ = (
+        '_least',
+        '_limited',
+        '_nearest',
+        '_place',
+        '_states',
+        '_toggles',
+        '_worst',
+        'closure',
+        'of',
+    )
 
     def __init__(self, member: Member, closure: Closure) -> None:
         self.of, self.closure = member, closure
-        self._states = self._toggles = 0
+        self._states = self._toggles = self._limited = 0
         self._worst, self._least = -1.0, inf
         self._place: Place | None = None
         self._nearest: tuple[Nearness, Place] | None = None
@@ -162,6 +173,7 @@ class _Watch:
     def look(self, time: int, inputs: Sequence[float], position: Position) -> None:
         self._states += 1
         self._toggles += position.status is Status.TOGGLE
+        self._limited += position.status is Status.LIMITED
         residual = self.closure.residual(position)
         if residual > self._worst:
             self._worst, self._place = residual, Place(time, tuple(inputs))
@@ -173,5 +185,11 @@ class _Watch:
     def found(self) -> WorstStates:
         residual = (self._worst, self._place) if self._place else None
         return WorstStates(
-            self.of, self.closure, self._states, self._toggles, residual, self._nearest
+            self.of,
+            self.closure,
+            self._states,
+            self._toggles,
+            self._limited,
+            residual,
+            self._nearest,
         )

@@ -99,7 +99,9 @@ def view(
     position = _closed(closure, inputs)
     way = Way(closure, inputs)
     value = inputs[0]
-    interval = way.range_about(value) or InputRange(value, value, way.turning)
+    # A pose beyond the limits lies in no range, and is drawn before the widest.
+    interval = way.range_about(value) or way.widest_range
+    interval = interval or InputRange(value, value, way.turning)
     if ghosts:
         behind = [_closed(closure, given) for given in ghosts]
     elif interval.whole:
@@ -172,6 +174,11 @@ def symbol_size(shown: View) -> float:
     return bar_size(picture, shortest)
 
 
+def _beyond_text(shown: View) -> str:
+    beyond = shown.closure.beyond(shown.position)
+    return f' (limited: {beyond})' if beyond else ''
+
+
 def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None:
     """
     Paint a picture to a file.
@@ -196,7 +203,9 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
         figure = Figure(figsize=(wide + 4.9, tall + 0.5), dpi=110, layout='constrained')
         left, right = figure.subplots(1, 2, width_ratios=(wide, 4.2))
         left.set_title(
-            f'{title}, {_pose_text(shown.closure, shown.inputs)}', loc='left', fontsize=9
+            f'{title}, {_pose_text(shown.closure, shown.inputs)}{_beyond_text(shown)}',
+            loc='left',
+            fontsize=9,
         )
         left.set_aspect('equal')
         left.set_xlim((low - margin).real, (high + margin).real)

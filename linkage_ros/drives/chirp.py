@@ -34,7 +34,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import cos, exp, expm1, log, sin, tau
+from math import cos, exp, expm1, inf, log, sin, tau
 from typing import NamedTuple
 
 from linkage_ros.drives.clocked import as_integers, build_clocked, ClockedDrive, Curve, LARGEST
@@ -68,7 +68,21 @@ PARAMETERS = ChirpParameters
 
 def build(parameters: ChirpParameters, context: Context) -> ClockedDrive:
     """Build the drive."""
-    return build_clocked('drive.chirp', parameters, parameters.inputs, context, curve)
+    return build_clocked('drive.chirp', parameters, parameters.inputs, context, curve, extent)
+
+
+def extent(parameters: Chirp) -> tuple[float, float]:
+    """Return between which values an input stays, in [rad] or [m]."""
+    mean, A = parameters.mean, parameters.amplitude
+    length = round(parameters.seconds * NANOSECONDS)
+    sweep = _linear if parameters.sweep == 'linear' else _logarithmic
+    periods, below, _ = sweep(parameters.start_frequency, parameters.end_frequency, length)
+    passed = inf if parameters.repeat else periods(length) / below
+    # The sine begins at 0; its summit is a quarter of a period on, its valley three.
+    there = sin(tau * passed) if passed < 1.0 else 0.0
+    return mean + A * (-1.0 if passed >= 0.75 else min(0.0, there)), mean + A * (
+        1.0 if passed >= 0.25 else there
+    )
 
 
 def curve(parameters: Chirp, _where: str = '') -> Curve:

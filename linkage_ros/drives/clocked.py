@@ -26,6 +26,7 @@ from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.drives.limits import refuse_beyond
 from linkage_ros.errors import DefinitionError
 from linkage_ros.tuples import new
 
@@ -82,6 +83,7 @@ def build_clocked(
     inputs: Mapping[str, P],
     context: Context,
     curve: Callable[[P, str], Curve],
+    extent: Callable[[P], tuple[float, float]],
 ) -> ClockedDrive:
     """
     Build a drive of curves.
@@ -98,11 +100,15 @@ def build_clocked(
         What it is built for.
     curve
         Makes a curve of parameters, given their key for messages.
+    extent
+        Tells between which values a curve of parameters stays, in [rad] or [m]; infinite ones
+        where it goes on and on.
 
     Raises
     ------
     DefinitionError
-        Where every input has something of its own, so that ``common`` would mean nothing.
+        Where every input has something of its own, so that ``common`` would mean nothing; where
+        one leaves the limits of a joint.
 
     """
     names = [given.joint for given in context.closure.linkage.inputs]
@@ -112,14 +118,13 @@ def build_clocked(
             f'names every input ({", ".join(names)}), so that what stands beside it has no part',
             f'leave one of them out: it follows what stands beside {where}.inputs',
         )
-    return ClockedDrive(
-        tuple(
-            curve(inputs[name], f'{where}.inputs.{name}')
-            if name in inputs
-            else curve(common, where)
-            for name in names
-        )
-    )
+    curves = []
+    for number, name in enumerate(names):
+        of, key = (inputs[name], f'{where}.inputs.{name}') if name in inputs else (common, where)
+        curves.append(curve(of, key))
+        if context.closure.bounds:
+            refuse_beyond(context.closure, number, key, curves[-1](0)[0], extent(of))
+    return ClockedDrive(tuple(curves))
 
 
 def as_integers(*numbers: float) -> tuple[list[int], int]:

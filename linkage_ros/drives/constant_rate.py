@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 
 from linkage_ros.drives.clocked import as_integers, build_clocked, ClockedDrive, Curve, LARGEST
 from linkage_ros.drives.drive import Context
@@ -56,7 +57,15 @@ PARAMETERS = ConstantRateParameters
 
 def build(parameters: ConstantRateParameters, context: Context) -> ClockedDrive:
     """Build the drive."""
-    return build_clocked('drive.constant_rate', parameters, parameters.inputs, context, curve)
+    return build_clocked(
+        'drive.constant_rate', parameters, parameters.inputs, context, curve, extent
+    )
+
+
+def extent(parameters: ConstantRate) -> tuple[float, float]:
+    """Return between which values an input stays, in [rad] or [m]."""
+    start, rate = parameters.start, parameters.rate
+    return (-inf if rate < 0.0 else start), (inf if rate > 0.0 else start)
 
 
 def curve(parameters: ConstantRate, _where: str = '') -> Curve:

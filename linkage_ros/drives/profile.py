@@ -37,6 +37,7 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import copysign, inf, sqrt
 
 from linkage_ros.drives.clocked import build_clocked, ClockedDrive, Curve, LARGEST
 from linkage_ros.drives.drive import Context
@@ -80,7 +81,34 @@ def build(parameters: ProfileParameters, context: Context) -> ClockedDrive:
         Where a table has less than two rows, or times that do not increase.
 
     """
-    return build_clocked('drive.profile', parameters, parameters.inputs, context, curve)
+    return build_clocked('drive.profile', parameters, parameters.inputs, context, curve, extent)
+
+
+def extent(parameters: Profile) -> tuple[float, float]:
+    """Return between which values an input stays, in [rad] or [m]."""
+    values = [value for _, value in parameters.table]
+    gain = values[-1] - values[0] if parameters.repeat else 0.0
+    found = list(values)
+    if parameters.interpolation == 'cubic':  # the others do not swing beyond their rows
+        times = [time for time, _ in parameters.table]
+        seconds = [after - before for before, after in pairwise(times)]
+        for value, (c1, c2, c3, _, _) in zip(
+            values, _polynomials(parameters, seconds), strict=False
+        ):
+            found += [value + x * (c1 + x * (c2 + x * c3)) for x in _turns_at(c1, c2, c3)]
+    return (-inf if gain < 0.0 else min(found)), (inf if gain > 0.0 else max(found))
+
+
+def _turns_at(c1: float, c2: float, c3: float) -> list[float]:
+    """Return where between 0 and 1 the slope c₁ + 2c₂x + 3c₃x² is 0."""
+    root = c2 * c2 - 3.0 * c1 * c3
+    if root < 0.0:
+        return []
+    # Of the two forms of a root the one in which nothing cancels (Press et al., section 5.6).
+    q = -(c2 + copysign(sqrt(root), c2))
+    found = [q / (3.0 * c3)] if c3 else []
+    found += [c1 / q] if q else []
+    return [x for x in found if 0.0 < x < 1.0]
 
 
 def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
@@ -90,13 +118,7 @@ def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
     begin, length = times[0], times[-1] - times[0]
     starts = [time - begin for time in times[:-1]]
     seconds = [(after - before) / NANOSECONDS for before, after in pairwise(times)]
-    steps = [after - before for before, after in pairwise(values)]
-    if parameters.interpolation == 'linear':
-        polynomials = [(step, 0.0, 0.0, 0.0, 0.0) for step in steps]
-    elif parameters.interpolation == 'cubic':
-        polynomials = _cubic(seconds, steps, periodic=parameters.repeat)
-    else:
-        polynomials = [(0.0, 0.0, 10 * step, -15 * step, 6 * step) for step in steps]
+    polynomials = _polynomials(parameters, seconds)
     durations = [after - before for before, after in pairwise(times)]
     pieces = list(zip(starts, durations, values, seconds, polynomials, strict=False))
     before, after = (values[0], 0.0, 0.0), (values[-1], 0.0, 0.0)
@@ -121,6 +143,16 @@ def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
         )
 
     return profile
+
+
+def _polynomials(parameters: Profile, seconds: Sequence[float]) -> list[_Polynomial]:
+    """Return the polynomial that leads from each row to the next, but for its constant."""
+    steps = [after - before for (_, before), (_, after) in pairwise(parameters.table)]
+    if parameters.interpolation == 'linear':
+        return [(step, 0.0, 0.0, 0.0, 0.0) for step in steps]
+    if parameters.interpolation == 'cubic':
+        return _cubic(seconds, steps, periodic=parameters.repeat)
+    return [(0.0, 0.0, 10 * step, -15 * step, 6 * step) for step in steps]
 
 
 def _times(table: Sequence[tuple[float, float]], where: str) -> list[int]:

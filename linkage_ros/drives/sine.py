@@ -54,7 +54,12 @@ PARAMETERS = SineParameters
 
 def build(parameters: SineParameters, context: Context) -> ClockedDrive:
     """Build the drive."""
-    return build_clocked('drive.sine', parameters, parameters.inputs, context, curve)
+    return build_clocked('drive.sine', parameters, parameters.inputs, context, curve, extent)
+
+
+def extent(parameters: Sine) -> tuple[float, float]:
+    """Return between which values an input stays, in [rad] or [m]."""
+    return parameters.mean - parameters.amplitude, parameters.mean + parameters.amplitude
 
 
 def curve(parameters: Sine, _where: str = '') -> Curve:

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
-from math import floor, inf, isfinite, tau
+from math import copysign, inf, isfinite
 
 from linkage_ros.drives.drive import Context, CrankState, Reader
 from linkage_ros.dynamics.integrators.method import METHODS
@@ -70,8 +70,8 @@ class TorqueParameters:
         'rate after an impact on a stop, by that before', 0.0, least=0.0, most=1.0
     )
     stop_margin: float = number(
-        'how far within the ends of its range the input is stopped, as a share of the range: at '
-        'the end, a toggle, the inertia is without bounds',
+        'how far before a toggle at an end of its range the input is stopped, as a share of the '
+        'range: at the toggle the inertia is without bounds; a limit is a stop itself',
         1e-3,
         above=0.0,
         most=0.49,
@@ -132,21 +132,24 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         )
     # A scene with slow ticks does not lose time between them.
     period = round(NANOSECONDS / context.rate) if context.rate else 0
-    return TorqueDrive(motion, start, parameters, max(_MADE_UP, 2 * period))
+    most = closure.linkage.inputs[0].limits.effort
+    return TorqueDrive(motion, start, parameters, max(_MADE_UP, 2 * period), min(most, LARGEST))
 
 
 def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]:
-    """Return where the input is stopped, in [rad] or [m]."""
+    """Return where the input is stopped, in [rad] or [m]: at limits, or before a toggle."""
+    # Where the input has limits itself, its angle counts with all turns.
+    counted = closure.linkage.inputs[0].limits.bounded
     for each in closure.input_ranges:
         if each.whole:
             return -inf, inf
-        turns = floor((start - each.lowest) / tau) * tau if each.turning else 0.0
-        low, high = each.lowest + turns, each.highest + turns
+        turns = 0.0 if counted else each.shift(start)
+        low, high = each.lowest - turns, each.highest - turns
         within = margin * (high - low)
         low, high = (
-            end + inwards if limited else copy
-            for end, inwards, copy, limited in zip(
-                (low, high), (within, -within), (-inf, inf), each.limited, strict=True
+            (end if by else end + inwards) if limited else copy
+            for end, inwards, copy, limited, by in zip(
+                (low, high), (within, -within), (-inf, inf), each.limited, each.by, strict=True
             )
         )
         if low <= start <= high:
@@ -175,6 +178,8 @@ class TorqueDrive:
         Step, and what holds while no command does.
     made_up
         The longest time that a tick makes up for, in [ns].
+    most
+        The greatest effort, either way, in [N·m] or [N]: what is commanded beyond it is cut to it.
 
     """
 
@@ -184,12 +189,14 @@ class TorqueDrive:
         '_idle',
         '_made_up',
         '_mechanism',
+        '_most',
         '_motion',
         '_step',
         '_time',
         '_until',
         'lost',
         'max_age',
+        'saturated',
         'stamp',
     )
 
@@ -199,9 +206,16 @@ class TorqueDrive:
     """How long a command holds, in [ns]."""
     lost: int
     """Time that was left out, in [ns]."""
+    saturated: int
+    """Commands that were cut to the effort limit."""
 
     def __init__(
-        self, mechanism: OneFreedom, start: Motion, use: TorqueParameters, made_up: int
+        self,
+        mechanism: OneFreedom,
+        start: Motion,
+        use: TorqueParameters,
+        made_up: int,
+        most: float = LARGEST,
     ) -> None:
         self._mechanism = mechanism
         self._motion = start
@@ -211,7 +225,8 @@ class TorqueDrive:
         self._time = self._boundary = -1
         self._until = _NEVER
         self.max_age = round(use.timeout * NANOSECONDS)
-        self.stamp = self.lost = 0
+        self._most = most
+        self.stamp = self.lost = self.saturated = 0
 
     def offer(self, command: EffortCommand, now: int) -> Rejection | None:
         """
@@ -230,6 +245,9 @@ class TorqueDrive:
             if isfinite(effort):
                 return Rejection.EFFORT_TOO_LARGE
             return Rejection.EFFORT_NOT_FINITE
+        if not -self._most <= effort <= self._most:
+            effort = copysign(self._most, effort)
+            self.saturated += 1
         force = (effort, 0.0)
         if self._time >= 0:
             self._advance(now)

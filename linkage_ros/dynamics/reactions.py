@@ -46,7 +46,7 @@ from linkage_ros.kinematics.structure import Joint
 from linkage_ros.tuples import new
 import numpy as np
 
-_CLOSED = Status.CLOSED
+_SOLVED = (Status.CLOSED, Status.LIMITED)
 
 
 class Reaction(NamedTuple):
@@ -219,7 +219,7 @@ class Reactions:
             Of each published joint, in [rad] or [m].
 
         """
-        if position.status is not _CLOSED:
+        if position.status not in _SOLVED:
             return None
         places, x = self._follower.places(position), position.state.coordinates
         matrix, lines = self._matrix.at(x, places), self._matrix.lines
@@ -258,7 +258,7 @@ class Reactions:
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> tuple[list[float], list[float]] | None:
         """Return the solution of the system, and what each joint resists its motion with."""
-        if position.status is not _CLOSED:
+        if position.status not in _SOLVED:
             return None
         loads, scale = self._mechanics.loads, self._scale
         gravity = complex(*loads.gravity)

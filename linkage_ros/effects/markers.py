@@ -192,6 +192,8 @@ class Markers:
         said = f'{position.status.value}: no pose'
         if position.status is Status.OPEN:
             said = f'open: the links miss each other by {position.gap:.3g} m'
+        elif position.status is Status.LIMITED:
+            said = 'limited: a joint is beyond its limits'
         shapes = self._shapes
         markers = [
             marker._replace(text=said)

@@ -23,14 +23,18 @@ then mix and quantise what they get without a thought of wrapping; `all_wrapped`
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import pi, remainder, tau
 
 from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.tuples import new
 
+Begin = Callable[[float], float]
+"""Returns the turn of an angle that is published first."""
 
-def continuous(turning: Sequence[bool]) -> Sensor:
+
+def continuous(turning: Sequence[bool], begins: Mapping[int, Begin] | None = None) -> Sensor:
     """
     Build what lets angles run on without jumps; the first lies in (−π, π].
 
@@ -38,8 +42,11 @@ def continuous(turning: Sequence[bool]) -> Sensor:
     ----------
     turning
         For each joint whether it is an angle.
+    begins
+        For joints that begin elsewhere, by their numbers, where.
 
     """
+    begin = {i: wrapped for i, turns in enumerate(turning) if turns} | dict(begins or {})
     places = tuple(i for i, turns in enumerate(turning) if turns)
     raw: tuple[float, ...] = ()
     """The angles as they came last."""
@@ -60,12 +67,29 @@ def continuous(turning: Sequence[bool]) -> Sensor:
             now = [v + n * tau if n else v for v, n in zip(joints, added, strict=True)]
         else:
             raw = joints
-            now = [wrapped(v) if i in places else v for i, v in enumerate(joints)]
+            now = [begin[i](v) if i in places else v for i, v in enumerate(joints)]
             added = _turns([round((w - v) / tau) for w, v in zip(now, joints, strict=True)])
         stamp, _, rates, accelerations, efforts = reading
         return new(Reading, (stamp, tuple(now), rates, accelerations, efforts))
 
     return run_on
+
+
+def beginnings(closure: Closure) -> dict[int, Begin]:
+    """
+    Return how published angles begin that have limits, by the numbers of the joints.
+
+    One that depends begins nearest to the middle of its limits, and so within them; one that is
+    driven begins where it is sent.
+    """
+    bounds, joints = closure.bounds, list(closure.linkage.joints)
+    found: dict[int, Begin] = {
+        bound.number: bound.turned for bound in bounds.joints if bound.middle is not None
+    }
+    for bound in bounds.inputs:
+        if bound.name in joints and closure.turning[joints.index(bound.name)]:
+            found[joints.index(bound.name)] = float
+    return found
 
 
 def _followed(

@@ -18,10 +18,17 @@
 from __future__ import annotations
 
 from itertools import combinations
-from math import isfinite
+from math import inf, isfinite, isnan
 
 from linkage_ros.errors import DefinitionError, quoted
-from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, RevoluteJoint, Slider
+from linkage_ros.kinematics.linkage import (
+    GROUND,
+    Input,
+    Limits,
+    Linkage,
+    RevoluteJoint,
+    Slider,
+)
 
 
 def check(linkage: Linkage) -> None:
@@ -57,6 +64,7 @@ def check(linkage: Linkage) -> None:
                 _check_link(linkage, f'joints.{name}.{end}', getattr(joint, end))
         else:
             _check_slider_name(linkage, f'joints.{name}.slider', joint.slider)
+    _check_all_limits(linkage)
     points = {point for carried in linkage.links.values() for point in carried}
     for point in (*linkage.traced, *(linkage.pose.points if linkage.pose else ())):
         if point not in points:
@@ -155,6 +163,53 @@ def _check_input(linkage: Linkage, given: Input) -> None:
             f'no point is named both on {given.parent!r} and on {given.child!r}',
             f'name the pin about which {given.joint!r} turns on both',
         )
+
+
+def _check_all_limits(linkage: Linkage) -> None:
+    for given in linkage.inputs:
+        _check_limits('input', given.limits, given.joint)
+    for name, joint in linkage.joints.items():
+        _check_limits(f'joints.{name}', joint.limits, name)
+        ends = (joint.limits.low, joint.limits.high)
+        if isinstance(joint, RevoluteJoint) and ends != (-inf, inf) and inf in map(abs, ends):
+            raise DefinitionError(
+                f'joints.{name}.limits',
+                f'{joint.limits} limits the angle on one side, and angles come round to it',
+                'write two finite numbers',
+            )
+    if linkage.pose:
+        for given, value in zip(linkage.inputs, linkage.pose.inputs, strict=False):
+            if not given.limits.low <= value <= given.limits.high:
+                raise DefinitionError(
+                    'pose.inputs',
+                    f'{value:g} is beyond the limits {given.limits} of {quoted(given.joint)}',
+                    'start within the limits, or widen them',
+                )
+
+
+def _check_limits(key: str, limits: Limits, name: str) -> None:
+    """Refuse limits between which nothing is."""
+    low, high = limits.low, limits.high
+    if isnan(low) or isnan(high) or low == inf or high == -inf:
+        raise DefinitionError(
+            f'{key}.limits',
+            f'{limits} of {quoted(name)} are no limits',
+            'write [low, high]; -.inf or .inf for none on a side',
+        )
+    if low >= high:
+        said = 'are the same number' if low == high else 'cross'
+        raise DefinitionError(
+            f'{key}.limits',
+            f'{limits} of {quoted(name)} {said}',
+            'write [low, high], the lower one first',
+        )
+    for what in ('velocity', 'effort'):
+        if not (value := getattr(limits, what)) > 0.0:
+            raise DefinitionError(
+                f'{key}.{what}',
+                f'{value:g} of {quoted(name)} lets nothing move',
+                'write a number of more than 0, or leave it out',
+            )
 
 
 def _check_slider_name(linkage: Linkage, key: str, name: str) -> None:

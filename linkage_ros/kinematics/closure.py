@@ -28,15 +28,18 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import quoted
 from linkage_ros.kinematics.checks import check
+from linkage_ros.kinematics.cylinder import without_mirrored
 from linkage_ros.kinematics.groups import find_groups
+from linkage_ros.kinematics.limits import Bounds, limited
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.machine_ranges import input_ranges
 from linkage_ros.kinematics.nearness import (
     Nearness,
     nearness,
     singular_inputs,
     SingularInput,
 )
-from linkage_ros.kinematics.ranges import input_ranges, InputRange
+from linkage_ros.kinematics.ranges import closing_ranges, InputRange
 from linkage_ros.kinematics.solution import Planner
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import Pose, State
@@ -175,6 +178,15 @@ class Closure:
         self._driven = len(linkage.inputs)
         factors = [1.0 / self.scale if given.slider else 1.0 for given in linkage.inputs]
         self._factors = None if set(factors) == {1.0} else factors
+        self.bounds = Bounds(linkage)
+        """The limits between which its joints stay."""
+        self._keep_limits()
+
+    def _keep_limits(self) -> None:
+        """Let positions tell of limits; where there are none, nothing is asked at any."""
+        vars(self).pop('position', None)
+        if self.bounds:
+            self.position = limited(self.position, self.bounds)  # type: ignore[method-assign]
 
     def position(self, *inputs: float) -> Position:
         """
@@ -213,6 +225,10 @@ class Closure:
         for i, j, factor, constant in self._terms:
             joints += (factor * (x[i] - x[j]) + constant,)
         return new(Position, (status, 0.0, joints, state, poses))
+
+    def posed(self, *inputs: float) -> Position:
+        """Close the loops as `position` does, whatever the limits."""
+        return type(self).position(self, *inputs)
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
         """
@@ -306,7 +322,14 @@ class Closure:
             Where the arrays do not fit each other, the linkage or ``out``.
 
         """
-        return self._solver.solve(inputs, rates, accelerations, derivatives, out)
+        batch = self._solver.solve(inputs, rates, accelerations, derivatives, out)
+        if self.bounds:
+            from linkage_ros.kinematics.batch.limits import (  # local import: needs numpy
+                mark_limited,
+            )
+
+            mark_limited(self.bounds, inputs, batch)
+        return batch
 
     @cached_property
     def _solver(self) -> Solver:
@@ -327,8 +350,8 @@ class Closure:
         speeds = State(velocity.state.coordinates, list(velocity.state.pins))
         changes = State(acceleration.state.coordinates, list(acceleration.state.pins))
         for step in self._more_steps:
-            step.rates((), state, speeds)
-            step.accelerations((), None, state, speeds, changes)
+            rates = step.rates((), state, speeds)
+            step.accelerations((), rates, state, speeds, changes)
         return {
             key: PointMotion(*(values.pins[i] * self.scale for values in (state, speeds, changes)))
             for key, i in self._point_index.items()
@@ -361,6 +384,19 @@ class Closure:
             for name, slide in self.slides.items()
         }
 
+    def beyond(self, position: Position) -> str:
+        """Return of a pose which joint is beyond its limits, in words; '' where none is."""
+        factors = self._factors or [1.0] * len(self.linkage.inputs)
+        driven = zip(position.state.coordinates[1:], factors, strict=False)
+        inputs = [value / factor for value, factor in driven]
+        joints = position.joints or self.position(*inputs).joints
+        bound = self.bounds.exceeded(inputs, joints) if joints else None
+        if bound is None:
+            return ''
+        driven_one = bound in self.bounds.inputs
+        value = bound.turned((inputs if driven_one else joints)[bound.number])
+        return f'{bound.name} at {value:.6g}, limits {self.linkage.limits[bound.name]}'
+
     def residual(self, position: Position) -> float:
         """
         Return what is left open by a closed position, in [m].
@@ -384,13 +420,27 @@ class Closure:
 
     @cached_property
     def input_ranges(self) -> tuple[InputRange, ...]:
-        """Where the single input closes every loop, in [rad] or [m]; of several inputs, none."""
+        """
+        Where the single input can go, in [rad] or [m]; of several inputs, none.
+
+        Every loop closes there, and no joint is beyond its limits.
+        """
         return input_ranges(self)
 
     @cached_property
     def singular_inputs(self) -> tuple[SingularInput, ...]:
         """Where a single input meets toggles and change points; of several inputs, none."""
         return singular_inputs(self)
+
+    @cached_property
+    def closing_ranges(self) -> tuple[InputRange, ...]:
+        """
+        Where the single input closes every loop, whatever the limits; of several inputs, none.
+
+        Of a cylinder those of positive length, unless it starts, or is limited to, the others.
+        """
+        found = closing_ranges(self)
+        return without_mirrored(self.linkage, self.structure, 0, found) if found else ()
 
     def nearness(self, position: Position) -> Nearness:
         """Return how near trouble a closed position is."""

@@ -49,7 +49,7 @@ class Constraints:
     linkage
         The linkage.
     joints
-        All its joints.
+        Those of the group.
     links
         The links of the group.
     planner
@@ -73,8 +73,7 @@ class Constraints:
         self._known_pins: dict[str, int] = {}
         self.slides: dict[str, OnLine] = {}
         for joint in joints:
-            if joint.link in self._bodies or joint.to in self._bodies:
-                self._add_joint(joint)
+            self._add_joint(joint)
         self._add_drives()
 
     def iteration(self, before: tuple[Step, ...]) -> Iteration:
@@ -102,8 +101,12 @@ class Constraints:
             self._linkage, self._links, planner.blocks, planner.points, planner.scale, place_known
         )
         sliding = tuple(bool(given.slider) for given in self._linkage.inputs)
+        far = sum(
+            max(abs(one - other) for one in points.values() for other in points.values())
+            for points in planner.points.values()
+        )
         return Iteration(
-            tuple(self._constraints), tuple(self.slides.values()), start, before, sliding
+            tuple(self._constraints), tuple(self.slides.values()), start, before, sliding, far
         )
 
     def _add_joint(self, joint: Joint) -> None:

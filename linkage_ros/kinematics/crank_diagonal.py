@@ -43,7 +43,10 @@ class CrankDiagonal:
         upper² − s² = (upper² − (a + d)²) + far² = (upper² − (d − a)²) − near²
 
     Where a and d are long beside upper, so that no stretch can be near s = a + d, the last line is
-    taken: the one before it would cancel a + d. The brackets are constants of the linkage.
+    taken: the one before it would cancel a + d. The brackets are constants of the linkage, and so
+    is the sum of both, span = upper² − lower². It gives the greater one from the smaller: where
+    they are alike, what rounds the one then makes the other as much smaller, and their product,
+    which has its extreme there, loses nothing. Each from its own bracket, it lost 147 u·κ.
 
     Parameters
     ----------
@@ -53,17 +56,22 @@ class CrankDiagonal:
         The margins |d − a| − lower and upper − a − d, correctly rounded; stretch is infinite where
         the dyad has no upper limit.
     limits
-        lower and upper.
+        lower and upper, and the span, which their difference would cancel; infinite likewise.
     arms
         Indices, among the coordinates, of the directions of OA and OD.
     offset
         φ less the difference of those two coordinates, in (−π, π] rad.
 
+    Attributes
+    ----------
+    along, quad, root
+        a·(d − a), 4ad and 2·√(ad), correctly rounded.
+
     """
 
     __slots__ = (
-        '_constants', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits', 'sides',
-        'stretch_margin',
+        '_constants', 'along', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits',
+        'quad', 'root', 'sides', 'stretch_margin',
     )  # fmt: skip
 
     _at_change_point = Status.CHANGE_POINT
@@ -74,28 +82,31 @@ class CrankDiagonal:
         d: float,
         fold: float,
         stretch: float,
-        limits: tuple[float, float],
+        limits: tuple[float, float, float],
         arms: tuple[int, int] = (1, 0),
         offset: float = 0.0,
     ) -> None:
-        lower, upper = limits
+        lower, upper, _ = limits
         least = abs(d - a)
         self.least = (Fraction(d) - Fraction(a)) ** 2
         self.sides = (a, d)
+        self.along = float(Fraction(a) * (Fraction(d) - Fraction(a)))
         self.limits = limits
         self.fold_margin, self.stretch_margin = fold, stretch
         self.brackets = (fold * (least + lower), stretch * (upper + a + d))
         short_pair = a + d > 2.0 * upper
         whole = (fsum((upper, -max(a, d), min(a, d)))) * (upper + least) if short_pair else 0.0
-        # Two roots, since a·d may underflow where the lengths differ by many decades.
-        self._constants = (a, d - a, 2.0 * sqrt(a) * sqrt(d), *self.brackets, short_pair, whole)
+        self.root, self.quad = mean_root(a, d), float(4 * Fraction(a) * Fraction(d))
+        self._constants = (
+            a, d - a, float(self.least), self.root, self.quad, *self.brackets, short_pair, whole,
+        )  # fmt: skip
         self.arms = (*arms, offset)
         self.half_turn = (sin(0.5 * offset), cos(0.5 * offset))
 
     def at(self, known: State) -> Diagonal:
         """Return the diagonal."""
         x = known[0]
-        a, difference, root, fold, stretch, short_pair, whole = self._constants
+        a, difference, least, root, quad, fold, stretch, short_pair, whole = self._constants
         first, second, offset = self.arms
         base = x[second]
         half = 0.5 * (x[first] - base)
@@ -108,27 +119,30 @@ class CrankDiagonal:
                 half_cosine * cosine - half_sine * sine,
             )
         near, far = root * half_sine, root * half_cosine
-        excess = near * near
-        square = difference * difference + excess
-        lower, upper = self.limits
+        # Not of the roots, which are rounded once more.
+        excess, rest = quad * half_sine * half_sine, quad * half_cosine * half_cosine
+        square = least + excess
+        lower, upper, _ = self.limits
         if square < SMALLEST:
             status = Status.OPEN if lower else Status.INDETERMINATE
             return Diagonal(0.0, 0.0, 0.0, 0.0, lower, near, far, 0.0, status)
         direction = base + atan2(
             -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
         )
-        root_fold, missing = reach(fold, near)
+        root_fold, missing = reach(fold, near, excess)
         if missing:
             gap = missing / (sqrt(square) + lower)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
         root_stretch = 1.0
         if short_pair:
-            root_stretch, missing = root_of(whole - near * near, abs(whole) + near * near)
+            root_stretch, missing = root_of(whole - excess, abs(whole) + excess)
         elif upper != inf:
-            root_stretch, missing = reach(stretch, far)
+            root_stretch, missing = reach(stretch, far, rest)
         if missing:
             gap = missing / (sqrt(square) + upper)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
+        if upper != inf:
+            root_fold, root_stretch = self._complemented(excess, rest, root_fold, root_stretch)
         status = _CLOSED
         if (root_fold == 0.0 and fold) or (root_stretch == 0.0 and stretch):
             status = Status.TOGGLE
@@ -140,6 +154,20 @@ class CrankDiagonal:
             Diagonal,
             (square, direction, root_fold, root_stretch, 0.0, near, far, excess, status),
         )
+
+    def _complemented(
+        self, excess: float, rest: float, root_fold: float, root_stretch: float
+    ) -> tuple[float, float]:
+        """Return both roots; the greater is made of the smaller, where it is not signed."""
+        _, _, _, _, _, fold, stretch, short_pair, whole = self._constants
+        folding, stretching = fold + excess, whole - excess if short_pair else stretch + rest
+        if (fold and not root_fold) or (stretch and not root_stretch):
+            return root_fold, root_stretch
+        if folding < stretching and stretch:
+            root_stretch = sqrt(self.limits[2] - folding)
+        elif folding >= stretching and fold:
+            root_fold = sqrt(self.limits[2] - stretching)
+        return root_fold, root_stretch
 
     def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> Growth:
         """
@@ -155,18 +183,17 @@ class CrankDiagonal:
         """
         v = speeds[0]
         first, second, _ = self.arms
-        square, _, fold, stretch, _, near, far, _, _ = diagonal
-        a, difference = self._constants[:2]
-        p = (a * difference - 0.5 * near * near) / square
+        square, _, fold, stretch, _, near, far, excess, _ = diagonal
+        p = (self.along - 0.5 * excess) / square
         q = 0.5 * near * far / square
-        fold_ratio, stretch_ratio = self._ratios(near, far, fold, stretch)
+        fold_ratio, stretch_ratio = self.ratios(near, far, fold, stretch)
         base = v[second]
         lean = 0.5 * fold_ratio * stretch_ratio / square
         return new(Growth, (q - 1j * p, v[first] - base, base, lean))
 
-    def _ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
+    def ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
         """Return near by fold and far by stretch; where one is the other the ratio is 1."""
-        _, _, _, fold_bracket, stretch_bracket, _, _ = self._constants
+        fold_bracket, stretch_bracket = self.brackets
         return (
             near / fold if fold_bracket else 1.0,
             far / stretch if stretch_bracket else 1.0,
@@ -190,10 +217,16 @@ class CrankDiagonal:
         a = changes[0]
         first, second, _ = self.arms
         q, p = growth.unit.real, -growth.unit.imag
+        short, long = self.sides
+        turn = p * (1.0 + p) + 1j * (q * ((long - short) * (long + short) / diagonal.square))
+        bend = self.bend(diagonal)
+        return new(GrowthChange, (turn, a[first] - a[second], a[second], bend))
+
+    def bend(self, diagonal: Diagonal) -> float:
+        """Return the bend that `accelerations` tells of."""
         square, _, fold, stretch, _, near, far, _, _ = diagonal
-        (short, long), (fold_bracket, stretch_bracket) = self.sides, self.brackets
-        turn = p + (p - q) * (p + q) + 1j * (q * ((long - short) * (long + short) / square))
-        fold_ratio, stretch_ratio = self._ratios(near, far, fold, stretch)
+        fold_bracket, stretch_bracket = self.brackets
+        fold_ratio, stretch_ratio = self.ratios(near, far, fold, stretch)
         bend = 0.0
         if fold_bracket:
             bend = fold_bracket * (far / fold) / fold * (stretch_ratio / fold)
@@ -201,13 +234,23 @@ class CrankDiagonal:
             bend -= near * fold_ratio
         elif stretch_bracket:
             bend -= stretch_bracket * (near / stretch) / stretch * (fold_ratio / stretch)
-        return new(GrowthChange, (turn, a[first] - a[second], a[second], 0.25 * bend / square))
+        return 0.25 * bend / square
 
     @property
     def singular_angles(self) -> tuple[float, ...]:
         """Differences of the two coordinates at which all links lie in one line, in [rad]."""
         margins = ((self.fold_margin, 0.0), (self.stretch_margin, pi))
         return tuple(phi - self.arms[2] for margin, phi in margins if margin == 0.0)
+
+
+def mean_root(a: float, d: float) -> float:
+    """Return 2·√(ad), correctly rounded."""
+    # Two roots, since a·d may underflow where the lengths differ by many decades.
+    root = 2.0 * sqrt(a) * sqrt(d)
+    if not root:
+        return root
+    exact = Fraction(root)
+    return float(exact - (exact - 4 * Fraction(a) * Fraction(d) / exact) / 2)
 
 
 class UnsignedDiagonal(CrankDiagonal):
@@ -228,6 +271,6 @@ class UnsignedDiagonal(CrankDiagonal):
         found = super().at(known)
         return found._replace(fold=abs(found.fold), stretch=abs(found.stretch))
 
-    def _ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
+    def ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
         """Return near by fold and far by stretch."""
         return near / fold, far / stretch

@@ -83,7 +83,10 @@ class Growth(NamedTuple):
 
 class GrowthChange(NamedTuple):
     """
-    The derivative of a `Growth`: change·unit + swing²·square + i·base.
+    The derivative of a `Growth`, ṡ² / s² added: change·unit + swing²·square + i·base.
+
+    So the square's real part is s̈/s at a rate of 1, which is no difference of large numbers where
+    A is next to D.
 
     The bend is what the square's real part leaves of a dyad's own second derivative (each dyad
     says what), by fold and stretch: near a change point a difference of large numbers, so a

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from cmath import rect
 from collections.abc import Sequence
-from math import remainder, tau
+from math import hypot, remainder, tau
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.step import State
@@ -117,6 +117,70 @@ def equations(
             errors.append(error)
             rows.append(row)
     return np.array(errors), np.array(rows)
+
+
+def spread(
+    constraints: Sequence[Constraint],
+    unknowns: Array,
+    known: State,
+    moved: Array,
+    known_moved: State,
+) -> Array:
+    """
+    Return a bound of how much the derivatives by the unknowns change, entry by entry.
+
+    Parameters
+    ----------
+    constraints, unknowns, known
+        As of `equations`.
+    moved
+        How far each unknown moves from its value, in either direction.
+    known_moved
+        How far each coordinate and each pin moves that is known before.
+
+    """
+    n = len(unknowns)
+    rows = []
+    values, ways = unknowns.tolist(), moved.tolist()
+    for constraint in constraints:
+        if isinstance(constraint, Meeting):
+            across, along = [0.0] * n, [0.0] * n
+            for end in constraint:
+                if end.body >= 0:
+                    k = 3 * end.body
+                    turn, arm = ways[k], _place(end, values, known)[1]
+                    # |d(r·sin)| ≤ |r·cos|·|dφ| + |r|·dφ²/2, and likewise for the cosine.
+                    curved = 0.5 * abs(end.arm) * turn * turn
+                    across[k] += abs(arm.real) * turn + curved
+                    along[k] += abs(arm.imag) * turn + curved
+            rows += [across, along]
+        elif isinstance(constraint, Parallel):
+            rows.append([0.0] * n)
+        else:
+            rows.append(_line_spread(constraint, values, known, ways, known_moved))
+    return np.array(rows)
+
+
+def _line_spread(
+    line: OnLine, values: Sequence[float], known: State, ways: Sequence[float], moved: State
+) -> list[float]:
+    row = [0.0] * len(values)
+    facing = line.line
+    turn = ways[3 * facing.body] if facing.body >= 0 else moved[0][facing.coordinate]
+    far = 0.0
+    for end in (line.point, line.through):
+        if end.body < 0:
+            far += float(abs(moved[1][end.pin]))
+            continue
+        k = 3 * end.body
+        reach = abs(end.arm)
+        far += hypot(ways[k + 1], ways[k + 2]) + reach * ways[k]
+        row[k] += reach * (ways[k] + turn)
+        row[k + 1] += turn
+        row[k + 2] += turn
+    if facing.body >= 0:
+        row[3 * facing.body] += abs(along(line, known, values)) * turn + far
+    return row
 
 
 def derivative(

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from cmath import phase
 from fractions import Fraction
-from math import inf
+from math import inf, sqrt
 
 from linkage_ros.kinematics.diagonal import Diagonal, Growth, GrowthChange
 from linkage_ros.kinematics.rounding import root_of, SMALLEST
@@ -39,7 +39,7 @@ class FreeDiagonal:
     ends
         Indices of A and D among the pins.
     limits
-        lower and upper of s.
+        lower and upper of s, and upper² − lower², as of a `CrankDiagonal`.
 
     """
 
@@ -47,7 +47,7 @@ class FreeDiagonal:
 
     least = Fraction(0)
 
-    def __init__(self, ends: tuple[int, int], limits: tuple[float, float]) -> None:
+    def __init__(self, ends: tuple[int, int], limits: tuple[float, float, float]) -> None:
         self._ends = ends
         self._limits = limits
 
@@ -72,22 +72,32 @@ class FreeDiagonal:
         first, second = self._ends
         pins, pulls = known[1], changes[1]
         unit = growth.unit
-        square = (pulls[second] - pulls[first]) / (pins[second] - pins[first]) - unit * unit
+        square = (pulls[second] - pulls[first]) / (pins[second] - pins[first])
+        square += unit.imag * (unit.imag - 2j * unit.real)
         return new(GrowthChange, (square, 0.0, 0.0, None))
 
 
-def free_diagonal(vector: complex, size: float, lower: float, upper: float) -> Diagonal:
+def free_diagonal(
+    vector: complex, size: float, lower: float, upper: float, span: float
+) -> Diagonal:
     """Return the diagonal of a vector whose ends have coordinates of a size."""
     s = abs(vector)
     square = s * s
     if square < SMALLEST:
         status = Status.OPEN if lower else Status.INDETERMINATE
         return Diagonal(0.0, 0.0, 0.0, 0.0, lower, 0.0, 0.0, 0.0, status)
-    root_fold, missing = root_of((s - lower) * (s + lower), (size + lower) * (s + lower))
+    folding = (s - lower) * (s + lower)
+    root_fold, missing = root_of(folding, (size + lower) * (s + lower))
     gap, root_stretch = missing / (s + lower), 1.0
     if upper != inf and not gap:
-        root_stretch, missing = root_of((upper - s) * (upper + s), (size + upper) * (upper + s))
+        stretching = (upper - s) * (upper + s)
+        root_stretch, missing = root_of(stretching, (size + upper) * (upper + s))
         gap = missing / (upper + s)
+        if root_fold and root_stretch:
+            if folding < stretching:
+                root_stretch = sqrt(span - folding)
+            else:
+                root_fold = sqrt(span - stretching)
     if gap:
         return Diagonal(square, 0.0, 0.0, 0.0, gap, 0.0, 0.0, 0.0, Status.OPEN)
     status = _CLOSED if root_fold and root_stretch else Status.TOGGLE

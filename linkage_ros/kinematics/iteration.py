@@ -21,20 +21,21 @@ meet, a slider keeps an angle and a point on a line, a driven joint fixes an ang
 many equations as unknowns, with the Jacobian written out. Velocities and accelerations solve the
 same matrix for the constraints' own derivatives.
 
-The assembly is the one that the given pose leads to by continuity. To make that a function of the
-inputs alone, and not of where the linkage was before, the solution is continued once from the pose
-to knots, 256 to a turn (or to the unit of length), each from its neighbour; a state starts from
-the nearest knot. A step is taken only where Newton's method contracts from its first correction
-on, the pose moves little, and the Jacobian keeps its orientation; else it is halved, and where it
-gets too small, the assembly ends there: the linkage is at its limit.
+The assembly is the one that the given pose leads to by continuity. Of a single input it is a
+`Branch`, which is followed once, so that a state depends on its input alone, and not on where the
+linkage was before: it starts from the branch's own curve, and what Newton's method finds farther
+from there than the curve allows is no answer. Of several inputs the straight line from the pose's
+inputs is followed anew for each state, with the same proof that no other assembly is met.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import ceil, inf, remainder, tau
+from math import hypot, inf
 from typing import NamedTuple
 
+from linkage_ros.kinematics.branch import Branch, Start
+from linkage_ros.kinematics.continuation import Continuation
 from linkage_ros.kinematics.equations import (
     along,
     Array,
@@ -50,16 +51,17 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State, Step
 import numpy as np
 
-_KNOTS = 256
-_SMALLEST_STEP = 2.0**-20
-_FARTHEST = 0.5
-"""In [rad], or in lengths: a step that moves an angle or a place by more is halved."""
-
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 """Of the size of the coordinates: what a constraint may be off by at a solution."""
 
 _SINGULAR = 1e-11
-"""Smallest singular value of the Jacobian, of the largest, below which no rate is told."""
+"""Of several inputs: smallest singular value of the Jacobian, of the largest, that has rates."""
+
+_AROUND = 64.0
+"""In [rad] or lengths: what a search for a solution does not go beyond."""
+
+_MOVED = 1e-6
+"""In lengths: by less than that links are not said to miss each other."""
 
 
 class IteratedPose(NamedTuple):
@@ -99,10 +101,13 @@ class Iteration:
         The steps before this one.
     sliding
         For each input whether it is a slide.
+    far
+        Length that no slide needs to exceed for a link to be stretched.
 
     """
 
-    __slots__ = ('_before', '_constraints', '_inputs', '_knots', '_period', '_slides', '_start')
+    __slots__ = ('_before', '_branch', '_constraints', '_far', '_inputs', '_slides', '_sliding',
+                 '_solution', '_start')  # fmt: skip
 
     def __init__(
         self,
@@ -111,11 +116,14 @@ class Iteration:
         start: StartingPose,
         before: tuple[Step, ...],
         sliding: tuple[bool, ...],
+        far: float,
     ) -> None:
         self._constraints = constraints
         self._slides = slides
         self._before = before
         self._inputs = start.inputs
+        self._sliding = sliding
+        self._far = far
         self._start = np.array(
             [
                 value
@@ -123,34 +131,68 @@ class Iteration:
                 for value in (angle, place.real, place.imag)
             ]
         )
-        self._knots: dict[int, Array | None] = {}
-        spacing = tau / _KNOTS if not sliding[0] else 1.0 / _KNOTS
-        self._period = (spacing, not sliding[0] and len(sliding) == 1)
+        self._branch: Branch | None = None
+        self._solution: Array | None = None
 
     @property
     def equation_count(self) -> int:
         """How many equations are solved at once."""
         return len(self._start)
 
+    @property
+    def inputs(self) -> tuple[float, ...]:
+        """Return the inputs of the pose, as coordinates."""
+        return self._inputs
+
     def close(self, known: State) -> IteratedPose:
         """Append the angles of the bodies, the slides, and the places of the bodies."""
         end = 1 + len(self._inputs)
         inputs = known[0][1:end]
-        start, value = self._nearest(inputs)
-        solved = None
-        if start is not None:
-            solved = self._continue(start, value, inputs, known)
-        if solved is None:
-            return self._open(known, start)
-        unknowns, jacobian = solved
-        x, pins = known
-        x.extend(unknowns[0::3].tolist())
-        pins.extend((unknowns[1::3] + 1j * unknowns[2::3]).tolist())
-        for slide in self._slides:
-            x.append(along(slide, known, unknowns).real)
-        pose = IteratedPose(Status.CLOSED, 0.0, unknowns, jacobian)
-        singular = self.conditioning(pose) <= _SINGULAR
-        return pose._replace(status=Status.TOGGLE) if singular else pose
+        start = self._start_at(inputs)
+        if start is None:
+            return self._open(known, inputs)
+        found = self._correct(known, start.unknowns, start.farthest)
+        if start.ends:
+            # Where the Jacobian is singular, what Newton's method finds is no nearer.
+            found = start.unknowns, equations(self._constraints, start.unknowns, known)[1]
+        if found is None:
+            return self._open(known, inputs)
+        unknowns, jacobian = found
+        self._place(known, unknowns, start.turned)
+        pose = IteratedPose(
+            Status.TOGGLE if start.ends else Status.CLOSED, 0.0, unknowns, jacobian
+        )
+        if len(inputs) > 1 and self.conditioning(pose) <= _SINGULAR:
+            return pose._replace(status=Status.TOGGLE)
+        return pose
+
+    def branch(self) -> Branch | None:
+        """
+        Return the branch of a single input, followed when it is first asked for.
+
+        There is none where the pose leads to no solution.
+        """
+        if self._branch is None:
+            solution = self.solution()
+            if solution is None:
+                return None
+            self._branch = Branch(
+                Continuation(self._constraints, self._known, self._moving),
+                solution,
+                self._inputs[0],
+                self._known,
+                turning=not self._sliding[0],
+                far=self._far,
+            )
+        return self._branch
+
+    def solution(self) -> Array | None:
+        """Return the unknowns at the pose's inputs, nothing where the pose leads to none."""
+        if self._solution is None:
+            known = self._known_at(self._inputs)
+            found = self._correct(known, self._start, inf) if known is not None else None
+            self._solution = found[0] if found is not None else None
+        return self._solution
 
     def rates(self, pose: IteratedPose, known: State, speeds: State) -> Array:
         """Append the rates of what `close` has appended."""
@@ -180,109 +222,110 @@ class Iteration:
         values = np.linalg.svd(pose.jacobian, compute_uv=False)
         return float(values[-1] / values[0])
 
+    def solution_from(self, angles: Array) -> Array | None:
+        """
+        Return the solution at the pose's inputs that a start with these angles leads to.
+
+        The bodies start where they miss their constraints least, which are linear in the places.
+        """
+        known = self._known_at(self._inputs)
+        if known is None:
+            return None
+        start = np.zeros_like(self._start)
+        start[0::3] = angles
+        errors, jacobian = equations(self._constraints, start, known)
+        places = np.arange(len(start)) % 3 > 0
+        start[places] = np.linalg.lstsq(jacobian[:, places], -errors, rcond=None)[0]
+        found = self._correct(known, start, _AROUND)
+        return None if found is None else found[0]
+
+    def solution_at(self, x: float) -> Array | None:
+        """Return the unknowns at a value of the single input, nothing where the branch is not."""
+        start, known = self._start_at((x,)), self._known(x)
+        if start is None or known is None:
+            return None
+        found = self._correct(known, start.unknowns, start.farthest)
+        return None if found is None else found[0]
+
+    def _place(self, known: State, unknowns: Array, turned: Array) -> None:
+        """Append a solution."""
+        x, pins = known
+        x.extend((unknowns[0::3] + turned[0::3]).tolist())
+        pins.extend((unknowns[1::3] + 1j * unknowns[2::3]).tolist())
+        for slide in self._slides:
+            x.append(along(slide, known, unknowns).real)
+
     def _append(self, state: State, values: Array) -> None:
         state[0].extend(values[0::3].tolist())
         state[1].extend((values[1::3] + 1j * values[2::3]).tolist())
 
-    def _known(self, inputs: Sequence[float]) -> State | None:
+    def _known_at(self, inputs: Sequence[float]) -> State | None:
         """Return what is known before this step, at any inputs."""
         known = State([0.0, *inputs], [])
         for step in self._before:
-            status = step.close(known)[0]
-            if not status.has_pose:
+            if not step.close(known)[0].has_pose:
                 return None
         return known
 
-    def _nearest(self, inputs: Sequence[float]) -> tuple[Array | None, Sequence[float]]:
-        """Return the solution at the nearest knot, and the knot's inputs."""
-        if len(inputs) > 1:
-            return self._knot(0), self._inputs
-        spacing, turning = self._period
-        number = round((inputs[0] - self._inputs[0]) / spacing)
-        at = (self._inputs[0] + number * spacing,)
-        if turning and abs(number) > _KNOTS // 2:
-            number = self._within_a_turn(number)
-        return self._knot(number), at
-
-    def _within_a_turn(self, number: int) -> int:
-        """
-        Return the knot, within a turn of the pose, of the same crank direction.
-
-        Where the input turns on and on and its links do not come back to where they were, the
-        assembly depends on the turn, and so does the knot.
-        """
-        if self._knot(_KNOTS) is not None and not self._closes_in_a_turn():
-            return number
-        near = round(remainder(number, _KNOTS))
-        far = near - _KNOTS if near > 0 else near + _KNOTS
-        return near if self._knot(near) is not None else far
-
-    def _closes_in_a_turn(self) -> bool:
-        """Return whether the links are back where they began after a turn of the input."""
-        first, last = self._knot(0), self._knot(_KNOTS)
-        if first is None or last is None:
-            return False
-        moved = last - first
-        turns = np.abs(moved[0::3] - tau * np.round(moved[0::3] / tau))
-        return bool(max(turns.max(), np.abs(moved[1::3]).max(), np.abs(moved[2::3]).max()) < 1e-9)
-
-    def _knot(self, number: int) -> Array | None:
-        """Return the solution at a knot, continued from the pose."""
-        spacing = self._period[0]
-        sign = 1 if number > 0 else -1
-        for k in range(0, number + sign, sign):
-            if k not in self._knots:
-                value = (self._inputs[0] + k * spacing, *self._inputs[1:])
-                known = self._known(value)
-                solved = None
-                if known is not None and k == 0:
-                    solved = self._correct(known, self._start, inf)
-                elif known is not None:
-                    before = self._knots[k - sign]
-                    at = (self._inputs[0] + (k - sign) * spacing, *self._inputs[1:])
-                    solved = (
-                        self._continue(before, at, value, known) if before is not None else None
-                    )
-                self._knots[k] = solved[0] if solved is not None else None
-            if self._knots[k] is None:
-                self._knots[number] = None
+    def _moving_at(
+        self, inputs: Sequence[float], rates: Sequence[float]
+    ) -> tuple[State, State] | None:
+        """Return what is known before this step, and its rates; nothing where it has none."""
+        known, speeds = State([0.0, *inputs], []), State([0.0, *rates], [])
+        for step in self._before:
+            pose = step.close(known)
+            if not pose[0].has_rates:
                 return None
-        return self._knots[number]
+            step.rates(pose, known, speeds)
+        return known, speeds
 
-    def _continue(
-        self, start: Array, begin: Sequence[float], end: Sequence[float], known: State
-    ) -> tuple[Array, Array] | None:
-        """Return the solution at some inputs, in steps from that at others."""
-        span = max(abs(e - b) for b, e in zip(begin, end, strict=True))
-        done, step = 0.0, 1.0 / max(1, ceil(span / (2.0 * self._period[0])))
-        at = start
-        orientation = None
-        while True:
-            target = min(1.0, done + step)
-            if target == 1.0:
-                there: State | None = known
-            else:
-                there = self._known(
-                    [b + target * (e - b) for b, e in zip(begin, end, strict=True)]
-                )
-            solved = self._correct(there, at, _FARTHEST) if there is not None else None
-            if solved is not None:
-                sign = np.linalg.slogdet(solved[1])[0]
-                if orientation not in (None, sign):
-                    solved = None
-                else:
-                    orientation = sign
-            if solved is None:
-                step *= 0.5
-                if step < _SMALLEST_STEP:
-                    return None
-                continue
-            at, done = solved[0], target
-            if done == 1.0:
-                return solved
+    def _known(self, x: float) -> State | None:
+        return self._known_at((x,))
+
+    def _moving(self, x: float) -> tuple[State, State] | None:
+        return self._moving_at((x,), (1.0,))
+
+    def _start_at(self, inputs: Sequence[float]) -> Start | None:
+        """Return where to start; nothing where the assembly does not lead."""
+        if len(inputs) > 1:
+            return self._along_a_line(inputs)
+        branch = self.branch()
+        return None if branch is None else branch.start(inputs[0])
+
+    def _along_a_line(self, inputs: Sequence[float]) -> Start | None:
+        """Return the start at several inputs, on the straight line from those of the pose."""
+        solution = self.solution()
+        if solution is None:
+            return None
+        ways = [value - begin for value, begin in zip(inputs, self._inputs, strict=True)]
+        length = hypot(*ways)
+        still = np.zeros_like(solution)
+        if not length:
+            return Start(solution, inf, still, False)
+        rates = [way / length for way in ways]
+
+        def place(x: float) -> list[float]:
+            return [begin + x * rate for begin, rate in zip(self._inputs, rates, strict=True)]
+
+        continuation = Continuation(
+            self._constraints,
+            lambda x: self._known_at(place(x)),
+            lambda x: self._moving_at(place(x), rates),
+        )
+        node = continuation.first(solution, 0.0)
+        if node is None:
+            return None
+        cell = None
+        for cell in continuation.cells(node, 1.0, length):
+            if cell.folds:
+                return None
+        if cell is None or cell.end.place[-1] < length:
+            return None
+        size = float(np.abs(cell.end.place - cell.begin.place).max())
+        return Start(cell.end.place[:-1], 0.2 * size, still, False)
 
     def _correct(self, known: State, start: Array, farthest: float) -> tuple[Array, Array] | None:
-        """Return a solution near a start, and its Jacobian, or nothing where none is proven."""
+        """Return the solution within a distance of a start, and its Jacobian."""
         unknowns, last = start, inf
         size = 1.0 + float(np.abs(start).max())
         for _ in range(30):
@@ -292,22 +335,31 @@ class Iteration:
             except np.linalg.LinAlgError:
                 return None
             length = float(np.abs(step).max())
-            if not length < farthest or (farthest < inf and length > 0.7 * last > 1e-12 * size):
-                return None
             if length >= last or length <= 4.0 * UNIT_ROUNDOFF * size:
                 good = float(np.abs(errors).max()) <= _ACCEPTED * size
                 return (unknowns, jacobian) if good else None
             unknowns, last = unknowns + step, length
+            if not float(np.abs(unknowns - start).max()) <= farthest:
+                return None
         return None
 
-    def _open(self, known: State, start: Array | None) -> IteratedPose:
-        unknowns = self._start if start is None else start
+    def _open(self, known: State, inputs: Sequence[float]) -> IteratedPose:
+        """
+        Return how near the links come, downhill from where their assembly ends.
+
+        Where they would close, but in another assembly or after another number of turns, what they
+        miss each other by is told as they lie at that end.
+        """
+        end = self._branch.nearest_end(inputs[0]) if self._branch is not None else None
+        unknowns = self._start if end is None else end
         errors, jacobian = equations(self._constraints, unknowns, known)
-        for _ in range(20):  # downhill, to tell how near the links come
+        first = float(np.abs(errors).max())
+        for _ in range(20):
             step = np.linalg.lstsq(jacobian, -errors, rcond=1e-6)[0]
             step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
             trial, slope = equations(self._constraints, unknowns + step, known)
             if np.abs(trial).max() >= np.abs(errors).max():
                 break
             unknowns, errors, jacobian = unknowns + step, trial, slope
-        return IteratedPose(Status.OPEN, float(np.abs(errors).max()), unknowns, jacobian)
+        gap = float(np.abs(errors).max())
+        return IteratedPose(Status.OPEN, gap if gap > _MOVED else first, unknowns, jacobian)

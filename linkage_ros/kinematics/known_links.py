@@ -103,7 +103,7 @@ class KnownLinks:
                 return index
             base = self.place(link, held.point)
             arm, angle = point - held.point, self.angles[link]
-            self.add(PointOnLink(base, self.pin_count, angle.coordinate, angle.unit * arm))
+            self.add(PointOnLink(base, angle.coordinate, angle.unit * arm))
         return self._new_pin(link, point)
 
     def _place_held(self, held: Held) -> int:

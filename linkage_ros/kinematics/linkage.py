@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Literal
 
 Point = tuple[float, float]
@@ -66,9 +67,43 @@ class Slider:
 
 
 @dataclass(frozen=True, slots=True)
+class Limits:
+    """
+    What a joint of the machine can do, as ``<limit>`` of a URDF has it; infinite: no limit.
+
+    Attributes
+    ----------
+    low, high
+        Between which the joint stays, in [rad] or [m].
+    velocity
+        The greatest rate, either way, in [rad/s] or [m/s].
+    effort
+        The greatest torque or force, either way, in [N·m] or [N].
+
+    """
+
+    low: float = -inf
+    high: float = inf
+    velocity: float = inf
+    effort: float = inf
+
+    @property
+    def bounded(self) -> bool:
+        """Whether there is a value that the joint cannot have."""
+        return self.low > -inf or self.high < inf
+
+    def __str__(self) -> str:
+        return f'[{self.low:.6g}, {self.high:.6g}]'
+
+
+NO_LIMITS = Limits()
+"""The limits of a joint of which nothing is said."""
+
+
+@dataclass(frozen=True, slots=True)
 class Input:
     """
-    A driven joint, named ``joint``.
+    A driven joint, named ``joint``, with what the machine's can do.
 
     It is the angle of ``child`` less that of ``parent``, which share a pin, in [rad]; or, where
     ``slider`` is named, the slide of that one, in [m].
@@ -78,6 +113,7 @@ class Input:
     parent: str = ''
     child: str = ''
     slider: str = ''
+    limits: Limits = NO_LIMITS
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +122,7 @@ class RevoluteJoint:
 
     parent: str
     child: str
+    limits: Limits = NO_LIMITS
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +130,7 @@ class SlideJoint:
     """A published slide: the position of a slider's point along its line, in [m]."""
 
     slider: str
+    limits: Limits = NO_LIMITS
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,3 +207,12 @@ class Linkage:
     traced: tuple[str, ...] = ()
     pose: Pose | None = None
     masses: Mapping[str, Mass] = field(default_factory=dict)
+
+    @property
+    def limits(self) -> dict[str, Limits]:
+        """Return the limits of those joints that have some, inputs first, by name."""
+        found = {name: joint.limits for name, joint in self.joints.items()}
+        # An input that is published too has its limits as an input.
+        named = {given.joint: given.limits for given in self.inputs}
+        named |= {name: limits for name, limits in found.items() if name not in named}
+        return {name: limits for name, limits in named.items() if limits != NO_LIMITS}

@@ -18,11 +18,14 @@
 from __future__ import annotations
 
 from functools import partial
-from math import inf, pi, remainder, sin, sqrt, tau
+from math import atan, inf, pi, remainder, sin, sqrt, tau
 from operator import attrgetter
 from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
+from linkage_ros.kinematics.dyads.prp import PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
+from linkage_ros.kinematics.dyads.rpr import RPRDyad
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
@@ -102,8 +105,23 @@ def nearness(closure: Closure, position: Position) -> Nearness:
         unit = closure.scale if sliding else 1.0
         value = position.state.coordinates[1] * unit
         for singular in closure.singular_inputs:
-            distance = min(distance, abs(_away(value - singular.value, not sliding)))
+            distance = min(distance, abs(away(closure, value, singular.value)))
     return Nearness(angle, conditioning, distance, weakest)
+
+
+def away(closure: Closure, value: float, place: float) -> float:
+    """
+    Return how far a value of the single input is from a place, in [rad] or [m].
+
+    Whole turns do not count, but from an end of a range where each turn has poses of its own.
+    """
+    if closure.linkage.inputs[0].slider:
+        return value - place
+    for interval in closure.input_ranges:
+        if not interval.whole and place in interval[:2]:
+            period = interval.turns * tau
+            return remainder(value - place, period) if period else value - place
+    return remainder(value - place, tau)
 
 
 def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
@@ -112,31 +130,25 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
 
     Toggles end the ranges of the input. Where the links of a dyad's two outer pins turn with the
     input, its constants tell at which angles its links lie in one line, or its lines are parallel.
-    Of all other dyads the transmission angle is searched over the ranges for where it is 0.
+    Of all other dyads the transmission angle is searched over the ranges for where it is 0, and of
+    a straight rod in a swivel, whose angle never is, the distance of the two pins.
     """
     from linkage_ros.kinematics.survey import zeros  # local import: it needs the closure
 
     given = closure.linkage.inputs
     if len(given) > 1:
         return ()
-    ends = [
-        end
-        for interval in closure.input_ranges
-        if not interval.whole
-        for end, limited in zip(interval[:2], interval.limited, strict=True)
-        if limited
-    ]
-    turning = not given[0].slider
+    ends = [end for interval in closure.closing_ranges for end in interval.toggles]
     found = [SingularInput(end, Status.TOGGLE) for end in ends]
     for number, step in enumerate(closure.steps):
         if not hasattr(step, 'transmission_angle') or isinstance(step, RPPDyad):
             continue
         places = _turned_by_input(closure, step)
         if places is None:
-            places = zeros(partial(_transmission_angle, closure, number), closure.input_ranges)
+            places = zeros(partial(_room, closure, number), closure.closing_ranges)
         for place in places:
             status = _met(closure, number, place)
-            distances = (abs(_away(place - one.value, turning)) for one in found)
+            distances = (abs(away(closure, place, one.value)) for one in found)
             if status is not None and all(apart > _SAME for apart in distances):
                 found.append(SingularInput(place, status))
     return tuple(sorted(found, key=attrgetter('value')))
@@ -157,11 +169,12 @@ def _turned_by_input(closure: Closure, step: Any) -> list[float] | None:
 
 def _met(closure: Closure, number: int, place: float) -> Status | None:
     """Return what a dyad meets where it is singular; nothing where no loops close next to it."""
-    status = closure.position(place).status
-    beside = [closure.position(place + step) for step in (-_BESIDE, _BESIDE)]
+    status = closure.posed(place).status
+    beside = [closure.posed(place + step) for step in (-_BESIDE, _BESIDE)]
     if not any(position.status.has_pose for position in beside):
         return None
-    if not status.has_pose:
+    if not status.has_pose or _never_toggles(closure.steps[number]):
+        # The float next to where lines are parallel, or pins meet, may have a pose.
         return Status.INDETERMINATE
     if status is Status.CLOSED and all(position.status.has_pose for position in beside):
         # The floats next to it, of a dyad that follows others: does it come out on its other side?
@@ -171,14 +184,20 @@ def _met(closure: Closure, number: int, place: float) -> Status | None:
     return status if status is Status.CHANGE_POINT else Status.TOGGLE
 
 
-def _transmission_angle(closure: Closure, number: int, value: float) -> float:
-    """Return the transmission angle of a dyad at an input; 0 where it has no pose."""
-    position = closure.position(value)
+def _never_toggles(step: Any) -> bool:
+    """Return whether a dyad is singular only where its lines are parallel or its pins meet."""
+    return isinstance(step, PRPDyad | CrankPRPDyad) or (
+        isinstance(step, RPRDyad) and not step.offset
+    )
+
+
+def _room(closure: Closure, number: int, value: float) -> float:
+    """Return how far a dyad is from being singular at an input, in [rad]; 0 without a pose."""
+    position = closure.posed(value)
     if len(position.poses) <= number or not position.status.has_pose:
         return 0.0
     step: Any = closure.steps[number]
-    return float(step.transmission_angle(position.poses[number]))
-
-
-def _away(difference: float, turning: bool) -> float:
-    return remainder(difference, tau) if turning else difference
+    pose: Any = position.poses[number]
+    if isinstance(step, RPRDyad) and not step.offset:
+        return atan(abs(pose.slide))
+    return float(step.transmission_angle(pose))

@@ -59,7 +59,7 @@ class PointOnLink:
     Parameters
     ----------
     pin
-        Index of that pin; the point's own index is the next free one.
+        Index of that pin.
     arm
         Index, among the coordinates, of the angle of the link.
     vector
@@ -67,13 +67,12 @@ class PointOnLink:
 
     """
 
-    __slots__ = ('_arm', '_pin', '_point', '_vector')
+    __slots__ = ('_arm', '_pin', '_vector')
 
     _facing = staticmethod(facing)
 
-    def __init__(self, pin: int, point: int, arm: int, vector: complex) -> None:
+    def __init__(self, pin: int, arm: int, vector: complex) -> None:
         self._pin = pin
-        self._point = point
         self._arm = arm
         self._vector = vector
 
@@ -83,18 +82,19 @@ class PointOnLink:
         pins.append(pins[self._pin] + self._facing(x[self._arm]) * self._vector)
         return PLACED
 
-    def rates(self, _pose: Pose, known: State, speeds: State) -> None:
-        """Append its velocity."""
-        pins, (v, velocities) = known[1], speeds
-        arm = pins[self._point] - pins[self._pin]
+    def rates(self, _pose: Pose, known: State, speeds: State) -> complex:
+        """Append its velocity; return the way from the pin."""
+        v, velocities = speeds
+        # Not the difference of the two places: far from the origin that has few digits.
+        arm: complex = self._facing(known[0][self._arm]) * self._vector
         velocities.append(velocities[self._pin] + 1j * v[self._arm] * arm)
+        return arm
 
     def accelerations(
-        self, _pose: Pose, _rates: None, known: State, speeds: State, changes: State
+        self, _pose: Pose, arm: complex, _known: State, speeds: State, changes: State
     ) -> None:
         """Append its acceleration."""
-        pins, turn, (a, pulls) = known[1], speeds[0][self._arm], changes
-        arm = pins[self._point] - pins[self._pin]
+        turn, (a, pulls) = speeds[0][self._arm], changes
         pulls.append(pulls[self._pin] + (1j * a[self._arm] - turn * turn) * arm)
 
 

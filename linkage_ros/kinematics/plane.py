@@ -25,6 +25,12 @@ def cross(one: complex, other: complex) -> float:
     return one.real * other.imag - one.imag * other.real
 
 
+def resolved(vector: complex, unit: complex) -> tuple[float, float]:
+    """Return a vector's parts along a unit vector and to the left of it."""
+    turned = vector * unit.conjugate()
+    return turned.real, turned.imag
+
+
 def folded(angle: float) -> float:
     """Return the acute angle between two lines, of an angle between them, in [rad]."""
     return abs(remainder(angle, pi))

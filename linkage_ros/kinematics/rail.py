@@ -25,7 +25,7 @@ all others from the coordinates (`FreeRail`).
 from __future__ import annotations
 
 from cmath import phase, rect
-from math import inf, pi, sqrt
+from math import fsum, inf, pi, sqrt
 from typing import NamedTuple, Protocol
 
 from linkage_ros.kinematics.rounding import margin, passes_zero, reach, root_of
@@ -126,7 +126,7 @@ class CrankRail:
 
     """
 
-    __slots__ = ('_arm', '_constants', '_half_turn', '_link', 'arms')
+    __slots__ = ('_arm', '_constants', '_half_turn', '_link', '_products', 'arms')
 
     _at_change_point = Status.CHANGE_POINT
 
@@ -137,7 +137,13 @@ class CrankRail:
             if link == inf
             else (margin(link, side, -a) for side in (-pivot.imag, pivot.imag))
         )
-        self._constants = (a, pivot, below, above, sqrt(2.0) * sqrt(a), not (below and above))
+        self._constants = (a, pivot, below, above, sqrt(2.0 * a), not (below and above))
+        # Of `across`: sums that cancel of a short crank beside a long link.
+        self._products = (
+            (0.0, 0.0)
+            if link == inf
+            else (below * fsum((a, link, -pivot.imag)), above * fsum((a, link, pivot.imag)))
+        )
         self._arm = arm
         self._half_turn = rect(1.0, 0.25 * pi - 0.5 * phase(arm))
         self._link = link
@@ -163,10 +169,11 @@ class CrankRail:
             return new(Sight, (place, inf, inf, 0.0, base, arm, 0.0, _CLOSED))
         eta = rect(1.0, -0.5 * swing) * self._half_turn
         sine, cosine = eta.imag, eta.real
-        root_below, gap = self._root(below, root * sine, link, -place.imag)
+        root_below, gap = self._root(below, root * sine, 2.0 * a * sine * sine, -place.imag)
         root_above = 0.0
         if not gap:
-            root_above, gap = self._root(above, root * cosine, link, place.imag)
+            part = root * cosine
+            root_above, gap = self._root(above, part, 2.0 * a * cosine * cosine, place.imag)
         if gap:
             return Sight(place, 0.0, 0.0, gap, base, arm, 0.0, Status.OPEN)
         lean, status = 0.0, _CLOSED
@@ -184,11 +191,15 @@ class CrankRail:
                 status = self._at_change_point
         return new(Sight, (place, root_below, root_above, 0.0, base, arm, lean, status))
 
-    def _root(self, bracket: float, part: float, link: float, side: float) -> tuple[float, float]:
+    def _root(
+        self, bracket: float, part: float, square: float, side: float
+    ) -> tuple[float, float]:
         """Return the root of the link's length less what it has to reach, and the gap."""
-        if bracket == 0.0 or abs(bracket) + part * part < link + abs(side):
-            return reach(bracket, part)
-        return root_of(link + side, link + abs(side))
+        size = self._link + abs(side)
+        # The square has more roundings than the side: where it is as great, it is no better.
+        if bracket == 0.0 or 4.0 * (abs(bracket) + square) < size:
+            return reach(bracket, part, square)
+        return root_of(self._link + side, size)
 
     def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
         """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
@@ -235,8 +246,8 @@ class CrankRail:
         """
         first, second = self.arms
         v, changed = speeds[0], changes[0]
-        a, pivot, below, above, _, changes_over = self._constants
-        link, e, y = self._link, pivot.imag, sight.place.imag
+        _, pivot, below, above, _, changes_over = self._constants
+        e, y = pivot.imag, sight.place.imag
         swing, change = v[first] - v[second], changed[first] - changed[second]
         if changes_over:
             if not below:
@@ -245,9 +256,9 @@ class CrankRail:
                 bent = e * sight.above / sight.below**3
             return change * sight.lean + swing * swing * bent
         if y > 0.0:
-            terms = e * sight.below**4, y * below * (a + link - e)
+            terms = e * sight.below**4, y * self._products[0]
         else:
-            terms = e * sight.above**4, y * above * (a + link + e)
+            terms = e * sight.above**4, y * self._products[1]
         parts = -swing * swing * sight.arm.imag, y * link_rate * link_rate
         along = sight.below * sight.above
         square = (swing / along) ** 2

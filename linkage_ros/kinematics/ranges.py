@@ -16,14 +16,15 @@
 """
 Where an input can go: the intervals in which every loop closes.
 
-The limits of a dyad on a crank and the ground follow from its lengths. What else there is, chains
-and iterated groups, is searched: sampled, and each limit narrowed down to neighbouring floats.
+The limits of a dyad on a crank and the ground follow from its lengths, those of an iterated group
+from its branch. What else there is, chains, is searched within these: sampled, and each limit
+narrowed down to neighbouring floats.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from math import acos, asin, inf, pi, sqrt, tau
+from math import acos, asin, ceil, inf, lcm, pi, sqrt, tau
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
@@ -31,6 +32,7 @@ from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
 
 if TYPE_CHECKING:
+    from linkage_ros.kinematics.branch import Branch
     from linkage_ros.kinematics.closure import Closure
 
 _SAMPLES = 720
@@ -42,32 +44,85 @@ class InputRange(NamedTuple):
     """
     An interval of an input in which every loop closes, in [rad] or [m]; turns not wrapped.
 
-    ``limited`` says of each end whether the linkage ends there; a slide may go on, beyond what was
-    searched.
+    Attributes
+    ----------
+    lowest, highest
+        The ends.
+    turning
+        Whether the input is an angle.
+    limited
+        Of each end whether the linkage ends there; a slide may go on, beyond what was searched,
+        and so may an angle that is limited on one side.
+    turns
+        How many whole turns of the input change nothing: one where dyads alone are solved, several
+        where links that are iterated come back after so many, and 0 where they never do, so that
+        each turn has poses of its own.
+    by
+        Of each end the joint whose limits it is at; '' where there is another reason: a toggle.
+
     """
 
     lowest: float
     highest: float
     turning: bool = True
     limited: tuple[bool, bool] = (True, True)
+    turns: int = 1
+    by: tuple[str, str] = ('', '')
 
     @property
     def whole(self) -> bool:
-        """Whether the input turns fully."""
-        return self.turning and self.highest - self.lowest >= tau
+        """Whether the input turns fully, on and on."""
+        width = self.highest - self.lowest
+        comes_round = self.turning and self.turns > 0 and self.by == ('', '')
+        return comes_round and width >= self.turns * tau
+
+    @property
+    def toggles(self) -> tuple[float, ...]:
+        """Return the ends at which a toggle lies: those that the linkage's lengths set."""
+        if self.whole:
+            return ()
+        ends = zip((self.lowest, self.highest), self.limited, self.by, strict=True)
+        return tuple(end for end, limited, by in ends if limited and not by)
+
+    def shift(self, value: float) -> float:
+        """Return the whole turns, in [rad], that bring a value nearest the middle of the range."""
+        if not (self.turning and self.turns):
+            return 0.0
+        period = self.turns * tau
+        return period * round((0.5 * (self.lowest + self.highest) - value) / period)
 
     def __str__(self) -> str:
         if self.whole:
             return 'every crank angle'
-        if self.limited == (False, False):
+        if self.limited == (False, False) and not self.turning:
             return 'every slide'
-        return f'{self.lowest:.6g} to {self.highest:.6g} {"rad" if self.turning else "m"}'
+        low, high, unit = f'{self.lowest:.6g}', f'{self.highest:.6g}', self.unit
+        if self.by != ('', '') and self.limited != (True, True):
+            return f'{low} {unit} and more' if self.limited[0] else f'{high} {unit} and less'
+        return f'{low} to {high} {unit}'
+
+    def shifted(self, shift: float) -> InputRange:
+        """Return the range as far away as this."""
+        return self._replace(lowest=self.lowest + shift, highest=self.highest + shift)
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the input."""
+        return 'rad' if self.turning else 'm'
 
 
-def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
-    """Return the intervals of a single input; none where it closes nowhere, or of several."""
+def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:
+    """
+    Return where the lengths let a single input go, whatever limits its joints have.
+
+    None where it closes nowhere, and of several inputs.
+    """
     if len(closure.linkage.inputs) > 1:
         return ()
+    branches = _branches(closure)
+    if branches:
+        # Each is followed only where those before it close: the last one lies within all.
+        return tuple(_on_a_branch(closure, branches[-1]))
     if closure.linkage.inputs[0].slider:
         far = reach(closure)
         return tuple(
@@ -98,6 +153,44 @@ def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
     return tuple(InputRange(low, high) for low, high in intervals)
 
 
+def whole_turns(closure: Closure) -> int:
+    """Return how many whole turns of the inputs change nothing, 0 where each turn is another."""
+    iterated = any(hasattr(step, 'branch') for step in closure.steps)
+    if len(closure.linkage.inputs) > 1:
+        return 0 if iterated else 1
+    return lcm(*(branch.interval.period if branch else 1 for branch in _branches(closure)))
+
+
+def _branches(closure: Closure) -> list[Branch | None]:
+    """Return the branch of each iterated group."""
+    return [step.branch() for step in closure.steps if hasattr(step, 'branch')]
+
+
+def _on_a_branch(closure: Closure, branch: Branch | None) -> Iterator[InputRange]:
+    """Yield the intervals of a branch in which what comes behind it closes, too."""
+    if branch is None:
+        return
+    after = 1 + max(i for i, step in enumerate(closure.steps) if hasattr(step, 'branch'))
+    behind = [s for s in closure.steps[after:] if not isinstance(s, _CLOSE_EVERYWHERE)]
+    turning = not closure.linkage.inputs[0].slider
+    unit = 1.0 if turning else closure.scale
+    low, high, limited, turns = branch.interval
+    low, high = (-pi * turns, pi * turns) if turns else (low * unit, high * unit)
+    parts = [(low, high)]
+    if behind:
+        count = _SAMPLES * max(1, ceil((high - low) / tau)) if turning else 4 * _SAMPLES
+        parts = list(search(_closes(closure), low, high, count))
+        if turns and len(parts) > 1 and parts[0][0] == low and parts[-1][1] == high:
+            # One interval that runs through the end of the turns.
+            (_, end), *others, (begin, _) = parts
+            parts = [*others, (begin, end + turns * tau)]
+    for begin, end in parts:
+        ends = limited[0] or begin > low, limited[1] or end < high
+        # What turns fully has no ends, and is said as it is of dyads.
+        ends = ends if any(ends) else (True, True) if turns else ends
+        yield InputRange(begin, end, turning, ends, whole_turns(closure))
+
+
 def describe(ranges: tuple[InputRange, ...]) -> str:
     """Return ranges as a user reads them."""
     return ' or '.join(map(str, ranges)) or 'no single range: it depends on every input'
@@ -112,7 +205,7 @@ def _crank_intervals(diagonal: CrankDiagonal) -> list[tuple[float, float]]:
         sin²(φ/2) = (lower² − (d − a)²)/(4ad)        cos²(φ/2) = ((a + d)² − upper²)/(4ad)
     """
     a, d = diagonal.sides
-    lower, upper = diagonal.limits
+    lower, upper, _ = diagonal.limits
     lowest, highest = 0.0, pi
     if diagonal.fold_margin < 0.0:
         square = -diagonal.fold_margin / a * (lower + abs(d - a)) / d / 4.0
@@ -149,9 +242,9 @@ def search(
         value = low + (high - low) * i / samples
         if closes(value):
             if begin is None:
-                begin = _limit(closes, value, before) if i else value
+                begin = last_inside(closes, value, before) if i else value
         elif begin is not None:
-            yield begin, _limit(closes, before, value)
+            yield begin, last_inside(closes, before, value)
             begin = None
         before = value
     if begin is not None:
@@ -163,7 +256,7 @@ def _closes(closure: Closure) -> Callable[[float], bool]:
     return lambda value: closure.position(value).status.has_pose
 
 
-def _limit(closes: Callable[[float], bool], inside: float, outside: float) -> float:
+def last_inside(closes: Callable[[float], bool], inside: float, outside: float) -> float:
     """Return the last value at which the loops close, on the way to one at which they do not."""
     for _ in range(60):
         middle = 0.5 * (inside + outside)

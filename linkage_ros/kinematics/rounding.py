@@ -39,9 +39,9 @@ def margin(*lengths: float) -> float:
     return 0.0 if abs(total) <= 4.0 * UNIT_ROUNDOFF * fsum(map(abs, lengths)) else total
 
 
-def reach(constant: float, part: float) -> tuple[float, float]:
+def reach(constant: float, part: float, square: float) -> tuple[float, float]:
     """
-    Return the root of ``constant + part²``, and that sum where it is negative.
+    Return the root of ``constant + part²``, and that sum where it is negative; given the square.
 
     A dyad that folds or stretches does so where such a sum, its reach, goes to zero. The constant
     is a bracket of the linkage; the part is signed by the half angle. Where the constant is zero,
@@ -58,7 +58,6 @@ def reach(constant: float, part: float) -> tuple[float, float]:
     """
     if constant == 0.0:
         return part, 0.0
-    square = part * part
     return root_of(constant + square, abs(constant) + square)
 
 

@@ -18,14 +18,17 @@
 from __future__ import annotations
 
 from cmath import phase, rect
+from dataclasses import replace
 from math import inf
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.diagonal import AnyDiagonal
+from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
 from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import Carry, DrivenRRRDyad, Side
+from linkage_ros.kinematics.dyads.folding_rrr import FoldingRRRDyad
 from linkage_ros.kinematics.dyads.prp import PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad, swivel_diagonal
@@ -36,6 +39,7 @@ from linkage_ros.kinematics.known_links import KnownLinks
 from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
 from linkage_ros.kinematics.linkage import Input, Linkage
 from linkage_ros.kinematics.places import Turned
+from linkage_ros.kinematics.plane import cross, resolved
 from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
 from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.structure import Driven, Dyad, Iterated, Structure
@@ -98,7 +102,7 @@ class Planner(KnownLinks):
 
     def __init__(self, linkage: Linkage, structure: Structure) -> None:
         super().__init__(linkage, structure)
-        self._joints = structure.joints
+        self._structure = structure
         self._assembly = dict(linkage.assembly)
         self._keys: list[str] = []
         for self.group, group in enumerate(structure.groups):
@@ -166,7 +170,7 @@ class Planner(KnownLinks):
         hinge = self._hinge(first.name, second.name)
         if hinge is None:
             ends = self.place_pin(first.name), self.place_pin(second.name)
-            diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c)), _LEVEL
+            diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c, 4.0 * b * c)), _LEVEL
         else:
             diagonal, base = (
                 crank_diagonal(
@@ -175,9 +179,12 @@ class Planner(KnownLinks):
                 hinge.base,
             )
             sign = hinge.side_at_change_point(diagonal, sign)
-        written_out = type(diagonal) is CrankDiagonal and CrankRRRDyad.fits(diagonal)
-        kind = CrankRRRDyad if written_out else RRRDyad
-        self.add(kind(diagonal, b, c, sign))  # type: ignore[arg-type]  # as just asked
+        kind: type[RRRDyad] = RRRDyad
+        if FoldingRRRDyad.fits(diagonal):
+            kind = FoldingRRRDyad
+        elif type(diagonal) is CrankDiagonal and CrankRRRDyad.fits(diagonal):
+            kind = CrankRRRDyad
+        self.add(kind(diagonal, b, c, sign))
         k = self.new_coordinates(2)
         self.angles[one] = _facing(k, base, one_arm)
         self.angles[other] = _facing(k + 1, base, other_arm)
@@ -199,7 +206,7 @@ class Planner(KnownLinks):
         hinge = self._hinge(first.name, second.name)
         if hinge is None:
             ends = self.place_pin(first.name), self.place_pin(second.name)
-            diagonal, base = FreeDiagonal(ends, (abs(offset), inf)), _LEVEL
+            diagonal, base = FreeDiagonal(ends, (abs(offset), inf, inf)), _LEVEL
         else:
             diagonal, base = (
                 swivel_diagonal(
@@ -238,6 +245,11 @@ class Planner(KnownLinks):
         self.slides[name] = Slide(k + 1, line.sign)
 
     def _prp(self, dyad: Dyad) -> None:
+        one, other = (outer.to for outer in dyad.outer)
+        pivot = self.common(one, other, ())
+        if pivot is not None:
+            self._crank_prp(dyad, pivot)
+            return
         starts, arms, units = [], [], []
         k = self.coordinate_count
         for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
@@ -249,6 +261,25 @@ class Planner(KnownLinks):
             self.ride(body, point, outer.to, line, Slide(k + i, 1.0))
             self.slides[outer.name] = Slide(k + i, line.sign)
         self.add(PRPDyad((starts[0], starts[1]), (arms[0], arms[1]), (units[0], units[1])))
+        self.new_coordinates(2)
+
+    def _crank_prp(self, dyad: Dyad, pivot: str) -> None:
+        offsets, angles, size = [], [], 0.0
+        k = self.coordinate_count
+        for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
+            point, center = self.points[body][dyad.inner.name], self.points[outer.to][pivot]
+            line = self.line(outer.name, outer.to, point)
+            way, offset = resolved(line.start - center, line.direction)
+            offsets.append(offset)
+            angles.append(self.angles[outer.to].along(line.direction))
+            size += abs(line.start - center)
+            foot = replace(line, start=center + 1j * offset * line.direction)
+            self.ride(body, point, outer.to, foot, Slide(k + i, 1.0))
+            self.slides[outer.name] = Slide(k + i, line.sign, -line.sign * way)
+        first, second = angles
+        arms = first.coordinate, second.coordinate
+        across = second.unit * first.unit.conjugate()
+        self.add(CrankPRPDyad((offsets[0], offsets[1]), size, arms, across))
         self.new_coordinates(2)
 
     def _rpp(self, dyad: Dyad) -> None:
@@ -268,7 +299,8 @@ class Planner(KnownLinks):
         constant = (inner.start - point) * turn
         level = Line(outer.start, 1 + 0j, 0.0, 1.0)
         rail = self._rail(first.name, second.to, level, inf)
-        self.add(RPPDyad(rail, constant, direction, outer.direction))
+        offsets = cross(constant, outer.direction), cross(inner.start - point, inner.direction)
+        self.add(RPPDyad(rail, direction, outer.direction, offsets))
         k = self.new_coordinates(2)
         self.ride(carrier, point, second.to, outer, Slide(k + 1, 1.0))
         self.slides[second.name] = Slide(k + 1, outer.sign)
@@ -298,7 +330,8 @@ class Planner(KnownLinks):
     def _iterate(self, group: Iterated) -> None:
         from linkage_ros.kinematics.constraints import Constraints  # local import: it loads numpy
 
-        constraints = Constraints(self._linkage, self._joints, group.links, self)
+        joints = self._structure.joints_of(group)
+        constraints = Constraints(self._linkage, joints, group.links, self)
         slides = constraints.slides
         self.add(constraints.iteration(tuple(self.steps)))
         k = self.new_coordinates(len(group.links) + len(slides))
@@ -362,8 +395,12 @@ class Planner(KnownLinks):
                 arm = self.arm(link, pivot, pin) * angle.unit * base.unit.conjugate()
                 place = (self.points[on][pivot] - line.start) * line.direction.conjugate()
                 arms = angle.coordinate, base.coordinate
-                kind = CrankRail if self._driven_only(arms) else UnsignedRail
-                return kind(arm, place, length, arms)
+                rail = CrankRail(arm, place, length, arms)
+                # As a parallelogram: both roots change their sign with a whole turn.
+                turns_matter = len(rail.singular_angles) < 2
+                if turns_matter and not self._driven_only(arms):
+                    return UnsignedRail(arm, place, length, arms)
+                return rail
         ends = self.place(on, line.start), self.place_pin(pin)
         return FreeRail(ends, length, base.coordinate, base.unit)
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from linkage_ros.kinematics.linkage import Point
+from linkage_ros.kinematics.linkage import GROUND, Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,3 +107,35 @@ class Structure:
     def freedom(self) -> int:
         """Degrees of freedom, by Grübler's count, before the inputs take theirs."""
         return 3 * (len(self.links) - 1) - 2 * len(self.joints)
+
+    def joints_of(self, group: Iterated) -> tuple[Joint, ...]:
+        """
+        Return the joints that hold a group: among its links, and to what is known before it.
+
+        Each is told from a link of the group; what hangs on the group is known only later.
+        """
+        known = {GROUND}
+        for before in self.groups[: self.groups.index(group)]:
+            known |= _links_of(before)
+        found: list[Joint] = []
+        pins: set[str] = set()
+        for joint in self.joints:
+            if joint.kind == 'P':
+                ends = {joint.link, joint.to}
+                if ends & set(group.links) and ends <= known | set(group.links):
+                    found.append(joint)
+            elif joint.name not in pins:
+                pins.add(joint.name)
+                carriers = [link for link, points in self.links.items() if joint.name in points]
+                own = [link for link in carriers if link in group.links]
+                base = [*(link for link in carriers if link in known), *own]
+                found += [Joint('R', joint.name, link, base[0]) for link in own if link != base[0]]
+        return tuple(found)
+
+
+def _links_of(group: Group) -> set[str]:
+    if isinstance(group, Driven):
+        return {group.joint.link}
+    if isinstance(group, Dyad):
+        return {link for body in group.bodies for link in body}
+    return set(group.links)

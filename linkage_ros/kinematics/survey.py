@@ -20,16 +20,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, partial
 from itertools import product
-from math import cos, isfinite, nan, pi, remainder, sqrt, tau
+from math import cos, inf, isfinite, nan, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.cylinder import without_mirrored
+from linkage_ros.kinematics.golden import golden
+from linkage_ros.kinematics.machine_ranges import repeats, turns
 from linkage_ros.kinematics.ranges import InputRange, reach, search
 from linkage_ros.kinematics.status import Status
 
 _SAMPLES = 720
 _GRID = 24
-_GOLDEN = (sqrt(5.0) - 1.0) / 2.0
 _SAME = 1e-9
 """What two values may differ by and be the same for a user, in [rad] or of a length."""
 
@@ -102,8 +104,11 @@ class Way:
         return self.closure.position(*self.inputs(value))
 
     def closes(self, value: float) -> bool:
-        """Return whether every loop closes there."""
-        return self.position(value).status.has_pose
+        """Return whether every loop closes there, with no joint beyond its limits."""
+        inputs = self.inputs(value)
+        position = self.closure.position(*inputs)
+        bounds = self.closure.bounds
+        return bool(position.joints) and not (bounds and bounds.exceeded(inputs, position.joints))
 
     @cached_property
     def ranges(self) -> tuple[InputRange, ...]:
@@ -116,7 +121,12 @@ class Way:
         if len(self.closure.linkage.inputs) == 1:
             found = self.closure.input_ranges
         else:
-            found = tuple(InputRange(*ends, self.turning) for ends in self._searched())
+            found = without_mirrored(
+                self.closure.linkage,
+                self.closure.structure,
+                self._index,
+                tuple(self._named(*ends) for ends in self._searched()),
+            )
         return tuple(map(self._usual, found))
 
     def range_about(self, value: float) -> InputRange | None:
@@ -124,12 +134,24 @@ class Way:
         for interval in self.ranges:
             if interval.whole or interval.lowest <= value <= interval.highest:
                 return interval
-            if interval.turning:
-                middle = 0.5 * (interval.lowest + interval.highest)
-                shift = tau * round((value - middle) / tau)
-                if shift and interval.lowest <= value - shift <= interval.highest:
-                    return InputRange(interval.lowest + shift, interval.highest + shift)
+            if interval.turning and not self.input.limits.bounded:
+                shift = self._shift(interval, value)
+                if shift:
+                    return interval.shifted(shift)
         return None
+
+    def _shift(self, interval: InputRange, value: float) -> float:
+        """Return the turns by which a value lies beyond a range and in it all the same, or 0."""
+        period, turns = tau * interval.turns, -interval.shift(value)
+        # Where only two turns lead back to where it was, one leads to another pose.
+        for shift in (turns, turns - period, turns + period):
+            within = interval.lowest <= value - shift <= interval.highest
+            if not (shift and within):
+                continue
+            limited = bool(self.closure.bounds.joints)
+            if not limited or repeats(self.closure, self.position, value, -shift):
+                return shift
+        return 0.0
 
     @property
     def widest_range(self) -> InputRange | None:
@@ -141,35 +163,46 @@ class Way:
         )
 
     def _usual(self, interval: InputRange) -> InputRange:
-        if not interval.turning:
+        if not interval.turning or self.input.limits.bounded:
+            return interval
+        if not interval.turns:
             return interval
         if interval.whole:
-            turns = 1 if all(self._repeats(0.1 + i, tau) for i in range(6)) else 2
-            return InputRange(0.0, turns * tau)
+            return interval._replace(lowest=0.0, highest=tau * turns(self.closure, self.position))
         middle = 0.5 * (interval.lowest + interval.highest)
-        shift = -tau * round(middle / tau)
-        if shift and self._repeats(middle, shift):
-            return InputRange(interval.lowest + shift, interval.highest + shift)
+        shift = -interval.shift(0.0)
+        if shift and repeats(self.closure, self.position, middle, shift):
+            return interval.shifted(shift)
         return interval
-
-    def _repeats(self, value: float, shift: float) -> bool:
-        """Return whether all joints are the same again after a shift, but for whole turns."""
-        here, there = self.position(value).joints, self.position(value + shift).joints
-        return all(
-            abs(remainder(p - q, tau) if turns else p - q)
-            < _SAME * (1.0 if turns else self.closure.scale)
-            for p, q, turns in zip(here, there, self.closure.turning, strict=True)
-        )
 
     def _searched(self) -> list[tuple[float, float]]:
         """Return the intervals in which every loop closes, of several inputs."""
         far = pi if self.turning else reach(self.closure)
+        limits = self.input.limits
+        if limits.bounded:
+            low, high = max(limits.low, -far), min(limits.high, far)
+            if self.turning:
+                # Angles count with their turns.
+                low = limits.low if limits.low > -inf else limits.high - tau
+                high = limits.high if limits.high < inf else limits.low + tau
+            return list(search(self.closes, low, high)) if low < high else []
         found = list(search(self.closes, -far, far))
         if self.turning and len(found) > 1 and found[0][0] == -far and found[-1][1] == far:
             # One interval that runs through the end of the turn.
             (_, high), *others, (low, _) = found
             found = [*others, (low, high + tau)]
         return found
+
+    def _named(self, low: float, high: float) -> InputRange:
+        """Return a range with the joints whose limits it ends at; the others are held."""
+        by = []
+        whole = self.turning and high - low >= tau and not self.closure.bounds
+        for end, outwards in ((low, low - high), (high, high - low)):
+            beyond = self.inputs(end + 1e-9 * outwards)
+            joints = () if whole else self.closure.position(*beyond).joints
+            bound = self.closure.bounds.exceeded(beyond, joints) if joints else None
+            by.append(bound.name if bound else '')
+        return InputRange(low, high, self.turning, by=(by[0], by[1]))
 
 
 def usual_inputs(closure: Closure) -> tuple[float, ...]:
@@ -211,9 +244,16 @@ def grid(closure: Closure, count: int = _GRID) -> Iterator[tuple[tuple[float, ..
     """Yield positions on a grid over all inputs: a turn each, or as far as a slide may reach."""
     ways = []
     for given in closure.linkage.inputs:
+        low, high = given.limits.low, given.limits.high
         if given.slider:
             farthest = reach(closure)
-            ways.append([farthest * (2 * i - count) / count for i in range(count + 1)])
+            low, high = max(low, -farthest), min(high, farthest)
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            ways.append([middle + half * (2 * i - count) / count for i in range(count + 1)])
+        elif given.limits.bounded:
+            low = low if low > -inf else high - tau
+            high = high if high < inf else low + tau
+            ways.append([low + (high - low) * i / count for i in range(count + 1)])
         else:
             ways.append([tau * i / count for i in range(count)])
     for inputs in product(*ways):
@@ -270,7 +310,7 @@ def _lowest(
             )
             found.append((result, values[i]))
             if result <= min(beside) and result < max(beside):
-                lowest = _golden(function, before, after)
+                lowest = golden(function, before, after)
                 # At a smooth valley the place has half the digits; the sample's may be better.
                 if result - lowest[0] > _NOISE:
                     found[-1] = lowest
@@ -287,24 +327,6 @@ def _lowest(
         if all(abs(remainder(value - p, tau) if whole else value - p) > _APART for p in at):
             at.append(value)
     return Extreme(best, tuple(at))
-
-
-def _golden(function: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
-    """Return the lowest value between two places, and where it is."""
-    one, other = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_one, at_other = function(one), function(other)
-    for _ in range(80):
-        if not low < one < other < high:
-            break
-        if at_one <= at_other:
-            high, other, at_other = other, one, at_one
-            one = high - _GOLDEN * (high - low)
-            at_one = function(one)
-        else:
-            low, one, at_one = one, other, at_other
-            other = low + _GOLDEN * (high - low)
-            at_other = function(other)
-    return min((at_one, one), (at_other, other))
 
 
 def zeros(function: Callable[[float], float], ranges: Sequence[InputRange]) -> list[float]:
@@ -325,7 +347,7 @@ def zeros(function: Callable[[float], float], ranges: Sequence[InputRange]) -> l
             valleys = range(1, len(values) - 1)
         for i in valleys:
             if results[i] <= min(results[i - 1], results[i + 1]) and results[i] < _NEAR_ZERO:
-                lowest, at = _golden(function, values[i - 1], values[i + 1])
+                lowest, at = golden(function, values[i - 1], values[i + 1])
                 if min(lowest, results[i]) < _ZERO:
                     found.append(at if lowest <= results[i] else values[i])
     return found

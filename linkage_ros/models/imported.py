@@ -19,11 +19,19 @@ from __future__ import annotations
 
 from cmath import rect
 from collections.abc import Mapping, Sequence
-from math import hypot
+from dataclasses import replace
+from math import hypot, inf, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError
-from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, RevoluteJoint
+from linkage_ros.kinematics.linkage import (
+    GROUND,
+    Input,
+    Limits,
+    Linkage,
+    NO_LIMITS,
+    RevoluteJoint,
+)
 from linkage_ros.models.closings import find_closings, find_loops
 from linkage_ros.models.planar import lay_flat, Planar
 from linkage_ros.models.sides import assembled
@@ -50,6 +58,8 @@ def imported(
     close: Sequence[tuple[str, str]] = (),
     inputs: Sequence[str] = (),
     at: Mapping[str, float] | None = None,
+    *,
+    limits: bool = True,
 ) -> Imported:
     """
     Make a linkage of a URDF.
@@ -65,6 +75,8 @@ def imported(
     at
         Values of joints in a pose in which the loops close, in [rad] or [m]; those that are not
         named are as the file has them, or 0.
+    limits
+        Whether the limits of its joints are kept.
 
     Raises
     ------
@@ -72,7 +84,10 @@ def imported(
         Where it does not make a linkage, with what would help.
 
     """
-    return _Import(urdf, close, inputs, at or {}).made()
+    made = _Import(urdf, close, inputs, at or {}).made()
+    if not limits:
+        return made
+    return made._replace(linkage=_limited(made.linkage, urdf))
 
 
 class _Import:
@@ -205,3 +220,23 @@ class _Import:
 
     def _where(self) -> str:
         return 'in the pose' if self._told else 'where all joints are 0'
+
+
+def _limited(linkage: Linkage, urdf: UrdfFile) -> Linkage:
+    """Return a linkage whose joints have the limits of the robot's."""
+
+    def of(name: str, turns: bool) -> Limits:
+        limits = urdf.joints[name].limits if name in urdf.joints else NO_LIMITS
+        if turns and limits.high - limits.low >= tau:
+            # Angles come round: these are no limits of one that is published.
+            return replace(limits, low=-inf, high=inf)
+        return limits
+
+    return replace(
+        linkage,
+        inputs=tuple(replace(one, limits=of(one.joint, False)) for one in linkage.inputs),
+        joints={
+            name: replace(joint, limits=of(name, isinstance(joint, RevoluteJoint)))
+            for name, joint in linkage.joints.items()
+        },
+    )

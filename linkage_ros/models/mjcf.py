@@ -145,7 +145,7 @@ def _drive(actuators: ET.Element, part: Part, bodies: Bodies) -> None:
         joint = bodies.joints[given.joint]
         if motor:
             joint.set('armature', number(motor))
-        ET.SubElement(
+        servo = ET.SubElement(
             actuators,
             'position',
             name=joint.get('name', ''),
@@ -153,3 +153,5 @@ def _drive(actuators: ET.Element, part: Part, bodies: Bodies) -> None:
             kp=rough(inertia * _PACE * _PACE),
             kv=rough(2.0 * inertia * _PACE),
         )
+        if given.limits.bounded:
+            servo.set('ctrlrange', joint.get('range', ''))

@@ -23,11 +23,11 @@ hangs by.
 from __future__ import annotations
 
 from cmath import phase, rect
-from math import prod, remainder, tau
+from math import inf, prod, remainder, tau
 from xml.etree import ElementTree as ET
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Mass
+from linkage_ros.kinematics.linkage import GROUND, Limits, Mass, NO_LIMITS
 from linkage_ros.kinematics.survey import usual_inputs
 from linkage_ros.models.bodies import bar_width, bodies, Body, Solid
 from linkage_ros.models.names import PrefixedNames
@@ -44,6 +44,9 @@ LIGHT = 10.0
 
 _DIFFERENCE = 1e-4
 """In [rad], or of a length."""
+
+_FARTHEST = 1e9
+"""In [rad] or [m]: where a joint is limited that has a limit on the other side only."""
 
 _LEAST_INERTIA = 1e-12
 """An engine has no points with a mass; what has no extent gets this, in [kg·m²]."""
@@ -156,6 +159,7 @@ class Bodies:
         if branch.joint:
             joint.set('name', self._names.own(branch.joint))
             self.joints[branch.joint] = joint
+            _limit(joint, closure.linkage.limits.get(branch.joint, NO_LIMITS))
         else:
             joint.set('name', self._names.joint(f'{child}_at_{branch.name}'))
         joint.set('axis', axis)
@@ -174,7 +178,11 @@ class Bodies:
         if branch.kind == 'P':
             return self._closure.slide_values(self._position)[branch.name]
         angles = self._closure.link_angles(self._position)
-        return remainder(branch.sign * (angles[branch.child] - angles[branch.parent]), tau)
+        value = remainder(branch.sign * (angles[branch.child] - angles[branch.parent]), tau)
+        for bound in self._closure.bounds.joints:
+            if bound.name == branch.joint:
+                return bound.turned(value)
+        return value
 
 
 def _held(closure: Closure, branch: Branch) -> tuple[complex, float, str, complex]:
@@ -215,6 +223,14 @@ def _weight(body: Body) -> float:
         * prod((solid.length, solid.width, solid.height))
         for solid in body.solids
     )
+
+
+def _limit(joint: ET.Element, limits: Limits) -> None:
+    """Write what a joint can do, as far as the engine has words for it: no rate is limited."""
+    if limits.bounded:
+        joint.set('range', numbers(max(limits.low, -_FARTHEST), min(limits.high, _FARTHEST)))
+    if limits.effort < inf:
+        joint.set('actuatorfrcrange', numbers(-limits.effort, limits.effort))
 
 
 def _inertial(body: ET.Element, mass: Mass, origin: complex) -> None:

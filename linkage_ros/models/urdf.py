@@ -23,11 +23,12 @@ their grounds, since a scene does not say where they stand.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.linkage import GROUND, Mass
+from linkage_ros.kinematics.linkage import GROUND, Limits, Mass, NO_LIMITS
 from linkage_ros.kinematics.survey import usual_inputs
 from linkage_ros.models.bodies import bodies, Body
 from linkage_ros.models.cuts import add_frames, Cut
@@ -40,6 +41,9 @@ from linkage_ros.models.xml import comment, document, number, numbers, rough
 
 EFFORT, VELOCITY = 1000.0, 100.0
 """Limits that URDF asks for and nobody knows, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
+
+FARTHEST = 1e9
+"""In [rad]: where an angle is limited that goes on and on to this side, and to the other not."""
 
 _ROOT = 'world'
 
@@ -93,7 +97,7 @@ def urdf(name: str, parts: Sequence[Part]) -> bytes:
             mount = TreeJoint(
                 model.names.joint('mount'), 'fixed', root, model.names.own(GROUND), 0j
             )
-            _joint(robot, mount, None)
+            _joint(robot, mount, None, NO_LIMITS)
     for model in models:
         _write(robot, model)
     return document(robot)
@@ -126,9 +130,9 @@ A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joint
 the published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
 Links are bars in layers, of no particular shape; those with a mass are thin plates: ixx = iyy =
 izz/2.
-limit: what the joint comes to over the range of the input that the linkage starts in, and 0.001
-rad, or of the reach, on either side; with several inputs none for angles, the reach for slides.
-effort and velocity are not known: {EFFORT:g} and {VELOCITY:g}."""
+limit: as the linkage gives it; else what the joint comes to over the range of the input that the
+linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
+angles, the reach for slides. effort and velocity, where not known: {EFFORT:g} and {VELOCITY:g}."""
 
 
 def _write(robot: ET.Element, model: _Model) -> None:
@@ -144,9 +148,12 @@ def _write(robot: ET.Element, model: _Model) -> None:
         if joint.child not in links:
             ET.SubElement(robot, 'link', name=joint.child)
     found = {names.own(name): span for name, span in model.spans.items()}
+    given = {names.own(name): limits for name, limits in linkage.limits.items()}
+    computed: dict[str, dict[str, str]] = {}
     for joint in model.tree.joints:
-        _joint(robot, joint, found.get(joint.mimics or joint.name))
-    _start(robot, model)
+        of = joint.mimics or joint.name
+        computed[of] = _joint(robot, joint, found.get(of), given.get(of, NO_LIMITS))
+    _start(robot, model, computed)
 
 
 def _inertial(link: ET.Element, mass: Mass, origin: complex) -> None:
@@ -177,28 +184,42 @@ def _visuals(link: ET.Element, name: str, body: Body, origin: complex) -> None:
             ET.SubElement(material, 'color', rgba=numbers(*body.colour))
 
 
-def _joint(robot: ET.Element, joint: TreeJoint, span: Span | None) -> None:
+def _joint(
+    robot: ET.Element, joint: TreeJoint, span: Span | None, limits: Limits
+) -> dict[str, str]:
+    """Write a joint; return those of its limits that the linkage does not give."""
     kind: str = joint.kind
-    if kind == 'revolute' and span is not None and not span.limited:
+    if kind == 'revolute' and span is not None and not span.limited and not limits.bounded:
         kind = 'continuous'
     element = ET.SubElement(robot, 'joint', name=joint.name, type=kind)
     _origin(element, joint.place, joint.turn)
     ET.SubElement(element, 'parent', link=joint.parent)
     ET.SubElement(element, 'child', link=joint.child)
     if joint.kind == 'fixed':
-        return
+        return {}
     assert span is not None, 'all that moves is published'
     if joint.kind == 'revolute':
         axis = numbers(0.0, 0.0, joint.axis.real)
     else:
         axis = numbers(joint.axis.real, joint.axis.imag, 0.0)
     ET.SubElement(element, 'axis', xyz=axis)
-    limit = {'effort': number(EFFORT), 'velocity': number(VELOCITY)}
-    if kind != 'continuous':
-        limit = {'lower': number(span.lowest), 'upper': number(span.highest), **limit}
-    ET.SubElement(element, 'limit', limit)
+    # What is limited on one side only, and turns on and on to the other, is limited far away.
+    lowest, highest = (span.lowest, span.highest) if span.limited else (-FARTHEST, FARTHEST)
+    known = {
+        'lower': (limits.low, lowest),
+        'upper': (limits.high, highest),
+        'effort': (limits.effort, EFFORT),
+        'velocity': (limits.velocity, VELOCITY),
+    }
+    if kind == 'continuous':
+        del known['lower'], known['upper']
+    written = {
+        key: number(given if isfinite(given) else ours) for key, (given, ours) in known.items()
+    }
+    ET.SubElement(element, 'limit', written)
     if joint.mimics:
         ET.SubElement(element, 'mimic', joint=joint.mimics, multiplier='1', offset='0')
+    return {key: written[key] for key, (given, _) in known.items() if not isfinite(given)}
 
 
 def _origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:
@@ -206,11 +227,12 @@ def _origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:
     ET.SubElement(element, 'origin', xyz=xyz, rpy=rpy)
 
 
-def _start(robot: ET.Element, model: _Model) -> None:
+def _start(robot: ET.Element, model: _Model, computed: Mapping[str, Mapping[str, str]]) -> None:
     """
     Say what URDF has no words for: the inputs, and a pose in which the loops close.
 
-    Readers of URDF pass over elements that they do not know; ``linkage import`` knows it.
+    Of each joint also those limits that the linkage does not give. Readers of URDF pass over
+    elements that they do not know; ``linkage import`` knows these.
     """
     closure, names = model.part.closure, model.names
     inputs = usual_inputs(closure)
@@ -220,4 +242,7 @@ def _start(robot: ET.Element, model: _Model) -> None:
     element = ET.SubElement(robot, 'linkage_start')
     for name in named_joints(closure.linkage):
         kind = 'input' if name in [each.joint for each in closure.linkage.inputs] else 'joint'
-        ET.SubElement(element, kind, name=names.own(name), value=number(values[name]))
+        own = names.own(name)
+        joint = ET.SubElement(element, kind, name=own, value=number(values[name]))
+        if own in computed:
+            ET.SubElement(joint, 'computed', dict(computed[own]))

@@ -18,10 +18,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from math import isfinite
+from math import inf, isfinite
 from xml.etree import ElementTree as ET
 
 from linkage_ros.errors import FileError, quoted
+from linkage_ros.kinematics.linkage import Limits, NO_LIMITS
 from linkage_ros.models.urdf_robot import Inertial, MOVING, UrdfFile, UrdfJoint, UrdfLink, Vector
 
 _KINDS = (*MOVING, 'fixed', 'floating', 'planar')
@@ -64,13 +65,17 @@ class _Reader:
             links[name] = self._link(element, f'link {name}')
         if not links:
             raise self._error('', 'has no link', 'name a URDF file')
+        start = root.find('linkage_start')
+        made_up = {} if start is None else {each.get('name', ''): _made_up(each) for each in start}
         joints: dict[str, UrdfJoint] = {}
         for element in root.findall('joint'):
             name = self._named(element, joints, 'joint')
-            joints[name] = self._joint(element, name, links)
+            limits = NO_LIMITS
+            if name not in made_up or made_up[name] is not None:
+                limits = self._limits(element, name, made_up.get(name))
+            joints[name] = self._joint(element, name, links)._replace(limits=limits)
         self._check_mimics(joints)
         base, ordered = self._tree(links, joints)
-        start = root.find('linkage_start')
         said = [] if start is None else [each for each in start if each.get('name') in joints]
         return UrdfFile(
             self._file,
@@ -173,7 +178,42 @@ class _Reader:
             mimics='' if mimic is None else mimic.get('joint', ''),
             multiplier=self._values(mimic, 'multiplier', where, 1, '1')[0],
             offset=self._values(mimic, 'offset', where, 1, '0')[0],
+            limits=NO_LIMITS,
         )
+
+    def _limits(self, joint: ET.Element, name: str, made_up: Mapping[str, str] | None) -> Limits:
+        """
+        Return what ``<limit>`` says, as far as it says something.
+
+        Nothing do numbers that ``linkage urdf`` had to make up, bounds of a continuous joint, two
+        bounds of 0, and a velocity or an effort of 0, which exporters write who do not know them.
+        """
+        limit, where = joint.find('limit'), f'joint {name}'
+        if limit is None or joint.get('type') not in MOVING:
+            return NO_LIMITS
+        told = {
+            key: self._value(limit, key, where, default='0')
+            for key in ('lower', 'upper', 'velocity', 'effort')
+        }
+        book = dict(made_up or {})
+        if any(book.get(key, limit.get(key)) != limit.get(key) for key in ('lower', 'upper')):
+            # Somebody has put one of the two right, and left the other as it was.
+            book = {key: text for key, text in book.items() if key not in ('lower', 'upper')}
+        for key, text in book.items():
+            if key in told and text == limit.get(key):
+                del told[key]
+        low, high = told.get('lower', -inf), told.get('upper', inf)
+        if joint.get('type') == 'continuous' or low == high == 0.0:
+            low, high = -inf, inf
+        if low >= high:
+            raise self._error(
+                where,
+                f'its limits, {low:g} to {high:g}, leave nothing between them',
+                'put <limit> right, or import with --no-limits',
+            )
+        rates = [told.get(key, 0.0) for key in ('velocity', 'effort')]
+        velocity, effort = (value if value > 0.0 else inf for value in rates)
+        return Limits(low, high, velocity, effort)
 
     def _end(
         self, element: ET.Element, end: str, where: str, links: Mapping[str, UrdfLink]
@@ -226,6 +266,12 @@ class _Reader:
                     'close it by --close instead',
                 )
         return roots[0], ordered
+
+
+def _made_up(joint: ET.Element) -> Mapping[str, str] | None:
+    """Return the limits of a joint that ``linkage urdf`` made up; None where it kept no book."""
+    computed = joint.find('computed')
+    return None if computed is None else computed.attrib
 
 
 def _below(root: str, joints: Mapping[str, UrdfJoint]) -> Iterator[UrdfJoint]:

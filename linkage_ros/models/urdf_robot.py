@@ -20,6 +20,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from linkage_ros.kinematics.linkage import Limits
+
 Vector = tuple[float, float, float]
 
 MOVING = ('revolute', 'continuous', 'prismatic')
@@ -70,6 +72,8 @@ class UrdfJoint(NamedTuple):
         In the child's frame, of any length but 0.
     mimics, multiplier, offset
         The joint that it follows, '' for none, and how.
+    limits
+        As ``<limit>`` has them, but for those that ``linkage urdf`` has made up.
 
     """
 
@@ -83,6 +87,7 @@ class UrdfJoint(NamedTuple):
     mimics: str
     multiplier: float
     offset: float
+    limits: Limits
 
 
 class UrdfFile(NamedTuple):

@@ -31,6 +31,7 @@ _COUNTED = {
     'Ticks open': ('told_open', 'open'),
     'Ticks indeterminate': ('told_open', 'indeterminate'),
     'Ticks at a toggle': ('told_toggle', ''),
+    'Ticks beyond limits': ('told_limited', ''),
 }
 """Counts that only grow, the lane that tells of it, and what it says."""
 
@@ -47,7 +48,8 @@ class Health:
     Parameters
     ----------
     lanes
-        Where what happens is put, by kind: lost, told_open, told_toggle, dropped and health.
+        Where what happens is put, by kind: lost, told_open, told_toggle, told_limited, dropped
+        and health.
     from_beginning
         Whether the bag holds the run from its beginning: where not, counts have begun before.
 

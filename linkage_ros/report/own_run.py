@@ -40,8 +40,8 @@ from linkage_ros.scene.scene import Scene
 import numpy as np
 
 LANES = (
-    'fault', 'open', 'told_open', 'toggle', 'told_toggle', 'silent', 'withheld', 'rejected',
-    'stale', 'lost', 'dropped', 'reset', 'jump', 'health',
+    'fault', 'open', 'told_open', 'toggle', 'told_toggle', 'told_limited', 'silent', 'withheld',
+    'rejected', 'stale', 'lost', 'dropped', 'reset', 'jump', 'health',
 )  # fmt: skip
 
 _TOGETHER = 20_000_000
@@ -110,6 +110,7 @@ class OwnRun:
             if member.drive[0] == 'topic'
         }
         self._first_joints = [scene.joints.index(linkage.joints[0]) for linkage in self._linkages]
+        self._has_limits = any(member.linkage.limits for member in scene.members)
         self._tells_toggles = len(scene.members) == 1 and 'velocity' in scene.members[0].effects
         self._health = Health(self._lanes, from_beginning)
         bodies = sum(len(each.closure.structure.links) for each in self._linkages[:MOST_LINKAGES])
@@ -190,6 +191,8 @@ class OwnRun:
             yield 'toggle'
         if self._health.said:
             yield from ('lost', 'dropped', 'health', 'told_open', 'told_toggle')
+            if self._has_limits:
+                yield 'told_limited'
 
     def _look_at_samples(self, samples: Rows, good: Flags, states: Rows, read: JointBlock) -> None:
         """Draw the crank, and look for samples at which a loop does not close."""

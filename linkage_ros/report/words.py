@@ -29,6 +29,7 @@ LANES = {
     'told_open': ('no pose, by diagnostics', 'as the diagnostics count, once a period'),
     'toggle': ('at a toggle', 'joint states without rates'),
     'told_toggle': ('at a toggle, by diagnostics', 'as the diagnostics count, once a period'),
+    'told_limited': ('beyond limits, by diagnostics', 'as the diagnostics count, once a period'),
     'silent': ('no joint states', 'for longer than these are otherwise apart'),
     'withheld': ('withheld', 'ticks without a joint state after which something is remembered'),
     'rejected': ('samples rejected', 'as the scene refuses them, once more'),

@@ -30,6 +30,7 @@ from linkage_ros.kinematics.linkage import Input
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.status import Status
 from linkage_ros.line import Line
+from linkage_ros.look import Look
 from linkage_ros.ros.run_snapshots import RunSnapshots
 from linkage_ros.ros.tick_loop import Counts, TickLoop
 
@@ -62,7 +63,9 @@ class Snapshot:
     lost: int = 0
     rejected: int = 0
     toggles: int = 0
+    limited: int = 0
     unclosed: int = 0
+    indeterminate: int = 0
 
     @classmethod
     def of(cls, counts: Counts, time: int) -> Snapshot:
@@ -73,7 +76,9 @@ class Snapshot:
             counts.lost,
             sum(counts.rejected.values()),
             counts.unclosed[Status.TOGGLE],
+            counts.unclosed[Status.LIMITED],
             counts.unclosed[Status.OPEN] + counts.unclosed[Status.INDETERMINATE],
+            counts.unclosed[Status.INDETERMINATE],
         )
 
 
@@ -169,9 +174,18 @@ class Health:
 
     def _lost_time(self) -> dict[str, object]:
         """Return the time that drives which integrate could not follow, and left out."""
-        drives = [line.drive for line in self.loop.pipeline.lines]
+        lines = self.loop.pipeline.lines
+        drives = [line.drive for line in lines]
         lost = [drive.lost for drive in drives if hasattr(drive, 'lost')]
-        return {'Time not integrated (s)': f'{sum(lost) / NANOSECONDS:.3f}'} if lost else {}
+        if not lost:
+            return {}
+        values: dict[str, object] = {'Time not integrated (s)': f'{sum(lost) / NANOSECONDS:.3f}'}
+        if any(
+            limits.effort < inf for line in lines for limits in line.member.linkage.limits.values()
+        ):
+            cut = sum(drive.saturated for drive in drives if hasattr(drive, 'saturated'))
+            values['Commands cut to the effort limit'] = cut
+        return values
 
     def _crank(self) -> DiagnosticStatus:
         counts = self.loop.counts
@@ -204,21 +218,25 @@ class Health:
         counts = self.loop.counts
         level, message = OK, 'Closed'
         lines = self.loop.pipeline.lines
-        number, last = counts.last_unclosed or (0, None)
+        number, last = counts.last_unclosed.get(Status.OPEN, (0, None))
         reachable = describe(lines[number].closure.input_ranges)
-        if last is not None and self.now.unclosed > self.before.unclosed:
+        if self.now.unclosed > self.before.unclosed:
             level = ERROR
             message = (
                 f'Open by {last.gap:.6g} m; reachable: {reachable}'
-                if last.status is Status.OPEN
+                if last is not None and self.now.indeterminate == self.before.indeterminate
                 else 'The pose cannot be told: two pins coincide, or a link is broken'
             )
+        elif self.now.limited > self.before.limited:
+            number, beyond = counts.last_unclosed[Status.LIMITED]
+            level, message = WARN, f'Beyond limits: {lines[number].closure.beyond(beyond)}'
         elif self.now.toggles > self.before.toggles:
             level, message = WARN, 'At a toggle: position valid, velocity not'
         values: dict[str, object] = {
             'Scene': self.scene,
             'Reachable': reachable,
             'Ticks at a change point': counts.unclosed[Status.CHANGE_POINT],
+            'Ticks beyond limits': counts.unclosed[Status.LIMITED],
             'Ticks at a toggle': counts.unclosed[Status.TOGGLE],
             'Ticks open': counts.unclosed[Status.OPEN],
             'Ticks indeterminate': counts.unclosed[Status.INDETERMINATE],
@@ -241,7 +259,34 @@ class Health:
             values |= near
             if warning and level == OK:
                 level, message = WARN, warning
+        shares, warning = self._shares()
+        values |= shares
+        if warning and level == OK:
+            level, message = WARN, warning
         return self._status('loop closure', level, message, values)
+
+    def _shares(self) -> tuple[dict[str, str], str]:
+        """Return what of its limits each joint takes at the last tick, and what is too much."""
+        values, warnings = {}, []
+        last = self.loop.counts.last
+        for line, look in zip(self.loop.pipeline.lines, last.looks if last else (), strict=False):
+            for name, (rate, effort) in _exertions(line, look).items():
+                limits = line.member.linkage.limits[name]
+                for what, value, most in (
+                    ('Velocity', rate, limits.velocity),
+                    ('Effort', effort, limits.effort),
+                ):
+                    if value is None or most == inf:
+                        continue
+                    values[f'{what} of {line.member.prefix}{name}, of its limit'] = (
+                        f'{abs(value) / most:.4g}'
+                    )
+                    if abs(value) > most:
+                        warnings.append(
+                            f'{what} of {line.member.prefix}{name} is {abs(value):.6g}, '
+                            f'its limit {most:.6g}'
+                        )
+        return values, '; '.join(warnings)
 
     def _inputs(self) -> dict[str, str]:
         """Return the inputs of the only linkage."""
@@ -346,6 +391,21 @@ class Health:
             hardware_id=self.scene,
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
+
+
+def _exertions(line: Line, look: Look) -> dict[str, tuple[float | None, float | None]]:
+    """Return rate and effort of the joints that have limits, as far as they are known."""
+    linkage, reading = line.member.linkage, look.reading
+    found: dict[str, tuple[float | None, float | None]] = {}
+    if reading is not None:
+        for number, name in enumerate(linkage.joints):
+            # Rates and efforts are of all joints, or of none; of those that are driven no others.
+            rate = reading.rates[number] if reading.rates else None
+            found[name] = rate, reading.efforts[number] if reading.efforts else None
+    driven = look.crank.rates if look.crank is not None else ()
+    for given, rate in zip(linkage.inputs, driven, strict=False):
+        found[given.joint] = rate, found.get(given.joint, (None, None))[1]
+    return {name: of for name, of in found.items() if name in linkage.limits}
 
 
 def _of(line: Line) -> str:

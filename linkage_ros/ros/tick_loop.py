@@ -67,8 +67,8 @@ class Counts:
     lateness: DurationHistogram = field(default_factory=DurationHistogram)
     last: Tick | None = None
     unclosed: dict[Status, int] = field(default_factory=lambda: dict.fromkeys(Status, 0))
-    last_unclosed: tuple[int, Position] | None = None
-    """Number of the linkage, and its position, when it last had no rates."""
+    last_unclosed: dict[Status, tuple[int, Position]] = field(default_factory=dict)
+    """Number of the linkage and its position, where one had the status last."""
 
 
 Take = Callable[[], tuple[bytes, dict[str, Any]] | None]
@@ -257,8 +257,7 @@ class TickLoop:
                 counts.silent += 1
             elif position[0] is not _CLOSED:
                 counts.unclosed[position[0]] += 1
-                if not position[0].has_rates:
-                    counts.last_unclosed = number, position
+                counts.last_unclosed[position[0]] = number, position
             if reading is None and position is not None and position[2]:
                 counts.withheld += 1
 

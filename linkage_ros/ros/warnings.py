@@ -101,12 +101,15 @@ class Warnings:
             self._lost = counts.lost
         for status, text in _UNCLOSED.items():
             ticks = counts.unclosed[status] - self._unclosed[status]
-            if ticks and counts.last_unclosed is not None:
-                number, position = counts.last_unclosed
+            if ticks and status in counts.last_unclosed:
+                number, position = counts.last_unclosed[status]
+                closure = closures[number]
                 line = text.format(
                     ticks=ticks,
                     gap=position.gap,
-                    reachable=describe(closures[number].input_ranges),
+                    reachable=describe(closure.input_ranges),
+                    published='published all the same' if position.joints else 'nothing published',
+                    beyond=closure.beyond(position),
                 )
                 if self.say(status.value, line, period):
                     self._unclosed[status] = counts.unclosed[status]
@@ -127,4 +130,5 @@ _UNCLOSED = {
         '{ticks} ticks without a pose (two pins in one place, or a broken link), nothing published'
     ),
     Status.TOGGLE: '{ticks} ticks at a toggle: positions published, velocities not',
+    Status.LIMITED: '{ticks} ticks beyond limits, {published}: {beyond}',
 }

@@ -17,13 +17,16 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.limit_checks import check_limits
 from linkage_ros.kinematics.linkage import (
     GROUND,
     Input,
+    Limits,
     Linkage,
     Mass,
     Pose,
@@ -39,6 +42,9 @@ _FARTHEST = 1e9
 
 _HEAVIEST = 1e12
 """Masses beyond this, in [kg], and moments of inertia, in [kg·m²], are no machine's either."""
+
+_STRONGEST = 1e12
+"""Nor are efforts beyond this, in [N·m] or [N]."""
 
 
 def looks_like_linkage(content: Section) -> bool:
@@ -58,7 +64,9 @@ def read_linkage(content: Section) -> Linkage:
     """
     for shorthand, expand in _SHORTHANDS.items():
         if shorthand in content:
-            written_out = expand(content.section(shorthand))
+            short = content.section(shorthand)
+            written_out = _limited(expand(short), short)
+            short.finish()
             content.finish()
             return _closable(content, _linkage(Section(content.file, '', written_out)), shorthand)
     for key in _KEYS:
@@ -101,12 +109,29 @@ def _linkage(content: Section) -> Linkage:
 
 
 def _input(content: Section) -> Input:
+    limits = _limits(content)
     if 'slider' in content:
-        driven = Input(content.text('joint'), slider=content.text('slider'))
+        driven = Input(content.text('joint'), slider=content.text('slider'), limits=limits)
     else:
-        driven = Input(content.text('joint'), content.text('parent'), content.text('child'))
+        ends = content.text('parent'), content.text('child')
+        driven = Input(content.text('joint'), *ends, limits=limits)
     content.finish(('slider',))
     return driven
+
+
+def _limits(content: Section) -> Limits:
+    """Return what a joint says of its limits; `kinematics.checks` says whether they can be."""
+    low, high = content.interval('limits', most=_FARTHEST)
+    return Limits(
+        low,
+        high,
+        content.number('velocity', inf, above=0.0, most=_FARTHEST, unit='rad/s or m/s')
+        if 'velocity' in content
+        else inf,
+        content.number('effort', inf, above=0.0, most=_STRONGEST, unit='N·m or N')
+        if 'effort' in content
+        else inf,
+    )
 
 
 def _pose(content: Section) -> Pose:
@@ -155,10 +180,11 @@ def _slider(content: Section) -> Slider:
 
 def _joint(content: Section) -> RevoluteJoint | SlideJoint:
     joint: RevoluteJoint | SlideJoint
+    limits = _limits(content)
     if 'slider' in content:
-        joint = SlideJoint(content.text('slider'))
+        joint = SlideJoint(content.text('slider'), limits)
     else:
-        joint = RevoluteJoint(content.text('parent'), content.text('child'))
+        joint = RevoluteJoint(content.text('parent'), content.text('child'), limits)
     content.finish(('slider',))
     return joint
 
@@ -166,22 +192,44 @@ def _joint(content: Section) -> RevoluteJoint | SlideJoint:
 def _closable(content: Section, linkage: Linkage, shorthand: str = '') -> Linkage:
     try:
         closure = Closure(linkage)
-        if len(linkage.inputs) == 1 and not closure.input_ranges:
+        if len(linkage.inputs) == 1 and not closure.closing_ranges:
             raise DefinitionError(
                 'links',
                 'the loops close at no value of the input',
                 'the longest link of a loop must be shorter than its others together',
             )
+        check_limits(closure)
     except DefinitionError as error:
-        raise content.error(shorthand or error.where, error.reason, error.remedy) from None
+        where = error.where
+        if shorthand:
+            # Of what a shorthand stands for, it says the limits alone itself.
+            where = f'{shorthand}.{where}' if where.endswith('.limits') else shorthand
+        raise content.error(where, error.reason, error.remedy) from None
     return linkage
+
+
+def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
+    """Return what a shorthand stands for, with the limits that it gives its joints."""
+    driven, joints = written_out['input'], written_out['joints']
+    own = content.section('joints', required=False)
+    for name in own:
+        if name not in joints:
+            raise own.error(
+                name, f'{quoted(name)} is no joint of it', f'name one of {", ".join(joints)}'
+            )
+    places = [(driven, content.section('input', required=False))]
+    places += [(joints[name], own.section(name)) for name in own]
+    for joint, of in places:
+        _limits(of)
+        of.finish()
+        joint.update(of.mapping)
+    return written_out
 
 
 def _four_bar(content: Section) -> dict[str, Any]:
     """Write out crank a, coupler b, rocker c and ground d."""
     a, b, c, d = (content.number(side, above=0.0, most=_FARTHEST, unit='m') for side in 'abcd')
     side = content.choice('assembly', ('left', 'right'), 'left')
-    content.finish()
     return {
         'links': {
             'ground': {'O2': [0, 0], 'O4': [d, 0]},
@@ -207,7 +255,6 @@ def _inverted_slider_crank(content: Section) -> dict[str, Any]:
             'swivel', "[0, 0] is the crank's pivot", 'give the swivel another place'
         )
     side = content.choice('assembly', ('ahead', 'behind'), 'ahead')
-    content.finish()
     return {
         'links': {
             'ground': {'O': [0, 0], 'C': list(swivel)},

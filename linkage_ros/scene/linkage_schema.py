@@ -30,6 +30,7 @@ from linkage_ros.scene.schema import (
 
 _FARTHEST = 1e9
 _HEAVIEST = 1e12
+_STRONGEST = 1e12
 
 _SHORTHANDS = ('four_bar', 'inverted_slider_crank')
 _WRITTEN_OUT = ('links', 'input', 'joints')
@@ -84,7 +85,11 @@ def _shorthands() -> dict[str, Schema]:
     return {
         'four_bar': mapping(
             'A four-bar by the lengths of its links; stands for a file written out.',
-            {**lengths, 'assembly': _choice('side of A→O4 on which B lies', left, left[0])},
+            {
+                **lengths,
+                'assembly': _choice('side of A→O4 on which B lies', left, left[0]),
+                **_limits_of('coupler_joint', 'rocker_joint'),
+            },
             required=tuple(lengths),
         ),
         'inverted_slider_crank': mapping(
@@ -93,6 +98,7 @@ def _shorthands() -> dict[str, Schema]:
                 'a': number('crank [m]', above=0.0, most=_FARTHEST),
                 'swivel': point("the swivel from the crank's pivot: [x, y] [m]", _FARTHEST),
                 'assembly': _choice('side of B on which the swivel lies', ahead, ahead[0]),
+                **_limits_of('rod_joint', 'rod_slide'),
             },
             required=('a', 'swivel'),
         ),
@@ -109,6 +115,7 @@ def _input() -> Schema:
                 'parent': text('the link that carries the motor'),
                 'child': text('the link that is turned'),
                 'slider': text('the slider that is driven, in the place of parent and child'),
+                **_limits(),
             },
             required=('joint',),
         ),
@@ -130,9 +137,38 @@ def _joint() -> Schema:
                 'parent': text('the link from which the angle is measured'),
                 'child': text('the link whose angle it is'),
                 'slider': text('the slider, in the place of parent and child'),
+                **_limits(),
             },
         ),
         **_either_slider,
+    }
+
+
+def _limits() -> dict[str, Schema]:
+    """Return the schemas of what a joint of the machine can do."""
+    return {
+        'limits': {
+            'description': 'between which the joint stays: [low, high] [rad or m]; '
+            '-.inf or .inf for no limit on a side',
+            'type': 'array',
+            'minItems': 2,
+            'maxItems': 2,
+            # The lower one may be -.inf, the upper one .inf: JSON Schema knows them as numbers.
+            'items': {'type': 'number'},
+        },
+        'velocity': number('its greatest rate [rad/s or m/s]', above=0.0, most=_FARTHEST),
+        'effort': number('its greatest torque or force [N·m or N]', above=0.0, most=_STRONGEST),
+    }
+
+
+def _limits_of(*joints: str) -> dict[str, Schema]:
+    """Return the schemas by which a shorthand gives its joints limits."""
+    return {
+        'input': mapping('What the driven joint can do.', _limits()),
+        'joints': mapping(
+            'What the published joints can do, by their names.',
+            {name: mapping('What the joint can do.', _limits()) for name in joints},
+        ),
     }
 
 

@@ -25,11 +25,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 import json
+from math import isfinite, isinf
 from pathlib import Path
 import re
 from textwrap import wrap
 
-from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.kinematics.linkage import (
+    Input,
+    Limits,
+    Linkage,
+    RevoluteJoint,
+    SlideJoint,
+    Slider,
+)
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.whole_file import write_whole
 from linkage_ros.scene.yaml_file import parse_yaml
@@ -91,6 +99,8 @@ def write_linkage(linkage: Linkage, file: str | Path, comment: Sequence[str] = (
 def number_text(value: float) -> str:
     """Return the shortest text that every YAML reader takes for the same float."""
     value = float(value)
+    if isinf(value):
+        return '.inf' if value > 0.0 else '-.inf'
     written = repr(value)
     if value.is_integer() and abs(value) < _WHOLE and written != '-0.0':
         return str(int(value))
@@ -140,15 +150,25 @@ def _slider(slider: Slider) -> dict[str, Content]:
 
 
 def _input(given: Input) -> dict[str, Content]:
+    limits = _limits(given.limits)
     if given.slider:
-        return {'joint': given.joint, 'slider': given.slider}
-    return {'joint': given.joint, 'parent': given.parent, 'child': given.child}
+        return {'joint': given.joint, 'slider': given.slider, **limits}
+    return {'joint': given.joint, 'parent': given.parent, 'child': given.child, **limits}
 
 
 def _joint(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
+    limits = _limits(joint.limits)
     if isinstance(joint, SlideJoint):
-        return {'slider': joint.slider}
-    return {'parent': joint.parent, 'child': joint.child}
+        return {'slider': joint.slider, **limits}
+    return {'parent': joint.parent, 'child': joint.child, **limits}
+
+
+def _limits(limits: Limits) -> dict[str, Content]:
+    found: dict[str, Content] = {'limits': [limits.low, limits.high]} if limits.bounded else {}
+    for key in ('velocity', 'effort'):
+        if isfinite(value := getattr(limits, key)):
+            found[key] = value
+    return found
 
 
 def _pose(linkage: Linkage) -> dict[str, Content]:

@@ -227,7 +227,15 @@ def _scene(
     return scene
 
 
-_OF_A_MEMBER = ('publish_input', 'drive', 'effects', 'loads', 'solver', 'accuracy')
+_OF_A_MEMBER = (
+    'publish_input',
+    'drive',
+    'effects',
+    'loads',
+    'solver',
+    'accuracy',
+    'beyond_limits',
+)
 """What an entry of ``linkages`` may say for itself, and the scene for all that do not."""
 
 _OF_A_SCENE = ('rate', 'angles', 'seed', 'faults', 'record', 'robot_description', *_OF_A_MEMBER)
@@ -285,6 +293,7 @@ def _member(
         loads=read_loads(loads) if loads is not None else None,
         content=own,
         linkage_content=linkage_content,
+        silent_beyond_limits=_silent(where('beyond_limits'), linkage),
         **read_solving(own, scene, parts),
     )
     effects.finish(tuple(EFFECTS))
@@ -314,6 +323,22 @@ def _with_inputs(linkage: Linkage, content: Section) -> Linkage:
     except DefinitionError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
     return changed
+
+
+def _silent(content: Section, linkage: Linkage) -> bool:
+    """Return whether nothing is published beyond the limits of a linkage."""
+    said = content.choice('beyond_limits', ('publish', 'silent'), 'publish')
+    if (
+        'beyond_limits' in content
+        and 'linkages' not in content
+        and not any(limits.bounded for limits in linkage.limits.values())
+    ):
+        raise content.error(
+            'beyond_limits',
+            'no joint of the linkage has limits',
+            'leave it out, or write limits: [low, high] into the linkage file',
+        )
+    return said == 'silent'
 
 
 def _rate(content: Section) -> float:

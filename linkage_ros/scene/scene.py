@@ -76,6 +76,8 @@ class Member:
         Of its positions, in [rad] or [m], where the cheapest solver is to be found; else nothing.
     loads
         What acts on it; nothing where the scene does not say.
+    silent_beyond_limits
+        Whether nothing is published while a joint is beyond its limits.
     content, linkage_content
         Where all this stands, for messages: in the scene, and in the linkage file.
 
@@ -90,6 +92,7 @@ class Member:
     linkage_content: Section = field(compare=False, repr=False)
     solver: tuple[str, Any] | None = None
     accuracy: float | None = None
+    silent_beyond_limits: bool = False
 
     @property
     def prefix(self) -> str:

@@ -153,6 +153,12 @@ def _of_a_linkage() -> dict[str, Schema]:
             'without it, they are where the drive is no topic, or effort is named.',
             'type': 'boolean',
         },
+        'beyond_limits': {
+            'description': 'What is published while a joint is beyond its limits: the same as '
+            'within them, or nothing.',
+            'enum': ['publish', 'silent'],
+            'default': 'publish',
+        },
         'drive': {
             **mapping('Where the crank comes from: one drive.', drives),
             'maxProperties': 1,

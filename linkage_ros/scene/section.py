@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import inf, isfinite
+from math import inf, isfinite, isnan
 from re import fullmatch
 from typing import Any, cast
 
@@ -169,6 +169,30 @@ class Section:
                 key, f'{quoted(value)} is not a point', 'write two finite numbers: [x, y]'
             )
         if max(map(abs, value)) > most:
+            raise self.error(
+                key, f'{quoted(value)} is out of bounds', f'write numbers of at most {most:g}'
+            )
+        return float(value[0]), float(value[1])
+
+    def interval(self, key: str, *, most: float = inf) -> tuple[float, float]:
+        """
+        Return two numbers [low, high]; infinite ones for no limit, and where the key is absent.
+
+        Their order is left to who knows what they are of.
+        """
+        value = self._take(key, [-inf, inf], 'two numbers [low, high]')
+        if (
+            not isinstance(value, list)
+            or len(value) != 2
+            or any(isinstance(v, bool) or not isinstance(v, int | float) for v in value)
+            or any(map(isnan, value))
+        ):
+            raise self.error(
+                key,
+                f'{quoted(value)} is not two numbers',
+                'write [low, high]; -.inf or .inf for none on a side',
+            )
+        if any(most < abs(v) < inf for v in value):
             raise self.error(
                 key, f'{quoted(value)} is out of bounds', f'write numbers of at most {most:g}'
             )

@@ -74,10 +74,13 @@ def _drive(closure: Closure) -> str:
     start, interval = _start(closure)
     if interval.whole:
         return f'{{constant_rate: {{rate: 1, start: {number_text(start)}}}}}'
-    middle = 0.5 * (interval.lowest + interval.highest)
-    half = 0.5 * _PART * (interval.highest - interval.lowest)
+    left_out = 0.5 * (1.0 - _PART) * (interval.highest - interval.lowest)
+    low, high = (
+        end if by else end + inwards
+        for end, inwards, by in zip(interval[:2], (left_out, -left_out), interval.by, strict=True)
+    )
     # A start that lies in what is left out at an end is where the swing turns back.
-    low, high = min(middle - half, start), max(middle + half, start)
+    low, high = min(low, start), max(high, start)
     mean, amplitude = 0.5 * (low + high), 0.5 * (high - low)
     sine = min(max((start - mean) / amplitude, -1.0), 1.0) if amplitude else 0.0
     said = {

@@ -41,6 +41,9 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _ROUNDING = 2.0**-50
+_LEAST_BOX = 2.0**-44
+"""Of an unknown's size, or of 1: a narrower box could not be told from its rounding."""
+
 _UP = 1.0 + 2.0**-40
 """What makes up for the rounding of bounds that are worked out in matrices."""
 
@@ -162,10 +165,14 @@ class _Group:
         inverse, regular = _inverse(slopes)
         step, spread = self._step(0, inverse)
         first = np.abs(step) + spread
-        box = 2.0 * first
-        self._set(0, middle, box)
-        radius = (first + _image(self._loss(inverse), box)) * _UP
-        proven = regular & (radius < box).all(axis=1)
+        # A pin of the ground that a group places stands still but for its rounding.
+        box = 2.0 * first + _LEAST_BOX * (1.0 + np.abs(middle))
+        radius, held = self._within(box, first, inverse)
+        if not held.all():
+            # Where an unknown stands still, its box may be narrower than what others do to it.
+            box = np.where(held[:, None], box, np.maximum(box, 1.5 * radius))
+            radius, held = self._within(box, first, inverse)
+        proven = regular & held
         self._set(0, middle, radius)
         loss = self._loss(inverse)
         worst = loss.sum(axis=2).max(axis=1)
@@ -182,6 +189,13 @@ class _Group:
                 largest = (np.abs(step) + spread).max(axis=1) / (1.0 - worst)
             self._set(k, step, (spread + loss.sum(axis=2) * largest[:, None]) * _UP)
         return Unknowns(middle, box, radius, self._turning), proven
+
+    def _within(self, box: Array, first: Array, inverse: Array) -> tuple[Array, Mask]:
+        """Return how far from the middle a solution is, and where it is so within the box."""
+        self._set(0, self._middle, box)
+        radius: Array = (first + _image(self._loss(inverse), box)) * _UP
+        held: Mask = np.asarray((radius < box).all(axis=1))
+        return radius, held
 
     def _step(self, order: int, inverse: Array) -> tuple[Array, Array]:
         """Return −Y·F of an order: middles and radii."""

@@ -135,7 +135,7 @@ class Knots:
         """Return the assembly of each dyad, or nothing where a loop is not closed."""
         if key not in self._signs:
             position = self._closed.position(*self._given(key))
-            closed = position.status is Status.CLOSED
+            closed = position.status in (Status.CLOSED, Status.LIMITED)
             self._signs[key] = self._orientations(position.state.coordinates) if closed else None
         return self._signs[key]
 

@@ -157,14 +157,13 @@ class LoopFinder:
     def _iterated(self, group: Iterated) -> Loops:
         known = self._known
         slides, equations, balances = [], [], []
-        for joint in self._structure.joints:
-            if joint.link in group.links or joint.to in group.links:
-                equations.append(self._equation(joint))
-                if joint.kind == 'P':
-                    slides.append(joint.name)
-                    angle = self._sliders[joint.name].angle
-                    ends = known.blocks[joint.name], self._sliders[joint.name].along
-                    balances.append(self._between(*ends, angle))
+        for joint in self._structure.joints_of(group):
+            equations.append(self._equation(joint))
+            if joint.kind == 'P':
+                slides.append(joint.name)
+                angle = self._sliders[joint.name].angle
+                ends = known.blocks[joint.name], self._sliders[joint.name].along
+                balances.append(self._between(*ends, angle))
         for index, given in enumerate(self._inputs, 1):
             if given.slider in slides:
                 slide = known.slides[given.slider]

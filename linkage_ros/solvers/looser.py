@@ -13,13 +13,13 @@
 # limitations under the License.
 
 
-"""Links that no dyad covers, iterated to a tolerance from the nearest knot of `Iteration`."""
+"""Links that no dyad covers, iterated to a tolerance from the curve of `Iteration`."""
 
 from __future__ import annotations
 
 from typing import cast
 
-from linkage_ros.kinematics.equations import along, equations
+from linkage_ros.kinematics.equations import equations
 from linkage_ros.kinematics.iteration import IteratedPose, Iteration
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State, Step
@@ -28,9 +28,6 @@ import numpy as np
 _STEPS = 8
 _SINGULAR = 1e-6
 """Conditioning below which so loose an answer is none."""
-
-_FARTHEST = 0.5
-"""In [rad], or in lengths: what moves farther is left to the iteration in small steps."""
 
 
 class _Looser(Iteration):
@@ -44,10 +41,11 @@ class _Looser(Iteration):
     def close(self, known: State) -> IteratedPose:
         """Append as `Iteration.close`; where the first steps do not contract, it does."""
         end = 1 + len(self._inputs)
-        start, _ = self._nearest(known[0][1:end])
-        if start is None:
+        inputs = known[0][1:end]
+        start = self._start_at(inputs) if len(inputs) == 1 else None
+        if start is None or start.ends:
             return super().close(known)
-        unknowns, last = start, _FARTHEST
+        unknowns, last = start.unknowns, start.farthest
         for _ in range(_STEPS):
             errors, jacobian = equations(self._constraints, unknowns, known)
             try:
@@ -62,9 +60,7 @@ class _Looser(Iteration):
                 pose = IteratedPose(Status.CLOSED, 0.0, unknowns, jacobian)
                 if self.conditioning(pose) <= _SINGULAR:
                     break
-                self._append(known, unknowns)
-                for slide in self._slides:
-                    known[0].append(along(slide, known, unknowns).real)
+                self._place(known, unknowns, start.turned)
                 return pose
         return super().close(known)
 
@@ -76,7 +72,7 @@ def looser(step: Step, tolerance: float) -> Step:
     Parameters
     ----------
     step
-        An `Iteration`, with which its knots are shared.
+        An `Iteration`, with which its branch is shared.
     tolerance
         In [rad], and in the unit of the lengths.
 

@@ -42,6 +42,9 @@ _SMALLEST_CELL = 2.0**-18
 """Of the range: where that is too large to prove anything, there is a toggle, or next to one."""
 
 _MOST_CELLS = 2**14
+_PLENTY = 2**10
+"""Of cells: for each so many twice as many knots cost less than cells that spare them."""
+
 _BLOCK = 4096
 _TIGHT = 1.1
 """A bound that exceeds the middle's by no more than this is not worth smaller cells."""
@@ -161,9 +164,11 @@ class RangeProof:
                 width = done.high[where] - done.low[where]
                 if width < _SMALLEST_CELL * self._span or len(split) > _MOST_CELLS:
                     self._refuse(0.5 * (done.low[where] + done.high[where]))
-            surely = np.where(split, 0.0, 2.0 * done.middle - done.bound).max()
-            allowed = self._allowed(self._needed(max(float(surely), 0.0)))
-            split |= (done.bound > allowed) & (done.bound > _TIGHT * done.middle)
+            else:
+                # What the middles ask for is asked for in any case: no cell need be tighter.
+                knots = self._needed(float(done.middle.max()))
+                allowed = self._allowed(knots << min(len(split) // _PLENTY, 8))
+                split = (done.bound > allowed) & (done.bound > _TIGHT * done.middle)
             if len(split) > _MOST_CELLS or not split.any():
                 done = done.chosen(np.argsort(done.low))
                 for begin in range(0, len(done.low), _BLOCK):

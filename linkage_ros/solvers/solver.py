@@ -76,6 +76,7 @@ class Solver(Closure):
     def __init__(self, closed: Closure) -> None:
         # Not built once more: an iterated linkage is followed through a turn for it.
         vars(self).update(vars(closed))
+        self._keep_limits()
         self.closed = closed
         self.choice: Choice | None = None
 
@@ -111,13 +112,18 @@ class Solver(Closure):
 
     @cached_property
     def input_ranges(self) -> tuple[InputRange, ...]:
-        """Where the single input closes every loop, in [rad] or [m]; of several inputs, none."""
+        """Where the single input can go, in [rad] or [m]; of several inputs, none."""
         return self.closed.input_ranges
 
     @cached_property
     def singular_inputs(self) -> tuple[SingularInput, ...]:
         """Where a single input meets toggles and change points; of several inputs, none."""
         return self.closed.singular_inputs
+
+    @cached_property
+    def closing_ranges(self) -> tuple[InputRange, ...]:
+        """Where the single input closes every loop, whatever its limits; of several, none."""
+        return self.closed.closing_ranges
 
     def nearness(self, position: Position) -> Nearness:
         """Return how near trouble a closed position is."""

@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.nearness import away
 from linkage_ros.solvers.loops import Loops, Turns
 
 _NEAR = 0.01
@@ -61,11 +62,8 @@ def refuse_trouble(task: Task, ranges: Sequence[tuple[float, float]]) -> None:
     """Refuse where a toggle or a change point lies in a range: there is no bound."""
     for low, high in ranges:
         for singular in task.closed.singular_inputs:
-            turning = not task.closed.linkage.inputs[0].slider
-            nearest = 0.5 * (low + high)
-            away = singular.value - nearest
-            nearest += remainder(away, tau) if turning else away
-            if low <= nearest <= high:
+            middle = 0.5 * (low + high)
+            if low <= middle - away(task.closed, middle, singular.value) <= high:
                 raise refusal(task, f'cannot be proven near {place(task, singular.value)}')
 
 
@@ -75,7 +73,7 @@ def place(task: Task, value: float) -> str:
         return f'{value:.6g} m'
     where = f'{degrees(remainder(value, tau)):.4g}°'
     near = any(
-        abs(remainder(singular.value - value, tau)) < _NEAR
+        abs(away(task.closed, value, singular.value)) < _NEAR
         for singular in task.closed.singular_inputs
     )
     return f'the toggle or change point at {where}' if near else where

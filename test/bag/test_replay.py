@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 import json
-from math import tau
+from math import sin, tau
 from pathlib import Path
 
 from linkage_ros.bag.reading.reader import read_bag, RUN_FILE
@@ -44,10 +44,10 @@ def sample(stamp: int, angle: float, rate: float) -> bytes:
     return CRANK.write(stamp, (0.0, angle), (0.0, rate))
 
 
-def files(scene: str, run: bytes = RUN) -> dict[str, tuple[str, bytes]]:
+def files(scene: str, run: bytes = RUN, linkage: bytes = LINKAGE) -> dict[str, tuple[str, bytes]]:
     return {
         'scene.yaml': ('application/yaml', f'linkage: l.yaml\n{scene}'.encode()),
-        'linkage.yaml': ('application/yaml', LINKAGE),
+        'linkage.yaml': ('application/yaml', linkage),
         RUN_FILE: ('application/json', run),
     }
 
@@ -56,13 +56,18 @@ class Run:
     """A tick by hand: offers and ticks as the node's tick loop makes them, recorded."""
 
     def __init__(
-        self, folder: Path, scene: str, run: bytes = RUN, storage: Storage | None = None
+        self,
+        folder: Path,
+        scene: str,
+        run: bytes = RUN,
+        storage: Storage | None = None,
+        linkage: bytes = LINKAGE,
     ) -> None:
         said = json.loads(run)
         names = [name for key, name in said.items() if key.endswith('_topic')]
         names += said.get('extra_topics', [])
         topics = [Topic(name, 'sensor_msgs/msg/JointState', '', '') for name in names]
-        self.recorder = Recorder(BagWriter(folder, topics, files(scene, run), storage))
+        self.recorder = Recorder(BagWriter(folder, topics, files(scene, run, linkage), storage))
         self.folder = folder
         # The scene as the bag has it: what is tested is the order and the times, not the loading.
         self.scene = recorded_scene(read_bag(folder, allow_truncated=True))
@@ -109,6 +114,23 @@ def test_ticks_on_a_clock_replay_to_the_same_bytes(tmp_path: Path, scene: str) -
         run.tick(now, now)
     assert 1500 < len(run.published) < 2000
     assert run.replayed() == [(message, message) for message in run.published]
+
+
+@pytest.mark.parametrize('beyond', ['publish', 'silent'])
+@pytest.mark.parametrize('effects', ['{}', '{velocity: {}}'])
+def test_ticks_beyond_limits_replay_to_the_same_bytes(tmp_path, beyond: str, effects: str) -> None:
+    """The crank swings out of its limits and back, four times."""
+    limited = LINKAGE.replace(b'}', b', input: {limits: [0.5, 1.5]}}')
+    scene = f'effects: {effects}\nbeyond_limits: {beyond}\n'
+    run = Run(tmp_path / 'bag', scene, linkage=limited)
+    for k in range(2000):
+        now = SECOND + k * 1_000_000
+        run.offer(now, sample(now, 1.0 + 0.8 * sin(4.0 * tau * k / 2000), 0.0))
+        run.tick(now, now)
+    assert len(run.published) == 2000 if beyond == 'publish' else 500 < len(run.published) < 1500
+    assert [pair for pair in run.replayed() if pair[0]] == [
+        (message, message) for message in run.published
+    ]
 
 
 @pytest.mark.parametrize('compression', ['none', 'lz4', 'zstd'])

@@ -458,3 +458,21 @@ def test_from_the_command_line(linkage: Run, bag: Path) -> None:
     assert missing.stderr.splitlines() == [
         'linkage info: gone: does not exist; name the folder of a bag, or its file'
     ]
+
+
+@pytest.mark.parametrize(('beyond', 'states', 'limited'), [('publish', 10, 4), ('silent', 6, 0)])
+def test_states_beyond_limits_are_counted(
+    tmp_path: Path, tell: Any, beyond: str, states: int, limited: int
+) -> None:
+    """Where nothing is published there, there are no such states to count."""
+    run = Recorded(
+        tmp_path / 'bag',
+        scene_file(
+            tmp_path,
+            f'beyond_limits: {beyond}\n',
+            'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, input: {limits: [0, 0.55]}}\n',
+        ),
+        lambda number: {'crank_joint': (0.1 * number, 1.0)},
+    )
+    (linkage,) = tell(run.run(10))['scene']['linkages']
+    assert (linkage['states'], linkage['limited']) == (states, limited)

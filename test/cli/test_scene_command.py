@@ -157,7 +157,7 @@ WRONG = [
     (
         'linkages:\n- {name: a, linkage: l.yaml}\n- {name: b, linkage: l.yaml, rate: 5}\n',
         'four_bar: {a: 1, b: 2, c: 2, d: 2}\n',
-        ['s.yaml:3: linkages[2].rate: unknown key; known: accuracy, drive, effects, linkage, l'],
+        ['s.yaml:3: linkages[2].rate: unknown key; known: accuracy, beyond_limits, drive, ef'],
     ),
     (
         'linkage: l.yaml\nfaults: {a-b: {freeze: {}, silence: {}}}\n',

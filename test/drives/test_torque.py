@@ -316,7 +316,7 @@ def test_a_cylinder_gives_the_bucket_its_work():
 
 @pytest.mark.parametrize('direction', [1, -1])
 def test_the_cylinder_is_stopped_before_the_end_of_its_range(direction):
-    low, high = EXCAVATOR.input_ranges[1][:2]
+    low, high = EXCAVATOR.input_ranges[0][:2]
     within = 0.01 * (high - low)
     built = drive(EXCAVATOR, GRAVITY, start=0.9, timeout=10.0, stop_margin=0.01)
     built.state(BEGIN)
@@ -391,7 +391,7 @@ UNBUILT = {
     'no start for a slide': (
         EXCAVATOR,
         {},
-        'drive.torque.start: 0 is not between the stops; reachable: -1.32285 to -0.682846 m or ',
+        'drive.torque.start: 0 is not between the stops; reachable: 0.682846 to 1.32285 m; ',
     ),
     'a brake without a moment': (
         WHEEL,

@@ -26,7 +26,7 @@ import pytest
 from .on_crank import FourBar
 from .reference import four_bar, UNIT_ROUNDOFF
 from .samples import FOUR_BARS, four_bars
-from .tolerance import ANGLE, NEEDLE_RATE, RATE, TOGGLE, Worst
+from .tolerance import ANGLE, RATE, TOGGLE, Worst
 
 COUNT = 2000
 
@@ -54,10 +54,9 @@ def test_positions_rates_and_status_are_right_in_every_family(family: str) -> No
         worst.note('rocker', truth.rocker.half_turn_error_of(pose.second), limit, case)
         if pose.status is Status.CLOSED:
             assert pose.cross * sign > 0.0, case
-            limit = NEEDLE_RATE if family == 'needles' else RATE
             coupler_rate, rocker_rate = dyad.rates(pose, 1.0)
-            worst.note('ω3', truth.coupler_rate.error_of(coupler_rate), limit, case)
-            worst.note('ω4', truth.rocker_rate.error_of(rocker_rate), limit, case)
+            worst.note('ω3', truth.coupler_rate.error_of(coupler_rate), RATE, case)
+            worst.note('ω4', truth.rocker_rate.error_of(rocker_rate), RATE, case)
     worst.check()
     assert seen[Status.CLOSED] >= COUNT / 10, 'a sweep that closes nothing proves nothing'
     assert seen[Status.INDETERMINATE] == 0

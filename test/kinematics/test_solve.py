@@ -117,6 +117,24 @@ OTHERS: dict[str, tuple[Linkage, Inputs]] = {
         ),
         TWO_TURNS,
     ),
+    'pin in a slot of the crank and one of the ground': (
+        Linkage(
+            links={
+                'ground': {'O': (0.0, 0.0), 'G': (0.1, 0.2)},
+                'crank': {'O': (0.1, -0.2), 'S': (0.4, 0.1)},
+                'b1': {'P': (0.0, 0.0)},
+                'b2': {'P': (0.1, 0.0)},
+            },
+            inputs=(Input('crank_joint', 'ground', 'crank'),),
+            assembly={},
+            joints={'first': SlideJoint('s1'), 'second': SlideJoint('s2')},
+            sliders={
+                's1': Slider('P', 'crank', 'S', (1.0, 0.5), 'b1'),
+                's2': Slider('P', 'ground', 'G', (0.0, 1.0), 'b2', 0.2),
+            },
+        ),
+        ((-7.0, 7.0),),
+    ),
     'arm on an arm': (
         Linkage(
             links={

@@ -30,20 +30,8 @@ ANGLE = 4.0
 LENGTH = 4.0
 """Limit for slides and for gaps, the latter in u times all lengths; 2.4 and 3.5 were measured."""
 
-RATE = 8.0
-"""
-Limit for rates; `docs/accuracy/campaign.md` has what millions of cases reach.
-
-Above 4 are single rates near an extreme, where κ leaves out what the rate's terms, each for
-itself, make of rounding.
-"""
-
-NEEDLE_RATE = 8.0
-"""
-Limit for rates where lengths differ by up to 1e12.
-
-Of 40,000 loops 99.9 % stayed below 3.9; the worst, of the kind said above, were 18 and 29.
-"""
+RATE = 4.0
+"""Limit for rates; `docs/accuracy/campaign.md` has what millions of cases reach."""
 
 TOGGLE = 32.0
 """

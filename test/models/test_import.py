@@ -23,7 +23,7 @@ from math import cos, hypot, remainder, sin, tau
 from linkage_ros.cli.main import main
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import RevoluteJoint
+from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
 from linkage_ros.models.imported import imported
 from linkage_ros.models.urdf_file import read_urdf
 import numpy as np
@@ -32,6 +32,9 @@ import pytest
 from .gallery import LINKAGES
 from .odd import UNTOLD
 from .walked import Walked
+
+LIMITS = Limits(-3.0, 3.0, velocity=1.0, effort=1.0)
+"""What `joint` says below."""
 
 
 def frame(parent, name, xyz, rpy='0 0 0'):
@@ -148,8 +151,8 @@ def test_signs_are_those_of_the_urdf():
     The finger's axis is −y of a frame that is turned round, which is y.
     """
     joints = gripper().linkage.joints
-    assert joints['finger_joint'] == RevoluteJoint('ground', 'finger')
-    assert joints['bar_joint'] == RevoluteJoint('bar', 'motor')
+    assert joints['finger_joint'] == RevoluteJoint('ground', 'finger', LIMITS)
+    assert joints['bar_joint'] == RevoluteJoint('bar', 'motor', LIMITS)
 
 
 def test_a_pose_says_the_side():

@@ -38,7 +38,11 @@ def test_diagnostics_tell_of_the_time_since_those_before(tmp_path):
         Said(
             300.4, 'loop closure', {'Ticks open': 4, 'Ticks at a toggle': 1}, level=2, message='m'
         ),
-        Said(400.3, 'loop closure', {'Ticks open': 4, 'Ticks indeterminate': 6}),
+        Said(
+            400.3,
+            'loop closure',
+            {'Ticks open': 4, 'Ticks indeterminate': 6, 'Ticks beyond limits': 3},
+        ),
         Said(500.3, 'recording', {'Dropped: /joint_states': 3, 'Dropped: /crank': 0}),
         Said(600.3, 'motor', {'Lost ticks': 99}, level=2, message='of somebody else'),
         Said(900.3, 'tick', {'Lost ticks': 1}),  # the node was started anew
@@ -48,6 +52,7 @@ def test_diagnostics_tell_of_the_time_since_those_before(tmp_path):
         'lost': [(0, 100.3, 2, ''), (200.3, 300.3, 5, ''), (500.3, 900.3, 1, '')],
         'told_open': [(300.3, 300.4, 4, 'open'), (300.4, 400.3, 6, 'indeterminate')],
         'told_toggle': [(300.3, 300.4, 1, '')],
+        'told_limited': [(300.4, 400.3, 3, '')],
         'dropped': [(400.3, 500.3, 3, 'messages of /joint_states')],
         'health': [
             (200.3, 300.3, 1, 'warning, tick: 5 ticks lost'),

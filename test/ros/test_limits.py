@@ -13,93 +13,186 @@
 # limitations under the License.
 
 
-"""Where the linkage does not close, or has no rate: said, and nothing invented."""
+"""What a tick publishes beyond the limits of a joint, and what the node says of it."""
 
-from math import acos, pi
-import re
-import time
+from __future__ import annotations
 
+from collections import Counter
+from math import pi, tau
+
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.kinematics.status import Status
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.ros.diagnostics import Health, Snapshot
+from linkage_ros.ros.tick_loop import TickLoop
+from linkage_ros.ros.warnings import Warnings
+from linkage_ros.scene.load import parse_scene
 import pytest
-from sensor_msgs.msg import JointState
+from rosbags.typesys import get_typestore, Stores
 
-from .graph import crank, wait_for
-
-OK, WARN, ERROR = b'\0', b'\1', b'\2'
-
-# Crank and ground span 1 to 3, coupler and rocker at most 2: s² = a² + d² − 2ad·cos φ = (b + c)².
-LIMIT = acos(0.25)
-ROCKER_ROCKER = 'four_bar: {a: 1.0, b: 1.0, c: 1.0, d: 2.0, assembly: left}'
-# Stretched where the crank lies on the ground, and open everywhere else.
-ONE_ANGLE = 'four_bar: {a: 1.0, b: 1.0, c: 1.0, d: 3.0}'
-# A straight rod on its swivel: where the crank's pin passes it, the rod has no direction.
-THROUGH_SWIVEL = 'inverted_slider_crank: {a: 0.25, swivel: [0.25, 0]}'
+STORE = get_typestore(Stores.ROS2_JAZZY)
+MS = 1_000_000
+BEGIN = 1_700_000_000_000_000_000
+WARN = b'\1'
+LIMITED = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, input: {limits: [0.5, 1.5]}}'
+CRANK = JointStateWriter(['crank_joint'])
 
 
-@pytest.fixture
-def hold(graph):
-    """Return a function that publishes a crank angle until a condition holds."""
-    publisher = graph.publisher(JointState, '/crank_states')
-
-    def hold(angle, condition, what):
-        def publish_and_look():
-            publisher.publish(crank(angle, 1.0))
-            time.sleep(0.01)
-            return condition()
-
-        return wait_for(publish_and_look, what)
-
-    return hold
+def scene(said='', linkage=LIMITED):
+    files = {
+        'scene.yaml': f'linkage: linkage.yaml\n{said}'.encode(),
+        'linkage.yaml': linkage.encode(),
+    }
+    return parse_scene('s', 's', files)
 
 
-def level(graph, wanted):
-    def reached():
-        status = graph.status('loop closure')
-        return status if status is not None and status.level == wanted else None
-
-    return reached
+def read(message):
+    return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
 
 
-SCENE = 'rate: 100\ndrive: {topic: {carry_forward: false}}\neffects: {velocity: {}}'
+def at(pipeline, angle, number=0, rate=1.0):
+    now = BEGIN + number * MS
+    assert pipeline.offer(CRANK.write(now, [angle], [rate]), now) is None
+    return pipeline.tick(now)
 
 
-def test_an_angle_out_of_reach(graph, write_scene, start, hold):
-    node = start(write_scene('reach', SCENE, ROCKER_ROCKER))
-    heard = graph.listen(JointState, '/joint_states')
-    hold(1.0, lambda: len(heard) > 5, 'joint states within reach')
-
-    status = hold(pi, level(graph, ERROR), 'ERROR')
-    # At π crank pin and rocker pivot are 3 m apart, which two links of 1 m miss by 1 m.
-    assert 'Open by 1 m' in status.message
-    low, high = map(float, re.search(r'reachable: (\S+) to (\S+) rad', status.message).groups())
-    assert high == pytest.approx(LIMIT, abs=1e-5)
-    assert low == -high
-    heard.clear()
-    graph.diagnostics.clear()
-    hold(pi, lambda: len(graph.diagnostics) > 2, 'diagnostics')
-    assert heard == []
-    assert 'open by 1 m, nothing published; reachable: -1.31812 to 1.31812 rad' in node.log
-
-    hold(1.0, lambda: len(heard) > 5, 'joint states again')
-    hold(1.0, level(graph, OK), 'OK')
-    assert node.end() == 0
+def test_by_default_the_same_is_published_as_within():
+    tick = at(Pipeline(scene('effects: {velocity: {}}')), 2.0)
+    free = LIMITED.replace(', input: {limits: [0.5, 1.5]}', '')
+    other = at(Pipeline(scene('effects: {velocity: {}}', free)), 2.0)
+    assert tick.looks[0].position.status is Status.LIMITED
+    assert tick.message == other.message != b''
 
 
-def test_at_a_toggle(graph, write_scene, start, hold):
-    node = start(write_scene('toggle', SCENE, ONE_ANGLE))
-    heard = graph.listen(JointState, '/joint_states')
-    status = hold(0.0, level(graph, WARN), 'WARN')
-    assert 'toggle' in status.message
-    for message in heard:
-        # All four links lie on one line.
-        assert list(message.position) == pytest.approx([0.0, pi], abs=1e-7) or list(
-            message.position
-        ) == pytest.approx([0.0, -pi], abs=1e-7)
-        assert list(message.velocity) == []
-    assert 'at a toggle: positions published, velocities not' in node.log
+@pytest.mark.parametrize('effects', ['{}', '{velocity: {}}', '{acceleration: {}}'])
+def test_silent_is_silent_beyond_and_within_the_same(effects):
+    said = f'effects: {effects}\n'
+    silent = Pipeline(scene(said + 'beyond_limits: silent'))
+    free = Pipeline(scene(said))
+    for number, angle in enumerate((1.0, 1.4, 1.6, 2.0, 1.5, 1.2, 0.4)):
+        tick, other = at(silent, angle, number), at(free, angle, number)
+        assert other.message
+        if angle in (1.6, 2.0, 0.4):
+            assert tick.message == b''
+            assert tick.looks[0].position.status is Status.LIMITED
+        else:
+            assert tick.message == other.message
 
 
-def test_where_two_pins_coincide_no_pose_is_invented(graph, write_scene, start, hold):
-    start(write_scene('swivel', SCENE, THROUGH_SWIVEL))
-    heard = graph.listen(JointState, '/joint_states')
-    hold(0.0, level(graph, ERROR), 'ERROR')
-    assert heard == []
+def test_silent_at_a_toggle_beyond_the_limits():
+    """It has another status, and is beyond the limits all the same."""
+    linkage = 'four_bar: {a: 0.1, b: 0.07, c: 0.06, d: 0.05, input: {limits: [-0.5, 0.5]}}'
+    silent = Pipeline(scene('beyond_limits: silent', linkage))
+    (closure,) = silent.closures
+    (one,) = closure.closing_ranges
+    assert closure.position(one.highest).status is Status.TOGGLE
+    assert at(silent, one.highest).message == b''
+    assert at(Pipeline(scene('', linkage)), one.highest).message
+
+
+@pytest.mark.parametrize('turns', [-2, -1, 0, 1])
+def test_a_published_angle_begins_within_its_limits(turns):
+    """So a consumer that has the limits from a URDF is never told of another turn."""
+    low, high = (end + turns * tau for end in (1.5, 2.0))
+    linkage = LIMITED.replace(
+        'input: {limits: [0.5, 1.5]}', f'joints: {{rocker_joint: {{limits: [{low!r}, {high!r}]}}}}'
+    )
+    pipeline = Pipeline(scene('', linkage))
+    for number in range(100):
+        message = read(at(pipeline, 2.0 + 0.005 * number, number).message)
+        values = dict(zip(message.name, message.position, strict=True))
+        assert low <= values['rocker_joint'] <= high
+        assert -pi < values['coupler_joint'] <= pi
+
+
+def test_an_input_with_limits_is_published_as_it_is_driven():
+    linkage = LIMITED.replace('[0.5, 1.5]', '[8, 12]')
+    pipeline = Pipeline(scene('drive: {sine: {amplitude: 1, mean: 10, frequency: 1}}', linkage))
+    message = read(pipeline.tick(BEGIN).message)
+    assert message.position[0] == 10.0
+
+
+class Said(list):
+    """Takes the place of a logger."""
+
+    def warning(self, line):
+        self.append(line)
+
+
+def ran(said, angles, linkage=LIMITED):
+    """Return a tick loop that has seen crank angles, and what was published."""
+    made = scene(said, linkage)
+    messages = [CRANK.write(BEGIN + n * MS, [angle], [1.0]) for n, angle in enumerate(angles)]
+    waiting, published = [], []
+
+    def take():
+        return (waiting.pop(0), {'source_timestamp': 0}) if waiting else None
+
+    loop = TickLoop(lambda: Pipeline(made), take, published.append)
+    for number, message in enumerate(messages):
+        waiting.append(message)
+        loop.tick_at(BEGIN + number * MS)
+    return loop, published
+
+
+def health(loop):
+    window = Snapshot(), Snapshot.of(loop.counts, BEGIN)
+    return Health(
+        'node', 's', 1000.0, BEGIN, '/crank', (), loop, *window, '',
+        {'transmission_angle': 0.0, 'conditioning': 0.0, 'toggle_distance': 0.0},
+    )  # fmt: skip
+
+
+ANGLES = (1.0, 2.0, 2.1, 1.0)
+
+
+@pytest.mark.parametrize(('said', 'published'), [('', 4), ('beyond_limits: silent', 2)])
+def test_what_is_counted_and_told(said, published):
+    loop, messages = ran(said, ANGLES)
+    counts = loop.counts
+    assert Counter(counts.unclosed) == Counter({Status.LIMITED: 2})
+    assert (len(messages), counts.published, counts.withheld) == (published, published, 0)
+    lines = Said()
+    Warnings(lines).look(counts, loop.pipeline.closures, '/crank', 1.0)
+    what = 'nothing published' if said else 'published all the same'
+    assert lines == [f'2 ticks beyond limits, {what}: crank_joint at 2.1, limits [0.5, 1.5]']
+    status = health(loop).statuses()[2]
+    assert (status.level, status.message) == (
+        WARN, 'Beyond limits: crank_joint at 2.1, limits [0.5, 1.5]',
+    )  # fmt: skip
+    values = {pair.key: pair.value for pair in status.values}
+    assert values['Ticks beyond limits'] == '2'
+    assert values['Reachable'] == '0.5 to 1.5 rad'
+
+
+def test_rates_and_efforts_are_told_by_their_limits():
+    linkage = LIMITED.replace(
+        'input: {limits: [0.5, 1.5]}',
+        'input: {velocity: 0.8}, joints: {rocker_joint: {velocity: 100}}',
+    )
+    loop, _ = ran('effects: {velocity: {}}', (1.0,), linkage)
+    status = health(loop).statuses()[2]
+    assert (status.level, status.message) == (
+        WARN, 'Velocity of crank_joint is 1, its limit 0.8',
+    )  # fmt: skip
+    values = {pair.key: pair.value for pair in status.values}
+    assert values['Velocity of crank_joint, of its limit'] == '1.25'
+    (rate,) = [
+        rate
+        for name, rate in zip(
+            loop.pipeline.closures[0].linkage.joints,
+            loop.counts.last.looks[0].reading.rates,
+            strict=True,
+        )
+        if name == 'rocker_joint'
+    ]
+    assert values['Velocity of rocker_joint, of its limit'] == f'{abs(rate) / 100:.4g}'
+    bare, _ = ran('', (1.0,), linkage)
+    keys = [pair.key for pair in health(bare).statuses()[2].values]
+    assert not any('rocker_joint, of its limit' in key for key in keys)
+
+
+def test_where_nothing_has_limits_nothing_is_told_of_them():
+    loop, _ = ran('', (1.0,), LIMITED.replace(', input: {limits: [0.5, 1.5]}', ''))
+    keys = [pair.key for status in health(loop).statuses() for pair in status.values]
+    assert [key for key in keys if 'limit' in key] == ['Ticks beyond limits']

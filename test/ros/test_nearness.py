@@ -39,10 +39,10 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
     """Return the status of the loop closure of a linkage that is so near to trouble."""
     counts = Counts()
     position = SimpleNamespace(status=None, gap=0.1, joints=(1.0,))
-    crank = SimpleNamespace(angles=(0.25,) * len(inputs))
-    look = SimpleNamespace(crank=crank, position=position)
+    crank = SimpleNamespace(angles=(0.25,) * len(inputs), rates=(1.0,) * len(inputs))
+    look = SimpleNamespace(crank=crank, position=position, reading=None)
     counts.last = SimpleNamespace(looks=(look,))
-    counts.last_unclosed = 0, position
+    counts.last_unclosed[position.status] = 0, position
     closure = SimpleNamespace(
         input_ranges=(),
         residual=lambda _: 0.0,
@@ -50,7 +50,7 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
             asked is position and SimpleNamespace(**dict(zip(LIMITS, nearness, strict=True)))
         ),
     )
-    member = SimpleNamespace(name='', linkage=SimpleNamespace(inputs=inputs))
+    member = SimpleNamespace(name='', linkage=SimpleNamespace(inputs=inputs, joints={}, limits={}))
     pipeline = SimpleNamespace(
         lines=[SimpleNamespace(member=member, closure=closure, drive=None)],
         max_age=1,

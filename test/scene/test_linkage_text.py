@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 import os
 from pathlib import Path
 import resource
@@ -25,7 +26,7 @@ import resource
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.linkage import Linkage, Mass, Pose, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.linkage import Limits, Linkage, Mass, Pose, RevoluteJoint, SlideJoint
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.linkage_text import linkage_text, number_text, write_linkage
 from linkage_ros.scene.yaml_file import parse_yaml
@@ -76,6 +77,11 @@ NAMES = st.one_of(
 NUMBERS = st.floats(-1e9, 1e9)
 NEAR = st.floats(-0.1, 0.1)
 POINTS = st.tuples(NUMBERS, NUMBERS)
+MOST = st.just(inf) | st.floats(0.0, 1e9, exclude_min=True)
+EXERTIONS = st.builds(Limits, velocity=MOST, effort=MOST)
+# Limits that leave every state where it is: nothing else is asked of them here.
+FAR = st.sampled_from([(-inf, inf), (-1e9, inf), (-inf, 1e9), (-1e9, 1e9)])
+LIMITS = st.builds(lambda ends, of: replace(of, low=ends[0], high=ends[1]), FAR, EXERTIONS)
 
 
 @st.composite
@@ -109,14 +115,18 @@ def linkages(draw: st.DrawFn) -> Linkage:
     return Linkage(
         links,
         tuple(
-            replace(g, **{key: new[getattr(g, key)] for key in g.__slots__})
+            replace(
+                g,
+                limits=draw(LIMITS),
+                **{key: new[getattr(g, key)] for key in ('joint', 'parent', 'child', 'slider')},
+            )
             for g in linkage.inputs
         ),
         {new[name]: side for name, side in linkage.assembly.items()},
         {
-            new[name]: SlideJoint(new[joint.slider])
+            new[name]: SlideJoint(new[joint.slider], draw(LIMITS))
             if isinstance(joint, SlideJoint)
-            else RevoluteJoint(new[joint.parent], new[joint.child])
+            else RevoluteJoint(new[joint.parent], new[joint.child], draw(EXERTIONS))
             for name, joint in linkage.joints.items()
         },
         {

@@ -25,7 +25,6 @@ from hypothesis import strategies as st
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.status import Status
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.section import Section
 from linkage_ros.scene.yaml_file import read_yaml
@@ -123,13 +122,13 @@ def test_a_spoilt_file_is_answered_or_refused_in_one_line(case: tuple[str, Any])
         assert all(map(isfinite, position.joints))
         assert isfinite(position.gap)
         assert position.gap >= 0.0
-        if position.status is Status.CLOSED:
+        if position.status.has_rates:
             velocity = closure.velocity(position, *(1.0,) * count)
             closure.acceleration(position, velocity, *(0.0,) * count)
             closure.residual(position)
             closure.nearness(position)
         else:
-            assert bool(position.joints) == (position.status is Status.TOGGLE)
+            assert bool(position.joints) == position.status.has_pose
 
 
 @pytest.mark.parametrize('name', sorted(GALLERY))

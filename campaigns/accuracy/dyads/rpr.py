@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from campaigns.accuracy.mechanism import Spot
+from campaigns.accuracy.mechanism import Mechanism, Spot
 from campaigns.accuracy.motion import conjugate, inverse, Motion, real, root
 from campaigns.accuracy.tangent import Tangent, times
 from flint import acb
@@ -57,6 +57,21 @@ class RPR:
     def assembly(self) -> tuple[str, Side]:
         return self.slider, 'ahead' if self.side > 0 else 'behind'
 
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return (self.rail,)
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.d
+
+    def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, self.d
+
     def close(self, motion: Motion) -> None:
         start, end = motion.at(self.a), motion.at(self.d)
         diagonal = end - start
@@ -72,7 +87,8 @@ class RPR:
         block = motion.mechanism.sliders[self.slider].block
         if block is not None:
             twist = motion.constants.twists[self.slider]
-            motion.place(block, unit * twist, self.d.point, end)
+            # It turns as the rail does, and that angle is handed on once.
+            motion.place(block, motion.unit[self.rail] * twist, self.d.point, end)
 
     def _base(self, motion: Motion) -> Any:
         """Return, in the rail's frame, where the block's pin is at slide 0, from the rail's."""
@@ -109,6 +125,6 @@ class RPR:
         tangent.place(self.rail, turn, self.a.point, start)
         tangent.slide[self.slider] = along.real + (base * direction.conjugate()).imag * turn
         if slide.block is not None:
-            turn_block = turn.copy()
+            turn_block = tangent.turn[self.rail].copy()
             turn_block[0] += tangent.twist_change[self.slider]
             tangent.place(slide.block, turn_block, self.d.point, end)

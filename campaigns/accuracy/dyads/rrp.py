@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from campaigns.accuracy.mechanism import Spot
+from campaigns.accuracy.mechanism import Mechanism, Spot
 from campaigns.accuracy.motion import conjugate, imag, inverse, Motion, real, root
 from campaigns.accuracy.tangent import Tangent, times
 from linkage_ros.kinematics.linkage import Side
@@ -54,6 +54,21 @@ class RRP:
     def assembly(self) -> tuple[str, Side]:
         return self.slider, 'ahead' if self.side > 0 else 'behind'
 
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return (self.one,)
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return (self.slider,)
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.slider
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, mechanism.start(self.slider)
+
     def close(self, motion: Motion) -> None:
         start = motion.at(self.a)
         b = motion.vector(self.one, self.a.point, self.pin)
@@ -69,8 +84,7 @@ class RRP:
         arm = line * (reach + height * 1j)
         motion.place(self.one, arm / b, self.a.point, start)
         if block is not None:
-            name = motion.mechanism.sliders[self.slider].block
-            motion.place(str(name), block, self.pin, start + arm)
+            motion.ride(self.slider, block, self.pin, start + arm)
 
     def margin(self, motion: Motion) -> object:
         """Return what the link reaches farther than it must, in the unit of the constants."""
@@ -88,9 +102,8 @@ class RRP:
         rest = base_change + times(slide, line_change) - start - unit * b_change
         along = times(line.conj(), rest)
         turn = times(tangent.next_inverse(), along.imag)
+        where = start + unit * b_change + 1j * times(unit * b, turn)
         tangent.place(self.one, turn, self.a.point, start)
         tangent.slide[self.slider] = -times(times(unit * b, line.conj()).imag, turn) - along.real
         if block_turn is not None:
-            tangent.place_block(
-                self.slider, self.pin, block_turn, tangent.at(Spot(self.one, self.pin))
-            )
+            tangent.ride(self.slider, self.pin, block_turn, where)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from campaigns.accuracy.mechanism import Spot
+from campaigns.accuracy.mechanism import Mechanism, Spot
 from campaigns.accuracy.motion import conjugate, inverse, Motion, real, root
 from campaigns.accuracy.tangent import Tangent, times
 from linkage_ros.kinematics.linkage import Side
@@ -59,6 +59,21 @@ class RRR:
     def assembly(self) -> tuple[str, Side]:
         return self.pin, 'left' if self.side > 0 else 'right'
 
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return self.one, self.two
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.d
+
+    def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, self.d
+
     def close(self, motion: Motion) -> None:
         start = motion.at(self.a)
         diagonal = motion.at(self.d) - start
@@ -71,7 +86,7 @@ class RRR:
         # two × one, which both rates are divided by.
         motion.inverse.append(inverse(height))
         motion.place(self.one, one / b, self.a.point, start)
-        motion.place(self.two, two / c, self.pin, start + one)
+        motion.place(self.two, two / c, self.d.point, motion.at(self.d))
 
     def _triangle(self, motion: Motion, diagonal: Any) -> tuple[Any, ...]:
         b = motion.vector(self.one, self.a.point, self.pin)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from campaigns.accuracy.mechanism import Spot
+from campaigns.accuracy.mechanism import Mechanism, Spot
 from campaigns.accuracy.motion import conjugate, imag, inverse, Motion
 from campaigns.accuracy.tangent import Tangent, times
 
@@ -46,6 +46,21 @@ class PRP:
     def assembly(self) -> None:
         return None
 
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return self.one, self.two
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.one, self.two
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return mechanism.start(self.one), mechanism.start(self.two)
+
     def close(self, motion: Motion) -> None:
         base_one, line_one, block_one = motion.line(self.one, self.pin)
         base_two, line_two, block_two = motion.line(self.two, self.pin)
@@ -54,8 +69,7 @@ class PRP:
         where = base_one + line_one * over[0]
         for name, block in ((self.one, block_one), (self.two, block_two)):
             if block is not None:
-                link = motion.mechanism.sliders[name].block
-                motion.place(str(link), block, self.pin, where)
+                motion.ride(name, block, self.pin, where)
 
     def margin(self, motion: Motion) -> Any:
         """Return how far the lines are from parallel, as a sine."""
@@ -73,7 +87,7 @@ class PRP:
         where = base_one + times(value_one, change_one) + times(line_one, slide_one)
         for name, turn in ((self.one, turn_one), (self.two, turn_two)):
             if turn is not None:
-                tangent.place_block(name, self.pin, turn, where)
+                tangent.ride(name, self.pin, turn, where)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +114,21 @@ class RPP:
     def assembly(self) -> None:
         return None
 
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return (self.outer,)
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.outer
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, mechanism.start(self.outer)
+
     def close(self, motion: Motion) -> None:
         inner, outer = (motion.mechanism.sliders[name] for name in (self.inner, self.outer))
         base, line, unit = motion.line(self.outer, outer.point)
@@ -108,7 +137,7 @@ class RPP:
         rest = start - base - unit * self._offset(motion)
         over = _meet(motion, rest, slot, line)
         motion.slide[self.inner], motion.slide[self.outer] = over
-        motion.place(inner.along, unit, outer.point, base + line * over[1])
+        motion.ride(self.outer, unit, outer.point, base + line * over[1])
         if inner.block is not None:
             turned = unit * motion.constants.twists[self.inner]
             motion.place(inner.block, turned, self.a.point, start)
@@ -149,7 +178,7 @@ class RPP:
         slides = _vary_meeting(tangent, rest, slot, line)
         tangent.slide[self.inner], tangent.slide[self.outer] = slides
         where = base + times(value, line_change) + times(line, slides[1])
-        tangent.place(inner.along, turn, outer.point, where)
+        tangent.ride(self.outer, outer.point, turn, where)
         if inner.block is not None:
             turn_block = turn.copy()
             turn_block[0] += tangent.twist_change[self.inner]

@@ -183,8 +183,7 @@ def _inertia(mechanics: Mechanics, value: float) -> float:
 def _holds(interval: InputRange, value: float) -> bool:
     if interval.whole:
         return True
-    turns = tau * round((0.5 * (interval.lowest + interval.highest) - value) / tau)
-    value += turns if interval.turning else 0.0
+    value += interval.shift(value)
     return interval.lowest <= value <= interval.highest
 
 

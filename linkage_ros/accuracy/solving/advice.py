@@ -215,7 +215,7 @@ def _iterated(found: Sequence[Measured]) -> str:
         return ''
     return (
         f'No dyad covers {some[0].poses.name}: what the node does there is to iterate, from the '
-        'nearest of 256 knots a turn.'
+        'curve of its branch.'
     )
 
 

@@ -189,9 +189,8 @@ def roots_of(total: Array, size: Array | float) -> tuple[Array, Array]:
     return roots, np.where(total >= -rounding, 0.0, -total)
 
 
-def reaches(constant: float, part: Array) -> tuple[Array, Array | float]:
+def reaches(constant: float, part: Array, square: Array) -> tuple[Array, Array | float]:
     """Return roots and what is missing, as `reach` does."""
     if constant == 0.0:
         return part, 0.0
-    square = part * part
     return roots_of(constant + square, abs(constant) + square)

@@ -105,7 +105,16 @@ class CrankRRRArrays:
 
     """
 
-    __slots__ = ('_arms', '_assembly', '_constants', '_diagonal', '_lost', '_pair', '_tolerance')
+    __slots__ = (
+        '_arms',
+        '_assembly',
+        '_constants',
+        '_diagonal',
+        '_lost',
+        '_pair',
+        '_span',
+        '_tolerance',
+    )
 
     def __init__(self, dyad: RRRDyad) -> None:
         diagonal = dyad.diagonal
@@ -120,9 +129,10 @@ class CrankRRRArrays:
         # Beside a long crank and ground, Y = whole − near² is what cancels less.
         self._pair = 0.5 * whole if short_pair else 0.0
         self._constants = (
-            a, d, sqrt(2.0) * sqrt(a) * sqrt(d),
+            a, d, diagonal.root / sqrt(2.0),
             0.5 * fold, 0.5 * stretch, 0.5 * more, 0.5 * less, 0.5 * difference,
         )  # fmt: skip
+        self._span = 0.5 * diagonal.limits[2]
         self._lost = OPEN if diagonal.limits[0] else INDETERMINATE
         # A state whose X·Y is above this is further inside its limits than any rounding goes.
         sizes = [2.0 * a * d + 0.5 * abs(bracket) for bracket in (fold, stretch)]
@@ -178,7 +188,7 @@ class CrankRRRArrays:
 
     def _triangle(self, phi: Array, w: Scratch) -> None:
         """Find the squares, and ¼·K² as cross."""
-        a, d, root, fold, stretch, more, less, _ = self._constants
+        _, _, root, fold, stretch, more, less, _ = self._constants
         near, far = w.x, w.y
         sine_cosine(phi, near, far, w.p, 0.5)
         np.multiply(near, 2.0 * root, out=near)
@@ -189,7 +199,7 @@ class CrankRRRArrays:
         np.multiply(near, near, out=w.near)
         np.multiply(far, far, out=w.far)
 
-        np.add(w.near, 0.5 * (d - a) * (d - a), out=w.s)
+        np.add(w.near, 0.5 * float(self._diagonal.least), out=w.s)
         np.add(w.near, more, out=w.plus)
         np.subtract(less, w.near, out=w.minus)
         np.add(w.near, fold, out=w.x)
@@ -197,6 +207,9 @@ class CrankRRRArrays:
             np.subtract(self._pair, w.near, out=w.y)
         else:
             np.add(w.far, stretch, out=w.y)
+        smaller = w.x < w.y
+        np.subtract(self._span, w.x, out=w.y, where=smaller)
+        np.subtract(self._span, w.y, out=w.x, where=~smaller)
         np.multiply(w.x, w.y, out=w.cross)
 
     def _turn(self, w: Scratch) -> None:
@@ -217,10 +230,11 @@ class CrankRRRArrays:
         """
         _, _, _, fold, stretch, *_ = self._constants
         codes: Codes = np.full(len(w.s), CLOSED, np.uint8)
+        direct = w.near + fold, self._pair - w.near if self._pair else w.far + stretch
         np.multiply(np.sqrt(np.maximum(w.x, 0.0)), np.sqrt(np.maximum(w.y, 0.0)), out=w.cross)
         np.multiply(w.cross, self._assembly, out=w.cross)
         upper = (self._pair, w.near) if self._pair else (stretch, w.far)
-        for total, constant, part in ((w.x, fold, w.near), (w.y, *upper)):
+        for total, constant, part in ((direct[0], fold, w.near), (direct[1], *upper)):
             rounding = ROUNDING * (abs(constant) + part)
             codes[total < -rounding] = OPEN
             w.cross[np.abs(total) <= rounding] = 0.0
@@ -240,8 +254,7 @@ class CrankRRRArrays:
 
     def _rates(self, w: Scratch) -> None:
         """Find p, q, r and twice the rates at a rate of φ of 1."""
-        a, d, *_ = self._constants
-        np.subtract(a * (d - a), w.near, out=w.p)
+        np.subtract(self._diagonal.along, w.near, out=w.p)
         np.divide(w.p, w.s, out=w.p)
         np.divide(w.q, w.s, out=w.q)
         np.divide(w.q, w.cross, out=w.r)

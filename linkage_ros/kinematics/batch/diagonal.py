@@ -29,6 +29,7 @@ from linkage_ros.kinematics.batch.arrays import (
     CHANGE_POINT,
     codes_of,
     Complex,
+    Mask,
     passes_zeros,
     phases,
     reaches,
@@ -54,21 +55,21 @@ class CrankDiagonalArrays(CrankDiagonal):
     def at(self, known: States) -> Diagonal:
         """Return the diagonals."""
         x = known[0]
-        a, difference, root, fold, stretch, short_pair, whole = self._constants
+        a, difference, least, root, quad, fold, stretch, short_pair, whole = self._constants
         first, second, offset = self.arms
         base = x[second]
         # Of links that never turn there is one number for all states.
         half = 0.5 * np.atleast_1d(x[first] - base)
         half_sine, half_cosine = half_angle(half, offset, self.half_turn, stretch == 0.0)
         near, far = root * half_sine, root * half_cosine
-        excess = near * near
-        square = difference * difference + excess
-        lower, upper = self.limits
+        excess, rest = quad * half_sine * half_sine, quad * half_cosine * half_cosine
+        square = least + excess
+        lower, upper, span = self.limits
         met = square < SMALLEST
         direction = base + np.arctan2(
             -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
         )
-        root_fold, missing = reaches(fold, near)
+        root_fold, missing = reaches(fold, near, excess)
         gap = missing / (np.sqrt(square) + lower)
         root_stretch: Any = 1.0
         toggle = (root_fold == 0.0) & bool(fold)
@@ -77,9 +78,17 @@ class CrankDiagonalArrays(CrankDiagonal):
             if short_pair:
                 root_stretch, missing = roots_of(whole - excess, abs(whole) + excess)
             else:
-                root_stretch, missing = reaches(stretch, far)
+                root_stretch, missing = reaches(stretch, far, rest)
             gap = np.where(gap > 0.0, gap, missing / (np.sqrt(square) + upper))
             toggle |= (root_stretch == 0.0) & bool(stretch)
+            folding, stretching = fold + excess, stretch + rest
+            if short_pair:
+                stretching = whole - excess
+            greater = folding < stretching
+            if stretch:
+                root_stretch = _complement(root_stretch, span - folding, greater & ~toggle)
+            if fold:
+                root_fold = _complement(root_fold, span - stretching, ~greater & ~toggle)
         if not fold and difference:
             flat = flat | passes_zeros(half_sine, half)
         if not stretch:
@@ -114,6 +123,12 @@ class FreeDiagonalArrays(FreeDiagonal):
         return free_diagonals(end - start, np.abs(start) + np.abs(end), *self._limits)
 
 
+def _complement(root: Array, square: Array, where: Mask) -> Array:
+    """Return a root, in some places as that of a square."""
+    found: Array = np.where(where & (square > 0.0), np.sqrt(np.abs(square)), root)
+    return found
+
+
 def half_angle(
     half: Array, offset: float, half_turn: tuple[float, float], exactly: bool
 ) -> tuple[Array, Array]:
@@ -131,18 +146,28 @@ def half_angle(
 
 
 def free_diagonals(
-    vector: Complex, size: Array, lower: Array | float, upper: Array | float
+    vector: Complex,
+    size: Array,
+    lower: Array | float,
+    upper: Array | float,
+    span: Array | float,
 ) -> Diagonal:
     """Return the diagonals of vectors whose ends have coordinates of a size."""
     s = np.abs(vector)
     square = s * s
     met = square < SMALLEST
-    root_fold, missing = roots_of((s - lower) * (s + lower), (size + lower) * (s + lower))
+    folding = (s - lower) * (s + lower)
+    root_fold, missing = roots_of(folding, (size + lower) * (s + lower))
     gap = missing / (s + lower)
     root_stretch: Any = 1.0
     if not (isinstance(upper, float) and upper == inf):
-        root_stretch, missing = roots_of((upper - s) * (upper + s), (size + upper) * (upper + s))
+        stretching = (upper - s) * (upper + s)
+        root_stretch, missing = roots_of(stretching, (size + upper) * (upper + s))
         gap = np.where(gap > 0.0, gap, missing / (upper + s))
+        inside = (root_fold > 0.0) & (root_stretch > 0.0)
+        greater = folding < stretching
+        root_stretch = _complement(root_stretch, span - folding, inside & greater)
+        root_fold = _complement(root_fold, span - stretching, inside & ~greater)
     gap = np.where(met, lower, gap)
     square = np.where(met, 0.0, square)
     codes = codes_of(gap, met, (root_fold == 0.0) | (root_stretch == 0.0))

@@ -50,7 +50,9 @@ class DrivenRRRArrays(DrivenRRRDyad):
         start, end = (pins[i] for i in self._ends)
         one, other = (side.at(x) for side in self._sides)
         b, c = np.abs(one), np.abs(other)
-        diagonal = free_diagonals(end - start, np.abs(start) + np.abs(end), np.abs(b - c), b + c)
+        diagonal = free_diagonals(
+            end - start, np.abs(start) + np.abs(end), np.abs(b - c), b + c, 4.0 * b * c
+        )
         difference = (b - c) * (b + c)
         pose = close_triangles(diagonal, difference, difference, self._sign)
         x.append(pose.first - phases(one))

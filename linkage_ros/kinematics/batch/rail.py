@@ -55,8 +55,9 @@ class CrankRailArrays(CrankRail):
             return new(Sight, (place, inf, inf, 0.0, base, arm, 0.0, CLOSED))
         eta = turned(-0.5 * swing) * self._half_turn
         sine, cosine = eta.imag, eta.real
-        root_below, gap = self._roots(below, root * sine, -place.imag)
-        root_above, missing = self._roots(above, root * cosine, place.imag)
+        root_below, gap = self._roots(below, root * sine, 2.0 * a * sine * sine, -place.imag)
+        part, square = root * cosine, 2.0 * a * cosine * cosine
+        root_above, missing = self._roots(above, part, square, place.imag)
         gap = np.where(gap > 0.0, gap, missing)
         lean: Any = 0.0
         flat: Any = False
@@ -75,13 +76,13 @@ class CrankRailArrays(CrankRail):
         codes = codes_of(gap, False, False if at_change_point else flat, flat)
         return new(Sight, (place, root_below, root_above, gap, base, arm, lean, codes))
 
-    def _roots(self, bracket: float, part: Array, side: Array) -> tuple[Any, Any]:
+    def _roots(self, bracket: float, part: Array, square: Array, side: Array) -> tuple[Any, Any]:
         """Return the roots of the link's length less what it has to reach, and the gaps."""
         if bracket == 0.0:
-            return reaches(bracket, part)
-        link, square = self._link, part * part
+            return reaches(bracket, part, square)
+        link = self._link
         total, size = link + side, link + np.abs(side)
-        shorter = abs(bracket) + square < size
+        shorter = 4.0 * (abs(bracket) + square) < size
         return roots_of(
             np.where(shorter, bracket + square, total),
             np.where(shorter, abs(bracket) + square, size),
@@ -93,10 +94,10 @@ class CrankRailArrays(CrankRail):
         """Return ÿ + y·λ̇² by below and above."""
         first, second = self.arms
         v, changed = speeds[0], changes[0]
-        a, pivot, below, above, _, changes_over = self._constants
+        _, pivot, _, _, _, changes_over = self._constants
         if changes_over:
             return super().across(sight, pull, link_rate, speeds, changes)
-        link, e = self._link, pivot.imag
+        e = pivot.imag
         y: Any = sight.place.imag
         along = sight.below * sight.above
         swing = v[first] - v[second]
@@ -104,7 +105,7 @@ class CrankRailArrays(CrankRail):
         square = np.where(left, sight.below, sight.above)
         square = square * square
         term = e * square * square
-        other = y * np.where(left, below * (a + link - e), above * (a + link + e))
+        other = y * np.where(left, *self._products)
         parts = -swing * swing * sight.arm.imag, y * link_rate * link_rate
         square = (swing / along) ** 2
         closed_form = (np.abs(term) + np.abs(other)) * square < abs(parts[0]) + abs(parts[1])

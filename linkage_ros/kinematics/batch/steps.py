@@ -22,6 +22,7 @@ from operator import attrgetter
 from typing import Any
 
 from linkage_ros.kinematics.batch.arrays import ArrayStep, Block, remade
+from linkage_ros.kinematics.batch.crank_prp import CrankPRPArrays
 from linkage_ros.kinematics.batch.crank_rrr import CrankRRRArrays
 from linkage_ros.kinematics.batch.diagonal import (
     CrankDiagonalArrays,
@@ -29,6 +30,7 @@ from linkage_ros.kinematics.batch.diagonal import (
     UnsignedDiagonalArrays,
 )
 from linkage_ros.kinematics.batch.driven_rrr import DrivenRRRArrays, SideArrays
+from linkage_ros.kinematics.batch.folding_rrr import FoldingRRRArrays
 from linkage_ros.kinematics.batch.one_by_one import OneByOne
 from linkage_ros.kinematics.batch.places import PointOnLinkArrays, PointOnRailArrays
 from linkage_ros.kinematics.batch.prp import PRPArrays
@@ -37,8 +39,10 @@ from linkage_ros.kinematics.batch.rpr import RPRArrays
 from linkage_ros.kinematics.batch.rrp import RRPArrays
 from linkage_ros.kinematics.batch.rrr import RRRArrays
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
+from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
 from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import DrivenRRRDyad
+from linkage_ros.kinematics.dyads.folding_rrr import FoldingRRRDyad
 from linkage_ros.kinematics.dyads.prp import PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad
@@ -89,7 +93,8 @@ def _walked(kind: type[Any]) -> Callable[[Any], ArrayStep]:
 def _rrr(dyad: RRRDyad) -> ArrayStep:
     if CrankRRRArrays.fits(dyad):
         return CrankRRRArrays(dyad)
-    return _Walked(remade(RRRArrays, dyad, diagonal=_part(dyad.diagonal)))
+    kind = FoldingRRRArrays if isinstance(dyad, FoldingRRRDyad) else RRRArrays
+    return _Walked(remade(kind, dyad, diagonal=_part(dyad.diagonal)))
 
 
 def _rpr(dyad: RPRDyad) -> ArrayStep:
@@ -125,11 +130,13 @@ _KINDS: dict[type[Any], Callable[[Any], ArrayStep]] = {
     PointOnLink: _walked(PointOnLinkArrays),
     PointOnRail: _walked(PointOnRailArrays),
     CrankRRRDyad: _rrr,
+    FoldingRRRDyad: _rrr,
     RRRDyad: _rrr,
     RPRDyad: _rpr,
     RRPDyad: _on_rail(RRPArrays),
     RPPDyad: _on_rail(RPPDyad),
     PRPDyad: _walked(PRPArrays),
+    CrankPRPDyad: _walked(CrankPRPArrays),
     DrivenRRRDyad: _driven_rrr,
     Iteration: _iteration,
 }

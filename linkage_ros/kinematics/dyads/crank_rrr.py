@@ -61,10 +61,11 @@ class CrankRRRDyad(RRRDyad):
         a, d = diagonal.sides
         fold, stretch = diagonal.brackets
         self._closing = (
-            *diagonal.arms, 2.0 * a, d - a, (d - a) * (d - a), 2.0 * sqrt(a) * sqrt(d),
-            fold, abs(fold), stretch, abs(stretch), *sums(b, c, diagonal.least), float(sign),
+            *diagonal.arms, 2.0 * a, d - a, float(diagonal.least), diagonal.root, diagonal.quad,
+            diagonal.limits[2], fold, abs(fold), stretch, abs(stretch),
+            *sums(b, c, diagonal.least), float(sign),
         )  # fmt: skip
-        self._moving = (*diagonal.arms[:2], a * (d - a))
+        self._moving = (*diagonal.arms[:2], diagonal.along)
         self._pulling = (
             *diagonal.arms[:2], fold, stretch, (d - a) * (d + a), (b - c) * (b + c),
         )  # fmt: skip
@@ -79,7 +80,7 @@ class CrankRRRDyad(RRRDyad):
     def close(self, known: State) -> RRRPose:
         """Append the directions of both links."""
         (
-            i, j, offset, twice_a, apart, apart_square, root,
+            i, j, offset, twice_a, apart, apart_square, root, quad, span,
             fold, fold_size, stretch, stretch_size, more, less, sign,
         ) = self._closing  # fmt: skip
         x = known[0]
@@ -93,7 +94,7 @@ class CrankRRRDyad(RRRDyad):
                 half_cosine * cosine - half_sine * sine,
             )
         near, far = root * half_sine, root * half_cosine
-        near_square, far_square = near * near, far * far
+        near_square, far_square = quad * half_sine * half_sine, quad * half_cosine * half_cosine
         square = apart_square + near_square
         folding, stretching = fold + near_square, stretch + far_square
         if (
@@ -102,6 +103,10 @@ class CrankRRRDyad(RRRDyad):
             or square < SMALLEST
         ):
             return super().close(known)
+        if folding < stretching:
+            stretching = span - folding
+        else:
+            folding = span - stretching
         fold_root, stretch_root = sqrt(folding), sqrt(stretching)
         cross = sign * fold_root * stretch_root
         if -SMALLEST < cross < SMALLEST:
@@ -124,8 +129,8 @@ class CrankRRRDyad(RRRDyad):
     ) -> _Rates:
         """Append the rates of both links."""
         i, j, along = self._moving
-        _, _, _, _, _, (square, _, fold, stretch, _, near, far, _, _), more, less = pose
-        p, q = (along - 0.5 * near * near) / square, 0.5 * near * far / square
+        _, _, _, _, _, (square, _, fold, stretch, _, near, far, near_square, _), more, less = pose
+        p, q = (along - 0.5 * near_square) / square, 0.5 * near * far / square
         lean = 0.5 * (near / fold) * (far / stretch) / square * self._sign
         v = speeds[0]
         base = v[j]

@@ -158,7 +158,9 @@ class DrivenRRRDyad:
         start, end = (pins[i] for i in self._ends)
         one, other = (side.at(x) for side in self._sides)
         b, c = abs(one), abs(other)
-        diagonal = free_diagonal(end - start, abs(start) + abs(end), abs(b - c), b + c)
+        diagonal = free_diagonal(
+            end - start, abs(start) + abs(end), abs(b - c), b + c, 4.0 * b * c
+        )
         difference = (b - c) * (b + c)
         pose = close_triangle(diagonal, difference, difference, self._sign)
         x.append(pose.first - phase(one))
@@ -201,7 +203,7 @@ class DrivenRRRDyad:
             )
         )
         between = pulls[end] + other - pulls[start] - one
-        square = between / (pins[end] - pins[start]) - unit * unit
+        square = between / (pins[end] - pins[start]) + unit.imag * (unit.imag - 2j * unit.real)
         b, c = map(abs, pose.sides)
         change = GrowthChange(square, 0.0, 0.0, None)
         triangle_accelerations(triangle, self._sign, (b - c) * (b + c), growth, change, changes)

@@ -37,6 +37,8 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.tuples import new
 
+_STILL = (0.0, 0.0)
+
 
 class RPPPose(NamedTuple):
     """
@@ -68,32 +70,35 @@ class RPPDyad:
     ----------
     rail
         The start of the known line, along the x axis of the link that carries it.
-    constant
-        κ, in the unit of the lengths.
     inner, outer
         v̂ and û, not parallel.
+    offsets
+        κ × û and κ × v̂, in the unit of the lengths: taken from z − κ they would lose what of κ
+        lies along a line, which may be far longer.
 
     """
 
-    __slots__ = ('_across', '_constant', '_inner', '_outer', 'rail')
+    __slots__ = ('_across', '_inner', '_offsets', '_outer', 'rail')
 
-    def __init__(self, rail: Rail, constant: complex, inner: complex, outer: complex) -> None:
+    def __init__(
+        self, rail: Rail, inner: complex, outer: complex, offsets: tuple[float, float]
+    ) -> None:
         self.rail = rail
-        self._constant = constant
         self._inner = inner
         self._outer = outer
+        self._offsets = offsets
         self._across = cross(inner, outer)
 
     def close(self, known: State) -> RPPPose:
         """Append both slides."""
         sight = self.rail.at(known)
-        first, second = self._slides(sight.place - self._constant, known)
+        first, second = self._slides(sight.place, self._offsets, known)
         return new(RPPPose, (Status.CLOSED, 0.0, first, second, sight))
 
     def rates(self, pose: RPPPose, known: State, speeds: State) -> tuple[complex, float]:
         """Append the rates of both slides."""
         rates = self.rail.rates(pose.sight, known, speeds)
-        self._slides(rates[0], speeds)
+        self._slides(rates[0], _STILL, speeds)
         return rates
 
     def accelerations(
@@ -106,16 +111,18 @@ class RPPDyad:
     ) -> None:
         """Append the accelerations of both slides."""
         pull, _ = self.rail.accelerations(pose.sight, rates, known, speeds, changes)
-        self._slides(pull, changes)
+        self._slides(pull, _STILL, changes)
 
     def transmission_angle(self, _pose: RPPPose) -> float:
         """Return the angle between the two lines, in [0, π/2], in [rad]."""
         return asin(min(abs(self._across), 1.0))
 
-    def _slides(self, place: complex, state: State) -> tuple[float, float]:
+    def _slides(
+        self, place: complex, offsets: tuple[float, float], state: State
+    ) -> tuple[float, float]:
         """Resolve a vector along both lines, and append its parts."""
-        first = cross(place, self._outer) / self._across
-        second = -cross(place, self._inner) / self._across
+        first = (cross(place, self._outer) - offsets[0]) / self._across
+        second = (offsets[1] - cross(place, self._inner)) / self._across
         state[0].append(first)
         state[0].append(second)
         return first, second

@@ -96,6 +96,11 @@ class RPRDyad:
         self.diagonal = diagonal
         self._constants = (offset, float(sign))
 
+    @property
+    def offset(self) -> float:
+        """Return h; 0 of a straight rail."""
+        return self._constants[0]
+
     def close(self, known: State) -> RPRPose:
         """Append the direction of the rail, and the slide."""
         offset, sign = self._constants
@@ -131,7 +136,7 @@ class RPRDyad:
         grown, lean = unit.real, sign * unsigned
         if known_bend is None:
             slope = offset / pose.slide
-            bend = square.real + grown * grown * (1.0 - slope) * (1.0 + slope)
+            bend = square.real - grown * slope * (grown * slope)
             bend = bend / pose.slide
         else:
             bend = sign * known_bend
@@ -159,4 +164,4 @@ def swivel_diagonal(
     """Return the diagonal of the inverted slider-crank with crank a on ground d."""
     fold = margin(max(a, d), -min(a, d), -abs(offset))
     kind = CrankDiagonal if turns_known else UnsignedDiagonal
-    return kind(a, d, fold, inf, (abs(offset), inf), arms, angle)
+    return kind(a, d, fold, inf, (abs(offset), inf, inf), arms, angle)

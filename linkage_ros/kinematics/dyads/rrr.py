@@ -163,7 +163,7 @@ def crank_diagonal(
     fold = margin(max(a, d), -min(a, d), -max(b, c), min(b, c))
     stretch = margin(b, c, -a, -d)
     kind = CrankDiagonal if turns_known or fold == stretch == 0.0 else UnsignedDiagonal
-    return kind(a, d, fold, stretch, (abs(b - c), b + c), arms, offset)
+    return kind(a, d, fold, stretch, (abs(b - c), b + c, 4.0 * b * c), arms, offset)
 
 
 def sums(b: float, c: float, least: Fraction) -> tuple[float, float]:
@@ -207,7 +207,7 @@ def triangle_accelerations(
     turn, pull, base, known_bend = change
     lean = sign * unsigned
     if known_bend is None:
-        bend = turn.real + unit.real * unit.real - pose.more * lean * (pose.less * lean)
+        bend = turn.real - pose.more * lean * (pose.less * lean)
         bend = bend / pose.cross
     else:
         bend = sign * known_bend

@@ -1,0 +1,484 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A linkage as equations: pins coincide, points lie on lines, blocks keep angles, inputs are driven.
+
+The unknowns are the angle and the place of the frame of every moving link. Nothing is eliminated,
+there are no dyads and no sides: the equations hold in every assembly. Many states are evaluated at
+once, in the longest floats that numpy has; linear systems are solved in doubles and refined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
+import numpy as np
+import numpy.typing as npt
+
+Real = np.longdouble
+"""64 bits of mantissa on x86-64, 113 on aarch64; where it is a double, the campaign is blunt."""
+
+Array = npt.NDArray[Any]
+
+TURN = 2 * np.arctan2(Real(0), Real(-1))
+
+UNIT_ROUNDOFF = 2.0**-53
+_REFINEMENTS = 3
+_SMALL = 2.0**-6
+"""Of the linkage: terms that are smaller count as this, since others that they go with are not."""
+
+_STEP = 2.0**-40
+_SAMPLES = 5
+
+
+class _Spot(NamedTuple):
+    """A point of a link: the number of the link (−1: the ground) and the place in its frame."""
+
+    link: int
+    x: Array
+    y: Array
+
+
+class _Moved(NamedTuple):
+    """A point in the frame of the ground, and the arm that it stands on."""
+
+    place: tuple[Array, Array]
+    arm: tuple[Array, Array]
+    link: int
+
+
+class Motion(NamedTuple):
+    """
+    States of a linkage, in columns.
+
+    Attributes
+    ----------
+    unknowns
+        (n, N): angle [rad] and place [m] of each moving link in turn.
+    rates, accelerations
+        (n, N), their derivatives by time.
+    joints
+        Three arrays (joints, N): values of the published joints and their derivatives.
+
+    """
+
+    unknowns: Array
+    rates: Array
+    accelerations: Array
+    joints: tuple[Array, Array, Array]
+
+
+class Equations:
+    """
+    The equations of a linkage.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    vary
+        Where its numbers are to be varied: a function of the shape (,) of a number that returns
+        what it is multiplied by, one for each column of the states.
+
+    """
+
+    def __init__(self, linkage: Linkage, vary: Any = None) -> None:
+        self.linkage = linkage
+        self._vary = vary
+        self.links = [link for link in linkage.links if link != GROUND]
+        self._number = {link: i for i, link in enumerate(self.links)} | {GROUND: -1}
+        self._spots = {
+            (link, name): self._spot(link, place)
+            for link, points in linkage.links.items()
+            for name, place in points.items()
+        }
+        self._lines = {name: self._line(s.direction) for name, s in linkage.sliders.items()}
+        self._angles = {
+            name: self._varied(slider.angle) for name, slider in linkage.sliders.items()
+        }
+        self.count = 3 * len(self.links)
+        self.size = max(
+            abs(part) for points in linkage.links.values() for p in points.values() for part in p
+        )
+
+    def _varied(self, value: float) -> Array:
+        exact = np.array([value], Real)
+        return exact if self._vary is None else exact * self._vary()
+
+    def _spot(self, link: str, place: Sequence[float]) -> _Spot:
+        x, y = map(self._varied, place)
+        return _Spot(self._number[link], x, y)
+
+    def _line(self, direction: Sequence[float]) -> tuple[Array, Array]:
+        x, y = map(self._varied, direction)
+        length = np.sqrt(x * x + y * y)
+        return x / length, y / length
+
+    def unknowns(self, poses: dict[str, tuple[Array, Array, Array]]) -> Array:
+        """Return the unknowns of links by name, each with its angle and place."""
+        return np.array([part for link in self.links for part in poses[link]], Real)
+
+    def residuals(self, unknowns: Array, inputs: Array) -> tuple[Array, Array, Array]:
+        """
+        Return what the equations are off by, their Jacobian, and the sizes of their terms.
+
+        Parameters
+        ----------
+        unknowns
+            (n, N).
+        inputs
+            (inputs, N), in [rad] or [m].
+
+        Returns
+        -------
+        The residuals (n, N), the Jacobian (N, n, n), and the sums (n, N) of the terms' moduli.
+
+        """
+        count = unknowns.shape[1]
+        rows, sizes = [], []
+        jacobian = np.zeros((count, self.count, self.count), Real)
+        turned = self._turned(unknowns)
+        for kind, parts in self._each():
+            row = len(rows)
+            if kind == 'pin':
+                one, other = (self._moved(unknowns, turned, spot) for spot in parts)
+                for axis in (0, 1):
+                    rows.append(one.place[axis] - other.place[axis])
+                    sizes.append(
+                        sum(
+                            np.abs(moved.arm[0]) + np.abs(moved.arm[1]) + np.abs(moved.place[axis])
+                            for moved in (one, other)
+                        )
+                    )
+                    for sign, moved in ((1, one), (-1, other)):
+                        self._add_place(jacobian, row + axis, moved, axis, sign)
+            elif kind in ('on line', 'slide'):
+                value, size, gradient = self._on_line(unknowns, turned, parts[0], kind)
+                if kind == 'slide':
+                    value, size = value - inputs[parts[1]], size + np.abs(inputs[parts[1]])
+                rows.append(value)
+                sizes.append(size)
+                jacobian[:, row, :] += gradient.T
+            else:
+                value, size = self._turn(unknowns, jacobian[:, row], parts)
+                if kind == 'turn':
+                    value, size = value - inputs[parts[3]], size + np.abs(inputs[parts[3]])
+                rows.append(value - TURN * np.round(value / TURN))
+                sizes.append(size)
+        shape = (self.count, count)
+        residuals = np.empty(shape, Real)
+        terms = np.empty(shape, Real)
+        for i, (row_, size) in enumerate(zip(rows, sizes, strict=True)):
+            residuals[i], terms[i] = row_, np.maximum(size, _SMALL * self.size)
+        return residuals, jacobian, terms
+
+    def _each(self) -> Any:
+        """Yield the equations by kind; a pin stands for two."""
+        carriers: dict[str, list[str]] = {}
+        for link, points in self.linkage.links.items():
+            for point in points:
+                carriers.setdefault(point, []).append(link)
+        for point, (first, *others) in carriers.items():
+            for link in others:
+                yield 'pin', (self._spots[link, point], self._spots[first, point])
+        for name, slider in self.linkage.sliders.items():
+            yield 'on line', (name,)
+            if slider.block:
+                yield (
+                    'block',
+                    (self._number[slider.block], self._number[slider.along], self._angles[name]),
+                )
+        for i, given in enumerate(self.linkage.inputs):
+            if given.slider:
+                yield 'slide', (given.slider, i)
+            else:
+                ends = self._number[given.child], self._number[given.parent]
+                yield 'turn', (*ends, np.zeros(1, Real), i)
+
+    def _turned(self, unknowns: Array) -> tuple[Array, Array]:
+        angles = unknowns[0::3]
+        return np.cos(angles), np.sin(angles)
+
+    def _moved(self, unknowns: Array, turned: tuple[Array, Array], spot: _Spot) -> _Moved:
+        i, x, y = spot
+        if i < 0:
+            return _Moved((x, y), (x, y), i)
+        cosine, sine = turned[0][i], turned[1][i]
+        arm = cosine * x - sine * y, sine * x + cosine * y
+        return _Moved((unknowns[3 * i + 1] + arm[0], unknowns[3 * i + 2] + arm[1]), arm, i)
+
+    @staticmethod
+    def _add_place(jacobian: Array, row: int, moved: _Moved, axis: int, factor: Any) -> None:
+        """Add the derivative of a coordinate of a point, times a factor."""
+        if moved.link < 0:
+            return
+        k = 3 * moved.link
+        jacobian[:, row, k] += factor * (-moved.arm[1] if axis == 0 else moved.arm[0])
+        jacobian[:, row, k + 1 + axis] += factor
+
+    def _slider(self, name: str) -> tuple[_Spot, _Spot, int, tuple[Array, Array]]:
+        slider = self.linkage.sliders[name]
+        carrier = slider.block or next(
+            link for link, points in self.linkage.links.items() if slider.point in points
+        )
+        return (
+            self._spots[carrier, slider.point],
+            self._spots[slider.along, slider.through],
+            self._number[slider.along],
+            self._lines[name],
+        )
+
+    def _on_line(
+        self, unknowns: Array, turned: tuple[Array, Array], name: str, kind: str
+    ) -> tuple[Array, Array, Array]:
+        """Return how far a slider's point lies beside its line, or along it; the gradient too."""
+        point, through, along, (ux, uy) = self._slider(name)
+        tip = self._moved(unknowns, turned, point)
+        foot = self._moved(unknowns, turned, through)
+        if along >= 0:
+            cosine, sine = turned[0][along], turned[1][along]
+            ux, uy = cosine * ux - sine * uy, sine * ux + cosine * uy
+        if kind == 'on line':  # the normal takes the place of the direction
+            ux, uy = -uy, ux
+        dx, dy = tip.place[0] - foot.place[0], tip.place[1] - foot.place[1]
+        value = ux * dx + uy * dy
+        size = sum(
+            np.abs(moved.place[axis]) + np.abs(moved.arm[axis])
+            for moved in (tip, foot)
+            for axis in (0, 1)
+        ) * np.ones_like(value)
+        gradient = np.zeros((self.count, unknowns.shape[1]), Real)
+        for sign, moved in ((1, tip), (-1, foot)):
+            if moved.link < 0:
+                continue
+            k = 3 * moved.link
+            gradient[k] += sign * (uy * moved.arm[0] - ux * moved.arm[1])
+            gradient[k + 1] += sign * ux
+            gradient[k + 2] += sign * uy
+        if along >= 0:
+            gradient[3 * along] += ux * dy - uy * dx
+        return value, size, gradient
+
+    def _turn(self, unknowns: Array, jacobian: Array, parts: Any) -> tuple[Array, Array]:
+        """Return the angle of one link less that of another and a constant."""
+        one, other, angle = parts[:3]
+        value = -angle * np.ones(unknowns.shape[1], Real)
+        size = np.abs(angle) + np.pi * np.ones(unknowns.shape[1], Real)
+        for sign, i in ((1, one), (-1, other)):
+            if i >= 0:
+                value = value + sign * unknowns[3 * i]
+                jacobian[:, 3 * i] += sign
+        return value, size
+
+    def bend(self, unknowns: Array, rates: Array) -> Array:
+        """Return the second derivatives (n, N) of the equations by time at accelerations of 0."""
+        turned = self._turned(unknowns)
+        rows: list[Array] = []
+        for kind, parts in self._each():
+            if kind == 'pin':
+                one, other = (self._moved(unknowns, turned, spot) for spot in parts)
+                pulls = zip(_pull(one, rates), _pull(other, rates), strict=True)
+                rows.extend(first - second for first, second in pulls)
+            elif kind in ('on line', 'slide'):
+                rows.append(self._line_bend(unknowns, rates, turned, parts[0], kind))
+            else:
+                rows.append(np.zeros(unknowns.shape[1], Real))
+        bend = np.empty((self.count, unknowns.shape[1]), Real)
+        for i, row in enumerate(rows):
+            bend[i] = row
+        return bend
+
+    def _line_bend(
+        self, unknowns: Array, rates: Array, turned: tuple[Array, Array], name: str, kind: str
+    ) -> Array:
+        point, through, along, (ux, uy) = self._slider(name)
+        tip = self._moved(unknowns, turned, point)
+        foot = self._moved(unknowns, turned, through)
+        turn: Any = 0.0
+        if along >= 0:
+            cosine, sine = turned[0][along], turned[1][along]
+            ux, uy = cosine * ux - sine * uy, sine * ux + cosine * uy
+            turn = rates[3 * along]
+        if kind == 'on line':
+            ux, uy = -uy, ux
+        between = [tip.place[i] - foot.place[i] for i in (0, 1)]
+        one, other = _velocity(tip, rates), _velocity(foot, rates)
+        speed = [one[i] - other[i] for i in (0, 1)]
+        one, other = _pull(tip, rates), _pull(foot, rates)
+        pull = [one[i] - other[i] for i in (0, 1)]
+        return (
+            ux * pull[0]
+            + uy * pull[1]
+            + 2 * turn * (ux * speed[1] - uy * speed[0])
+            - turn * turn * (ux * between[0] + uy * between[1])
+        )
+
+    def joints(
+        self, unknowns: Array, rates: Array | None = None, accelerations: Array | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Return the published joints with their first and second derivatives, (joints, N)."""
+        count = unknowns.shape[1]
+        still = np.zeros_like(unknowns)
+        rates = still if rates is None else rates
+        accelerations = still if accelerations is None else accelerations
+        turned = self._turned(unknowns)
+        found = [np.zeros((len(self.linkage.joints), count), Real) for _ in range(3)]
+        for j, joint in enumerate(self.linkage.joints.values()):
+            if isinstance(joint, RevoluteJoint):
+                for sign, link in ((1, joint.child), (-1, joint.parent)):
+                    if link != GROUND:
+                        k = 3 * self._number[link]
+                        for order, values in enumerate((unknowns, rates, accelerations)):
+                            found[order][j] += sign * values[k]
+                continue
+            value, _, gradient = self._on_line(unknowns, turned, joint.slider, 'slide')
+            found[0][j] = value
+            found[1][j] = (gradient * rates).sum(0)
+            found[2][j] = (gradient * accelerations).sum(0) + self._line_bend(
+                unknowns, rates, turned, joint.slider, 'slide'
+            )
+        return found[0], found[1], found[2]
+
+    def correct(
+        self, unknowns: Array, inputs: Array, shift: Array | None = None, steps: int = 8
+    ) -> tuple[Array, Array]:
+        """
+        Return the solutions next to some states, by Newton's method, and which are solutions.
+
+        Parameters
+        ----------
+        unknowns, inputs
+            (n, N) and (inputs, N).
+        shift
+            What the equations are to be off by, (n, N); 0 if not given.
+        steps
+            Corrections at most.
+
+        """
+        found = np.array(unknowns, Real)
+        good = np.zeros(found.shape[1], bool)
+        for step in range(steps + 1):
+            residuals, jacobian, sizes = self.residuals(found, inputs)
+            if shift is not None:
+                residuals = residuals - shift
+            ratio = (np.abs(residuals) / np.maximum(sizes, 1e-300)).max(0)
+            good = ratio < 64 * np.finfo(Real).eps
+            if step == steps or good.all():
+                break
+            found = found + solve(jacobian, -residuals)
+        return found, good
+
+    def motion(
+        self,
+        unknowns: Array,
+        inputs: Array,
+        rates: Array,
+        accelerations: Array,
+        noise: Array | float = 0.0,
+    ) -> Motion:
+        """
+        Return solutions with their rates and accelerations, from those of the inputs.
+
+        ``noise``, (n, N), is what part of its terms each equation is to be off by.
+        """
+        _, jacobian, _ = self.residuals(unknowns, inputs)
+        drive = np.zeros_like(unknowns)
+        drive[-len(inputs) :] = rates
+        v = solve(jacobian, drive)
+        v = v + solve(jacobian, noise * _terms(jacobian, v))
+        pull = np.zeros_like(unknowns)
+        pull[-len(inputs) :] = accelerations
+        bend = self.bend(unknowns, v)
+        a = solve(jacobian, pull - bend)
+        a = a + solve(jacobian, noise * (_terms(jacobian, a) + np.abs(bend)))
+        return Motion(unknowns, v, a, self.joints(unknowns, v, a))
+
+
+def condition_numbers(
+    linkage: Linkage, motion: Motion, inputs: Array, rates: Array, accelerations: Array, seed: int
+) -> tuple[Array, Array, Array]:
+    """
+    Return what the joints change by, relative to how much everything is rounded, (joints, N) each.
+
+    All numbers of the linkage, the inputs and the terms of every equation are varied by the same
+    part with random signs, some times over; the greatest change counts, and the value itself. That
+    the terms of the equations vary, stands for what one dyad hands to the next.
+    """
+    random = np.random.default_rng(seed)
+    count = inputs.shape[1]
+
+    def vary() -> Array:
+        return np.repeat(1 + _STEP * random.choice((-1.0, 1.0), _SAMPLES), count).astype(Real)
+
+    varied = Equations(linkage, vary)
+    noise = _STEP * random.choice((-1.0, 1.0), (varied.count, _SAMPLES * count)).astype(Real)
+    wide = [np.tile(values, (1, _SAMPLES)) for values in (inputs, rates, accelerations)]
+    wide = [values * (1 + _STEP * random.choice((-1.0, 1.0), values.shape)) for values in wide]
+    start = np.tile(motion.unknowns, (1, _SAMPLES))
+    _, _, sizes = varied.residuals(start, wide[0])
+    moved, _ = varied.correct(start, wide[0], noise * sizes, 3)
+    changed = varied.motion(moved, *wide, noise=noise).joints
+    found = []
+    for base, other in zip(motion.joints, changed, strict=True):
+        change = np.abs(other.reshape(len(base), _SAMPLES, count) - base[:, None, :]).max(1)
+        found.append(change / _STEP + np.abs(base))
+    return found[0], found[1], found[2]
+
+
+def _terms(jacobian: Array, values: Array) -> Array:
+    """Return the sums of the moduli of what the rows of a product are made of, (n, N)."""
+    return (np.abs(jacobian) @ np.abs(values.T)[:, :, None])[:, :, 0].T
+
+
+def _velocity(moved: _Moved, rates: Array) -> tuple[Any, Any]:
+    if moved.link < 0:
+        return 0.0, 0.0
+    turn, vx, vy = rates[3 * moved.link : 3 * moved.link + 3]
+    return vx - turn * moved.arm[1], vy + turn * moved.arm[0]
+
+
+def _pull(moved: _Moved, rates: Array) -> tuple[Any, Any]:
+    """Return the centripetal acceleration of a point."""
+    if moved.link < 0:
+        return 0.0, 0.0
+    square = rates[3 * moved.link] ** 2
+    return -square * moved.arm[0], -square * moved.arm[1]
+
+
+def solve(jacobian: Array, right: Array) -> Array:
+    """Solve (N, n, n) systems for (n, N) right sides, refined; infinite where singular."""
+    scale = np.maximum(np.abs(jacobian).max(2), 1e-300)
+    scaled = jacobian / scale[:, :, None]
+    matrix = scaled.astype(float)
+    rest = (right / scale.T).T[:, :, None]
+    with np.errstate(all='ignore'):
+        try:
+            inverse = np.linalg.inv(matrix)
+        except np.linalg.LinAlgError:
+            inverse = np.stack([_inverse(one) for one in matrix])
+        found = np.zeros_like(rest)
+        for _ in range(_REFINEMENTS):
+            error = rest - scaled @ found
+            found = found + (inverse @ error.astype(float))
+    return found[:, :, 0].T
+
+
+def _inverse(matrix: Array) -> Array:
+    try:
+        return np.linalg.inv(matrix)
+    except np.linalg.LinAlgError:
+        return np.full_like(matrix, np.inf)

@@ -1,0 +1,411 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""One linkage, solved by the package, and what the equations and the geometry say of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from math import tau
+import random
+from typing import Any
+
+from campaigns.topologies.constraints import (
+    Array,
+    condition_numbers,
+    Equations,
+    Motion,
+    Real,
+    TURN,
+    UNIT_ROUNDOFF,
+)
+from campaigns.topologies.geometry import Geometry, Places
+from campaigns.topologies.topology import Topology
+from campaigns.topologies.walk import follow, Walks
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.status import Status
+import numpy as np
+
+QUANTITIES = ('position', 'velocity', 'acceleration')
+
+STATES = 16
+"""At which each linkage is solved."""
+
+_AT_LIMIT = 1e-12
+"""Of a dyad's lengths: a dyad with less to spare may be told to be closed, toggled or open."""
+
+_ILL = 1e9
+"""From this condition on, nothing is compared: 1e-7 of a position would be rounding."""
+
+LIMIT = 16.0
+"""In u·κ, beyond which an error is a finding: κ is drawn five times, and may come out small."""
+
+_GROSS = 1e6
+"""In u·κ: a position that is off by more is another one."""
+
+_BESIDE = 1e-4
+"""In [rad], of a change point, where it is looked at from both sides."""
+
+_STILL = 2.0**-10
+"""Of the greatest κ of a state: that of a joint counts as this much at least."""
+
+CLOSED, OPEN, AT_LIMIT, UNKNOWN = 'closed', 'open', 'at limit', 'unknown'
+
+
+@dataclass
+class Findings:
+    """
+    What was found with a linkage.
+
+    Attributes
+    ----------
+    counts
+        Of states by what they are, and of findings by name.
+    notes
+        (finding, what exactly), the first of each name.
+    errors
+        For each quantity the errors in u·κ.
+
+    """
+
+    counts: Counter[str] = field(default_factory=Counter)
+    notes: list[tuple[str, str]] = field(default_factory=list)
+    errors: dict[str, list[float]] = field(default_factory=dict)
+
+    def find(self, name: str, note: str) -> None:
+        """Count a finding."""
+        if not self.counts[name]:
+            self.notes.append((name, note))
+        self.counts[name] += 1
+
+
+class Truth:
+    """What the equations say of some states: which close, and how the linkage moves there."""
+
+    def __init__(self, topology: Topology, inputs: Array, walks: Walks | None = None) -> None:
+        self.equations = Equations(topology.linkage)
+        self.inputs = inputs
+        if topology.groups is None:
+            unknowns, self.state = follow(topology, self.equations, inputs, walks)
+            self.missed = np.full(inputs.shape[1], np.nan)
+        else:
+            geometry = Geometry(topology.linkage, topology.groups, topology.sides)
+            places = geometry.place(inputs)
+            self.state, self.missed = _decide(places, inputs.shape[1])
+            unknowns = self.equations.unknowns(
+                {link: _pose(places, link) for link in self.equations.links}
+            )
+        self.unknowns = unknowns
+        closed = self.state == CLOSED
+        solved, good = self.equations.correct(unknowns[:, closed], inputs[:, closed])
+        self.unknowns[:, closed] = solved
+        index = np.flatnonzero(closed)
+        self.state[index[~good]] = AT_LIMIT
+
+
+def _pose(places: Places, link: str) -> tuple[Array, Array, Array]:
+    unit, origin = places.units[link], places.origins[link]
+    return np.angle(unit), origin.real, origin.imag
+
+
+def _decide(places: Places, count: int) -> tuple[Array, Array]:
+    """Return what states are by the first dyad that misses, and by how much it does, in [m]."""
+    state = np.full(count, CLOSED, object)
+    missed = np.full(count, np.nan)
+    for margin in places.margins:
+        with np.errstate(invalid='ignore'):
+            near = np.abs(margin.spare) <= _AT_LIMIT * margin.grain
+            off = margin.spare < -_AT_LIMIT * margin.grain
+        undecided = state == CLOSED
+        state[undecided & off] = OPEN
+        missed[undecided & off] = -margin.spare[undecided & off]
+        state[undecided & near] = AT_LIMIT
+        state[undecided & ~np.isfinite(margin.spare)] = AT_LIMIT
+    return state, missed
+
+
+def judge_states(
+    topology: Topology,
+    closure: Closure,
+    rng: random.Random,
+    findings: Findings,
+    walks: Walks | None,
+) -> None:
+    """
+    Compare positions, rates, accelerations and statuses.
+
+    Parameters
+    ----------
+    topology, closure
+        The linkage.
+    rng
+        Draws the states.
+    findings
+        Where what is found goes.
+    walks
+        The linkage followed, where it has a single input and links that no dyad covers.
+
+    """
+    count = len(topology.start)
+    inputs = np.array([_values(topology, rng, i) for i in range(count)], Real)
+    rates = np.array([[rng.gauss(0.0, 1.0) for _ in range(STATES)] for _ in range(count)], Real)
+    pulls = np.array([[rng.gauss(0.0, 1.0) for _ in range(STATES)] for _ in range(count)], Real)
+    truth = Truth(topology, inputs, walks)
+    answers = _scalar_answers(closure, inputs, rates, pulls, findings)
+    _compare_arrays(closure, inputs, rates, pulls, answers, truth, findings)
+    _compare(topology, closure, truth, answers, (rates, pulls), findings)
+    for at in topology.change_points:
+        _judge_change_point(topology, closure, at, findings)
+
+
+def closure_of(topology: Topology, findings: Findings) -> Closure | None:
+    """Return the closure of a linkage that closes by construction."""
+    try:
+        return Closure(topology.linkage)
+    except DefinitionError as error:
+        findings.find('refused', str(error))
+    except Exception as error:  # noqa: BLE001 - it is counted
+        findings.find('traceback: Closure', repr(error))
+    return None
+
+
+def _values(topology: Topology, rng: random.Random, number: int) -> list[float]:
+    """Return values of an input: where the linkage was made, near it, and anywhere."""
+    start, step = topology.start[number], topology.step[number]
+    turning = not topology.linkage.inputs[number].slider
+    values = [start]
+    while len(values) < STATES // 2 + 1:
+        values.append(start + rng.gauss(0.0, step))
+    while len(values) < STATES:
+        # Class III is followed for a turn about its pose; a dyad's angle may be any.
+        far = tau / 2 if topology.groups is None else tau
+        values.append(start + rng.uniform(-far, far) if turning else start * rng.uniform(-2, 3))
+    return values
+
+
+def _scalar_answers(
+    closure: Closure, inputs: Array, rates: Array, pulls: Array, findings: Findings
+) -> list[tuple[Any, tuple[tuple[float, ...], ...]] | None]:
+    """Return position and joints with their derivatives, for each state that was answered."""
+    answers: list[tuple[Any, tuple[tuple[float, ...], ...]] | None] = []
+    for k in range(inputs.shape[1]):
+        x, v, a = ([float(value) for value in row[:, k]] for row in (inputs, rates, pulls))
+        call = 'position'
+        try:
+            position = closure.position(*x)
+            joints: tuple[tuple[float, ...], ...] = (position.joints,)
+            if position.status.has_rates:
+                call = 'velocity'
+                velocity = closure.velocity(position, *v)
+                call = 'acceleration'
+                acceleration = closure.acceleration(position, velocity, *a)
+                joints = (position.joints, velocity.joints, acceleration.joints)
+        except Exception as error:  # noqa: BLE001 - it is counted
+            findings.find(f'traceback: {call}', f'at {x}: {error!r}')
+            answers.append(None)
+            continue
+        answers.append((position, joints))
+    return answers
+
+
+def _compare_arrays(
+    closure: Closure,
+    inputs: Array,
+    rates: Array,
+    pulls: Array,
+    answers: list[Any],
+    truth: Truth,
+    findings: Findings,
+) -> None:
+    """Compare what is solved over arrays with what is solved one by one."""
+    from linkage_ros.kinematics.batch.arrays import CODES  # local import: with numpy only
+
+    motion = {'rates': rates.astype(float), 'accelerations': pulls.astype(float)}
+    try:
+        for derivatives in (0, 1, 2):
+            batch = closure.solve(*inputs.astype(float), **motion, derivatives=derivatives)
+    except Exception as error:  # noqa: BLE001 - it is counted
+        findings.find('traceback: solve', f'derivatives={derivatives}: {error!r}')
+        return
+    for k, answer in enumerate(answers):
+        if answer is None or truth.state[k] in (AT_LIMIT, UNKNOWN):
+            continue
+        position, joints = answer
+        if CODES[position.status] != batch.status[k]:
+            note = f'at {inputs[:, k].tolist()}: {position.status} and {batch.status[k]}'
+            findings.find('arrays: status', note)
+            continue
+        for name, one, many in zip(QUANTITIES, joints, batch[1:], strict=False):
+            if not one:
+                continue
+            off = np.abs(many[:, k] - np.array(one))
+            # What the two differ by is rounding: that of a state far from a toggle.
+            if not (off <= 1e-6 * (1.0 + np.abs(one).max())).all():
+                findings.find(f'arrays: {name}', f'at {inputs[:, k].tolist()}: {off.max():.2g}')
+
+
+def _compare(
+    topology: Topology,
+    closure: Closure,
+    truth: Truth,
+    answers: list[Any],
+    motion_of_inputs: tuple[Array, Array],
+    findings: Findings,
+) -> None:
+    closed = []
+    for k, answer in enumerate(answers):
+        if answer is None:
+            continue
+        position, state = answer[0], truth.state[k]
+        at = f'at {[float(v) for v in truth.inputs[:, k]]}'
+        findings.counts[f'states {state}'] += 1
+        if state in (AT_LIMIT, UNKNOWN):
+            continue
+        if state == OPEN:
+            if position.joints:
+                findings.find('false closure', f'{at}: {position.status.name}, but is open')
+            elif topology.groups is not None:
+                missed = truth.missed[k]
+                if not abs(position.gap - missed) <= 1e-9 * (missed + closure.scale):
+                    findings.find('gap', f'{at}: {position.gap:.6g}, in truth {missed:.6g}')
+            continue
+        closed.append(k)
+    if not closed:
+        return
+    rates, pulls = (values[:, closed] for values in motion_of_inputs)
+    inputs = truth.inputs[:, closed]
+    motion = truth.equations.motion(truth.unknowns[:, closed], inputs, rates, pulls)
+    kappa = condition_numbers(topology.linkage, motion, inputs, rates, pulls, 1)
+    for column, k in enumerate(closed):
+        at = f'at {[float(v) for v in inputs[:, column]]}'
+        position, joints = answers[k]
+        if not kappa[0][:, column].max() < _ILL * max(1.0, closure.scale):
+            findings.counts['states ill'] += 1
+            continue
+        if not position.status.has_rates:
+            findings.find('missed closure', f'{at}: {position.status.name}, but closes')
+            continue
+        errors = []
+        for order, values in enumerate(joints):
+            off = np.array(values, Real) - motion.joints[order][:, column]
+            condition = kappa[order][:, column]
+            if order == 0:
+                turns = np.array(closure.turning)
+                off[turns] -= TURN * np.round(off[turns] / TURN)
+                condition = condition + np.where(turns, np.pi + np.abs(values), 0.0)
+            off = np.abs(off)
+            # What does not move is told from terms that do.
+            condition = np.maximum(condition, max(_STILL * condition.max(), 1e-300))
+            errors.append(
+                float(np.nan_to_num(off / (UNIT_ROUNDOFF * condition), nan=np.inf).max())
+            )
+        if errors[0] > _GROSS:
+            _other_pose(topology, closure, truth, position, inputs[:, [column]], at, findings)
+            continue
+        for name, error in zip(QUANTITIES, errors, strict=True):
+            findings.errors.setdefault(name, []).append(error)
+            if error > LIMIT:
+                findings.find(f'error: {name}', f'{at}: {error:.3g} u·κ')
+        if column == 0:
+            _compare_points(closure, truth.equations, motion, position, at, findings)
+
+
+def _other_pose(
+    topology: Topology,
+    closure: Closure,
+    truth: Truth,
+    position: Any,
+    inputs: Array,
+    at: str,
+    findings: Findings,
+) -> None:
+    """Tell whether a pose that is not the one that it should be closes at all."""
+    residual = closure.residual(position)
+    if residual < 1e-9 * closure.scale * max(1.0, truth.equations.size / closure.scale):
+        findings.find('wrong assembly', f'{at}: {dict(topology.linkage.assembly) or "class III"}')
+    else:
+        findings.find('not closed', f'{at}: said to be closed, off by {residual:.2g} m')
+
+
+def _compare_points(
+    closure: Closure,
+    equations: Equations,
+    motion: Motion,
+    position: Any,
+    at: str,
+    findings: Findings,
+) -> None:
+    """Compare the places of all points."""
+    angles = motion.unknowns[0::3, 0]
+    places = closure.points(position)
+    worst = 0.0
+    for (link, point), place in places.items():
+        if link not in closure.linkage.links:
+            continue
+        x, y = closure.linkage.links[link][point]
+        true = complex(x, y)
+        if link != GROUND:
+            i = equations.links.index(link)
+            turn = complex(np.cos(angles[i]), np.sin(angles[i]))
+            origin = complex(*(float(v) for v in motion.unknowns[3 * i + 1 : 3 * i + 3, 0]))
+            true = origin + turn * true
+        worst = max(worst, abs(place - true))
+    if not worst < 1e-6 * (closure.scale + equations.size):
+        findings.find('points', f'{at}: off by {worst:.2g} m')
+
+
+def _judge_change_point(
+    topology: Topology, closure: Closure, value: float, findings: Findings
+) -> None:
+    """Compare a change point that is passed with what lies closely on both sides of it."""
+    steps = _BESIDE * np.array([-1, 1, -2, 2], Real)
+    beside = value + steps[None, :]
+    one, nought = np.ones_like(beside), np.zeros_like(beside)
+    truth = Truth(topology, beside)
+    if (truth.state != CLOSED).any():
+        return
+    motion = truth.equations.motion(truth.unknowns, beside, one, nought)
+    jumps = np.array(closure.turning)[:, None]
+    places = motion.joints[0] - motion.joints[0][:, :1]
+    places -= np.where(jumps, TURN * np.round(places / TURN), 0.0)
+    wanted, doubt = [], []
+    for values in (motion.joints[0][:, :1] + places, motion.joints[1]):
+        near, far = values[:, :2].mean(1), values[:, 2:].mean(1)
+        wanted.append(near)
+        # The mean of both sides is off by a third of what it changes by at twice the distance.
+        doubt.append(np.abs(far - near))
+    try:
+        position = closure.position(value)
+        if position.status is Status.INDETERMINATE:
+            # A straight rod whose pins meet, exactly or within their rounding.
+            findings.counts['pins that meet'] += 1
+            return
+        joints = [position.joints]
+        if position.status.has_rates:
+            joints.append(closure.velocity(position, 1.0).joints)
+    except Exception as error:  # noqa: BLE001 - it is counted
+        findings.find('traceback: change point', f'at {value}: {error!r}')
+        return
+    if not position.status.has_pose or (value == 0.0 and not position.status.has_rates):
+        findings.find('change point: status', f'at {value}: {position.status.name}')
+    for name, found, true, off_by in zip(QUANTITIES, joints, wanted, doubt, strict=False):
+        off = np.array(found, Real) - true if found else np.zeros(1, Real)
+        if found and name == 'position':
+            off -= np.where(jumps[:, 0], TURN * np.round(off / TURN), 0.0)
+        if not (np.abs(off) < 1e-5 * (1.0 + np.abs(true).max()) + off_by).all():
+            findings.find(f'change point: {name}', f'at {value}: off by {np.abs(off).max():.2g}')

@@ -1,0 +1,291 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The ranges of a single input and its singular values, against a fine walk."""
+
+from __future__ import annotations
+
+from math import inf, remainder, tau
+from typing import NamedTuple
+
+from campaigns.accuracy.dyads.rpr import RPR
+from campaigns.topologies.constraints import Array, Real
+from campaigns.topologies.geometry import Geometry, Margin, Passing
+from campaigns.topologies.judge import Findings
+from campaigns.topologies.topology import Topology
+from campaigns.topologies.walk import Walks
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.nearness import SingularInput
+from linkage_ros.kinematics.status import Status
+import numpy as np
+
+SAMPLES = 2400
+"""Of the walk, over a turn from end to end, or as far as a slide may reach; the pose is one."""
+
+_FLAT = 1e-13
+"""Of a dyad's lengths: what it has to spare at a change point, but for rounding."""
+
+_NEARLY_FLAT = 0.03
+_SAME = 1e-6
+"""What places of the input may differ by, in [rad] or of what a slide may reach."""
+
+
+class Travel(NamedTuple):
+    """
+    Where an input closes the loops.
+
+    Attributes
+    ----------
+    parts
+        Intervals of the input, in [rad] or [m].
+    ends
+        Those of their ends at which the linkage is at a limit.
+    changes
+        Values between at which a dyad lies flat.
+    parallels
+        Values at which the two lines of a dyad are parallel.
+
+    """
+
+    parts: list[tuple[float, float]]
+    ends: list[float]
+    changes: list[float]
+    parallels: list[float]
+
+
+def judge_ranges(
+    topology: Topology, closure: Closure, findings: Findings, walks: Walks | None
+) -> None:
+    """Compare what the package says of a single input with a walk along it."""
+    turning = not topology.linkage.inputs[0].slider
+    try:
+        ranges = closure.input_ranges
+        singular = closure.singular_inputs
+        position = closure.position(*topology.start)
+        distance = closure.nearness(position).toggle_distance if position.joints else inf
+    except Exception as error:  # noqa: BLE001 - it is counted
+        findings.find('traceback: ranges', repr(error))
+        return
+    if walks is not None:
+        _judge_branch(topology, closure, walks, findings)
+        return
+    far = np.pi if turning else _reach(topology)
+    geometry = Geometry(topology.linkage, topology.groups or (), topology.sides)
+    travel = _travel(geometry, topology.start[0], far, turning)
+    same = _SAME * (1.0 if turning else far)
+    values = _samples(topology.start[0], far, turning)
+    for value in values:
+        inside = any(low - same <= value <= high + same for low, high in travel.parts)
+        well_inside = any(low + same <= value <= high - same for low, high in travel.parts)
+        said = any(
+            interval.whole or interval.lowest - same <= value + turn <= interval.highest + same
+            for interval in ranges
+            for turn in ((-2 * tau, -tau, 0.0, tau, 2 * tau) if turning else (0.0,))
+        )
+        if well_inside and not said:
+            findings.find('range: a part is missing', f'{value:.9g} closes, not in {ranges}')
+            break
+        if said and not inside:
+            findings.find('range: too wide', f'{value:.9g} is open, but in {ranges}')
+            break
+    _judge_singular(topology, travel, singular, same, findings)
+    true = [*travel.ends, *travel.changes, *travel.parallels]
+    away = [_apart(topology.start[0], place, turning) for place in true]
+    nearest = min(away, default=inf)
+    if nearest < inf and not abs(distance - nearest) <= same:
+        findings.find('singular: distance', f'{distance:.6g}, in truth {nearest:.6g}')
+
+
+def _judge_singular(
+    topology: Topology,
+    travel: Travel,
+    singular: tuple[SingularInput, ...],
+    same: float,
+    findings: Findings,
+) -> None:
+    """Compare the values that are listed with those that there are, by their kind."""
+    turning = not topology.linkage.inputs[0].slider
+    passed = any(isinstance(side, Passing) for side in topology.sides.values())
+    at_changes = {Status.CHANGE_POINT if passed else Status.TOGGLE}
+    if isinstance((topology.groups or ())[-1], RPR):
+        at_changes.add(Status.INDETERMINATE)  # A straight rod whose pins meet.
+    unmatched = list(singular)
+    for kind, places, statuses in (
+        ('toggle', travel.ends, {Status.TOGGLE}),
+        ('change point', travel.changes, at_changes),
+        ('parallel lines', travel.parallels, {Status.INDETERMINATE}),
+    ):
+        for place in places:
+            near = [one for one in singular if _apart(place, one.value, turning) <= same]
+            unmatched = [one for one in unmatched if one not in near]
+            said = [one.value for one in singular]
+            if not near:
+                findings.find(f'singular: {kind} not listed', f'{place:.9g}, not in {said}')
+            elif not any(one.status in statuses for one in near):
+                note = f'{place:.9g} is a {near[0].status.value}'
+                findings.find(f'singular: {kind} called other', note)
+    if unmatched:
+        findings.find('singular: listed, is none', f'{unmatched[0].value:.9g}')
+
+
+def _judge_branch(topology: Topology, closure: Closure, walks: Walks, findings: Findings) -> None:
+    """Compare the range about the pose with how far the linkage can be followed from there."""
+    turning = not topology.linkage.inputs[0].slider
+    start = topology.start[0]
+    down, up = walks
+    ranges = closure.input_ranges
+    turns = (0.0, -tau, tau) if turning else (0.0,)
+    about = [
+        (interval, turn)
+        for turn in turns
+        for interval in ranges
+        if interval.whole or interval.lowest <= start + turn <= interval.highest
+    ]
+    if not about:
+        findings.find('range: a part is missing', f'the pose at {start:.9g} is not in {ranges}')
+        return
+    interval, turn = about[0]
+    if interval.whole:
+        if down.end + up.end < tau - _SAME:
+            findings.find(
+                'range: too wide', f'all, but {start - down.end:.9g} to {start + up.end:.9g}'
+            )
+        return
+    for walk, sign, end in ((down, -1, interval.lowest), (up, 1, interval.highest)):
+        true, said = start + sign * walk.end, end - turn
+        same = _SAME * max(1.0, abs(true))
+        short = sign * (true - said)
+        # A slide is looked at only as far as some length.
+        if short > same and interval.limited[sign > 0]:
+            findings.find('range: a part is missing', f'to {true:.9g}, said {said:.9g}')
+        elif short < -same and not walk.complete:
+            findings.find('range: too wide', f'to {true:.9g}, said {said:.9g}')
+        listed = [one.value for one in closure.singular_inputs]
+        if (
+            not walk.complete
+            and min((_apart(true, v, turning) for v in listed), default=inf) > same
+        ):
+            findings.find('singular: toggle not listed', f'{true:.9g}, not in {listed}')
+
+
+def _samples(start: float, far: float, turning: bool) -> Array:
+    if turning:
+        first = (start + np.pi) % (tau / SAMPLES) - np.pi
+        return np.asarray(first + np.arange(SAMPLES + 1) * (tau / SAMPLES))
+    return np.sort(np.append(np.linspace(-far, far, SAMPLES), start))
+
+
+def _travel(geometry: Geometry, start: float, far: float, turning: bool) -> Travel:
+    values = _samples(start, far, turning)
+    places = geometry.place(values[None, :].astype(Real))
+    spare = _spare(places.margins, len(values))
+    closes = (spare >= -_FLAT).all(0)
+    borders = [i for i in range(len(values) - 1) if closes[i] != closes[i + 1]]
+    inner = np.array([values[i] if closes[i] else values[i + 1] for i in borders])
+    outer = np.array([values[i + 1] if closes[i] else values[i] for i in borders])
+    for _ in range(60 if borders else 0):
+        middle = 0.5 * (inner + outer)
+        found = geometry.place(middle[None, :].astype(Real))
+        good = (_spare(found.margins, len(middle)) >= 0.0).all(0)
+        inner, outer = np.where(good, middle, inner), np.where(good, outer, middle)
+    edges = inner.tolist()
+    parts, ends = [], list(edges)
+    low = -inf if closes[0] else None
+    for i, edge in zip(borders, edges, strict=True):
+        if closes[i] and low is not None:
+            parts.append((low, edge))
+            low = None
+        else:
+            low = edge
+    if low is not None:
+        parts.append((low, inf))
+    # Lines may be parallel between an end and the sample next to it.
+    fine = np.sort(np.concatenate([values, inner]))
+    there = geometry.place(fine[None, :].astype(Real))
+    open_ones = (_spare(there.margins, len(fine)) < -_FLAT).any(0)
+    parallels = _parallel(geometry, there.crossings, fine, ~open_ones)
+    # Next to parallel lines a dyad is far away, and small against that.
+    changes = _flat(geometry, values, spare, closes, [*ends, *parallels], turning)
+    return Travel(parts, ends, changes, parallels)
+
+
+def _spare(margins: list[Margin], count: int) -> Array:
+    """Return what each dyad has to spare, of its lengths, (dyads, N)."""
+    if not margins:
+        return np.ones((1, count))
+    found = np.array([margin.spare / margin.grain for margin in margins])
+    return np.asarray(np.nan_to_num(found, nan=-1.0))
+
+
+def _flat(
+    geometry: Geometry,
+    values: Array,
+    spare: Array,
+    closes: Array,
+    borders: list[float],
+    turning: bool,
+) -> list[float]:
+    """Return where a dyad has nothing to spare and goes on."""
+    found: list[float] = []
+    for k, row in enumerate(spare):
+        # Where a slide is looked at no farther, it may be stretched, and need not go on.
+        for i in range(0 if turning else 1, len(row) - (0 if turning else 1)):
+            # A turn begins where it ends: at one value twice.
+            last = len(row) - 1
+            before = row[i - 1 if i or not turning else last - 1]
+            after = row[i + 1 if i < last else 1 if turning else last]
+            if not (closes[i] and row[i] < _NEARLY_FLAT and row[i] <= min(before, after)):
+                continue
+            width = float(values[1] - values[0])
+            at = float(values[i])
+            for _ in range(11):
+                near = at + width * np.linspace(-1.0, 1.0, 41)
+                fine = _spare(geometry.place(near[None, :].astype(Real)).margins, 41)[k]
+                at, width = float(near[np.argmin(np.abs(fine))]), width / 15.0
+            least = float(np.abs(fine).min())
+            at_a_border = any(abs(at - border) < 1e-3 for border in borders)
+            if least < _FLAT and not at_a_border:
+                found.append(at)
+    return found
+
+
+def _parallel(
+    geometry: Geometry, crossings: list[Array], values: Array, closes: Array
+) -> list[float]:
+    """Return where two lines of a dyad are parallel."""
+    found: list[float] = []
+    for k, row in enumerate(crossings):
+        both = closes[:-1] & closes[1:]
+        borders = np.flatnonzero(both & (row[:-1] * row[1:] < 0.0))
+        low, high, below = values[borders], values[borders + 1], row[borders]
+        for _ in range(50 if len(borders) else 0):
+            middle = 0.5 * (low + high)
+            at = geometry.place(middle[None, :].astype(Real)).crossings[k]
+            same = at * below > 0.0
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        found += low.tolist()
+    return found
+
+
+def _reach(topology: Topology) -> float:
+    """Return the sum of how far each link reaches: no slide need be longer."""
+    return sum(
+        max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
+        for points in topology.linkage.links.values()
+    )
+
+
+def _apart(one: float, other: float, turning: bool) -> float:
+    return abs(remainder(one - other, tau) if turning else one - other)

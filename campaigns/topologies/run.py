@@ -1,0 +1,220 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The campaign: what there is to be done, done in parts, by as many processes as are wanted.
+
+Each linkage has a generator of its own, seeded by the campaign's seed, its family and its number:
+what comes out does not depend on how the work was shared, and any linkage can be made again.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+import random
+import traceback
+from typing import NamedTuple
+
+from campaigns.processes import results_of
+from campaigns.topologies.commands import FILES, judge_command, spoilt
+from campaigns.topologies.families import FAMILIES
+from campaigns.topologies.judge import closure_of, Findings, judge_states
+from campaigns.topologies.judge_ranges import judge_ranges
+from campaigns.topologies.topology import Topology
+from campaigns.topologies.walk import both_ways
+from linkage_ros.kinematics.linkage import Linkage
+
+_PART = 5
+_KEPT = 3
+
+KINEMATICS, CHECK, CHECK_SPOILT, FILE, ACCURACY = (
+    'kinematics',
+    'check',
+    'check spoilt',
+    'files',
+    'accuracy',
+)
+
+
+class Part(NamedTuple):
+    """Some linkages of a family, and what is to be tried with them."""
+
+    seed: int
+    family: str
+    first: int
+    size: int
+    what: str = KINEMATICS
+
+
+class Note(NamedTuple):
+    """A finding with the linkage that it was made with."""
+
+    what: str
+    linkage: int
+    text: str
+
+
+@dataclass
+class Tally:
+    """What was found in a family, in whatever order its parts were done."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    found_with: Counter[str] = field(default_factory=Counter)
+    worst: dict[str, tuple[float, int]] = field(default_factory=dict)
+    errors: dict[str, list[float]] = field(default_factory=dict)
+    notes: dict[str, list[Note]] = field(default_factory=dict)
+
+    def add(self, linkage: int, findings: Findings) -> None:
+        """Add the findings of one linkage."""
+        self.counts += findings.counts
+        self.counts['linkages'] += 1
+        self.counts['linkages with findings'] += bool(findings.notes)
+        for name, text in findings.notes:
+            self.found_with[name] += 1
+            self._keep(name, [Note(name, linkage, text)])
+        for name, errors in findings.errors.items():
+            self._note_errors(name, errors, (max(errors), linkage))
+
+    def merge(self, other: Tally) -> None:
+        """Add what another part has found."""
+        self.counts += other.counts
+        self.found_with += other.found_with
+        for name, notes in other.notes.items():
+            self._keep(name, notes)
+        for name, errors in other.errors.items():
+            self._note_errors(name, errors, other.worst[name])
+
+    def _keep(self, name: str, notes: Iterable[Note]) -> None:
+        self.notes[name] = sorted([*self.notes.get(name, []), *notes])[:_KEPT]
+
+    def _note_errors(self, name: str, errors: list[float], worst: tuple[float, int]) -> None:
+        self.errors.setdefault(name, []).extend(errors)
+        self.worst[name] = max(self.worst.get(name, (0.0, 0)), worst)
+
+
+def make(seed: int, family: str, index: int) -> tuple[Topology, random.Random]:
+    """Return a linkage of a family, and what draws its states."""
+    rng = random.Random(f'{seed}/{family}/{index}')
+    return FAMILIES[family].make(rng), rng
+
+
+def made_for(what: str, seed: int, family: str, index: int) -> Linkage:
+    """Return the linkage that a command is tried with."""
+    topology, rng = make(seed, family, index)
+    return spoilt(topology.linkage, rng) if what == CHECK_SPOILT else topology.linkage
+
+
+def examine(seed: int, family: str, index: int, what: str = KINEMATICS) -> Findings:
+    """Try one thing with one linkage."""
+    findings = Findings()
+    if what == KINEMATICS:
+        _kinematics(seed, family, index, findings)
+        return findings
+    linkage = made_for(what, seed, family, index)
+    commands = {CHECK: ('check',), CHECK_SPOILT: ('check',), FILE: FILES, ACCURACY: ('accuracy',)}
+    for command in commands[what]:
+        judge_command(command, linkage, findings, closes=what != CHECK_SPOILT)
+    return findings
+
+
+def _kinematics(seed: int, family: str, index: int, findings: Findings) -> None:
+    topology, rng = make(seed, family, index)
+    closure = closure_of(topology, findings)
+    if closure is None:
+        return
+    single = len(topology.start) == 1
+    walks = both_ways(topology) if single and topology.groups is None else None
+    judge_states(topology, closure, rng, findings, walks)
+    if single:
+        judge_ranges(topology, closure, findings, walks)
+
+
+def parts(
+    seed: int, wanted: dict[str, int], families: Iterable[str] = FAMILIES, slow: int = 4
+) -> list[Part]:
+    """
+    Return the work.
+
+    Parameters
+    ----------
+    seed
+        The campaign's.
+    wanted
+        How many linkages to try what with: of each family the kinematics, of all families together
+        everything else.
+    families
+        Their names.
+    slow
+        By how much fewer linkages of class III are tried: each is followed step by step.
+
+    """
+    weights = {family: 1 if family.startswith('class III') else slow for family in families}
+    work = []
+    for what, count in wanted.items():
+        done, passed = 0, 0
+        for family, weight in weights.items():
+            passed += weight
+            share = -(-count * weight // slow)
+            if what != KINEMATICS:
+                # So that all shares come to the whole.
+                share = count * passed // sum(weights.values()) - done
+            done += share
+            work += [
+                Part(seed, family, first, min(_PART, share - first), what)
+                for first in range(0, share, _PART)
+            ]
+    return work
+
+
+def do(part: Part) -> tuple[Part, Tally]:
+    """Do one part."""
+    tally = Tally()
+    for index in range(part.first, part.first + part.size):
+        try:
+            findings = examine(part.seed, part.family, index, part.what)
+        except Exception as error:
+            raise RuntimeError(
+                f'{part.what} of {part.family} {index}: {traceback.format_exc()}'
+            ) from error
+        tally.add(index, findings)
+    return part, tally
+
+
+def run(
+    work: list[Part], jobs: int, progress: Callable[[Part], None] | None = None
+) -> dict[str, dict[str, Tally]]:
+    """
+    Do all parts and return what was found, by what was tried and by family.
+
+    Parameters
+    ----------
+    work
+        The parts.
+    jobs
+        How many processes; 1: this one.
+    progress
+        Called with each part when it is done.
+
+    """
+    tallies: dict[str, dict[str, Tally]] = {}
+    for part in work:
+        tallies.setdefault(part.what, {}).setdefault(part.family, Tally())
+    for part, tally in results_of(do, work, jobs):
+        tallies[part.what][part.family].merge(tally)
+        if progress is not None:
+            progress(part)
+    return tallies

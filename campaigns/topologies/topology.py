@@ -1,0 +1,359 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Linkages of any topology, made from a pose: they close at the inputs that they were made at.
+
+Links and dyads are those of the accuracy campaign's builder. Here inputs turn or slide, stand on
+the ground, on each other or between moving links, and links may have no dyad at all.
+"""
+
+from __future__ import annotations
+
+from cmath import phase
+from collections.abc import Mapping
+from dataclasses import dataclass
+import random
+from typing import Any
+
+from campaigns.accuracy.builder import Builder
+from campaigns.accuracy.dyads.rpr import RPR
+from campaigns.accuracy.dyads.rrp import RRP
+from campaigns.accuracy.dyads.rrr import RRR
+from campaigns.accuracy.dyads.two_slides import PRP, RPP
+from campaigns.accuracy.mechanism import Dyad, polar, Spot, Turn
+from campaigns.accuracy.random_dyads import add_prp, add_rpp, add_rpr, add_rrp, add_rrr
+from campaigns.topologies.geometry import DrivenLink, DrivenRRR, Group, Passing
+from linkage_ros.kinematics.linkage import (
+    GROUND,
+    Input,
+    Linkage,
+    Pose,
+    RevoluteJoint,
+    Side,
+    SlideJoint,
+    Slider,
+)
+
+KINDS = ('RRR', 'RRP', 'RPR', 'PRP', 'RPP')
+
+
+@dataclass(frozen=True, slots=True)
+class Topology:
+    """
+    A linkage with what its maker knows of it.
+
+    Attributes
+    ----------
+    linkage
+        The linkage, in the package's terms.
+    groups
+        Inputs and dyads in the order in which they become known; None where links are left that
+        no dyad covers.
+    sides
+        For what closes a dyad +1 (left, ahead) or −1, or how that changes.
+    start
+        Inputs at which it closes by construction, in [rad] or [m].
+    pose
+        Angle and place of each moving link there.
+    step
+        What an input moves by that a person would call a little: 0.3 rad, or of a length.
+    change_points
+        Inputs within a turn at which exactly a change point lies that the linkage passes.
+
+    """
+
+    linkage: Linkage
+    groups: tuple[Group, ...] | None
+    sides: Mapping[str, int | Passing]
+    start: tuple[float, ...]
+    pose: Mapping[str, tuple[float, float, float]]
+    step: tuple[float, ...]
+    change_points: tuple[float, ...] = ()
+
+
+class TopologyBuilder(Builder):
+    """
+    A linkage in the making.
+
+    Parameters
+    ----------
+    rng
+        Source of everything random.
+    plain
+        Whether the frames are plain; either if not said.
+
+    """
+
+    def __init__(self, rng: random.Random, plain: bool | None = None) -> None:
+        super().__init__(rng, 0.0, rng.random() < 0.5 if plain is None else plain)
+        self.inputs: list[Input] = []
+        self._start: list[float] = []
+        self._step: list[float] = []
+        self._groups: list[Group] = []
+        self._sides: dict[str, int] = {}
+        self._assembly: dict[str, Side] = {}
+        self._rank = {GROUND: 0}
+        self._pose_points: dict[str, complex] = {}
+        self.put(GROUND, 'O', 0j)
+
+    def is_first(self) -> bool:
+        """Return whether lines may lie along axes: they might be parallel for ever."""
+        return False
+
+    def parent(self) -> str:
+        """Return a link that a published angle may be counted from; all are published anyway."""
+        return GROUND
+
+    def add(self, dyad: Dyad, *joints: Turn | str) -> None:
+        """Add a dyad with the side that the conventions name."""
+        super().add(dyad, *joints)
+        group: Any = dyad
+        if isinstance(group, RRR):
+            ends = (group.a, group.d), (group.one, group.two)
+            self._name_side(ends[0], ends[1], group.pin)
+        elif isinstance(group, RRP | RPR):
+            self._sides[group.slider] = group.side
+            self._assembly[group.slider] = 'ahead' if group.side > 0 else 'behind'
+        self._known(group)
+
+    def slide(self, line: complex, along: str, through: str, point: str, block: str | None) -> str:
+        """Add a slider whose line has a direction in the pose; its block may stand anyhow."""
+        name = super().slide(line, along, through, point, block)
+        if block is not None and self.axis(block) != self.axis(along):
+            turn = phase(self.axis(block) * self.axis(along).conjugate())
+            self._sliders[name] = self._sliders[name]._replace(angle=turn)
+        return name
+
+    def _name_side(self, ends: tuple[Spot, Spot], links: tuple[str, str], pin: str) -> None:
+        """Name the side of A→D on which a pin lies; A is known later, or stands first."""
+        ranks = [self._rank[end.link] for end in ends]
+        order = list(self._links)
+        if ranks[0] == ranks[1]:
+            swapped = order.index(links[1]) < order.index(links[0])
+        else:
+            swapped = ranks[0] < ranks[1]
+        where = self.where(Spot(links[0], pin)) - self.where(ends[0])
+        line = self.where(ends[1]) - self.where(ends[0])
+        side = 1 if (line.conjugate() * where).imag > 0 else -1
+        self._sides[pin] = side
+        self._assembly[pin] = 'left' if (side > 0) != swapped else 'right'
+
+    def _known(self, group: Group) -> None:
+        """Take the links of a group as known, in the order in which `linkage check` lists them."""
+        self._groups.append(group)
+        bodies: list[tuple[str, ...]] = []
+        if isinstance(group, RRR):
+            bodies = [(group.one,), (group.two,)]
+            if self._rank[group.a.link] < self._rank[group.d.link]:
+                bodies.reverse()
+        elif isinstance(group, DrivenRRR):
+            bodies = list(group.arms)
+            if self._rank[group.ends[0].link] < self._rank[group.ends[1].link]:
+                bodies.reverse()
+        elif isinstance(group, PRP):
+            sliders = [self._sliders[name] for name in (group.one, group.two)]
+            if self._rank[sliders[0].along] < self._rank[sliders[1].along]:
+                sliders.reverse()
+            bodies = [(slider.block,) for slider in sliders if slider.block]
+        elif isinstance(group, RPP):
+            inner = self._sliders[group.inner]
+            bodies = [(inner.block,)] if inner.block else []
+        # Of an RRP or RPR dyad the link with the pin, or with the rail, was made first.
+        for body in [*bodies, tuple(self._links)]:
+            for link in body:
+                self._rank.setdefault(link, len(self._rank))
+
+    def turning(self, on: str, pivot: complex | None = None) -> str:
+        """Add a link that an input turns on another."""
+        spot = self.spot(on)
+        if pivot is not None:
+            self.put(on, spot.point, pivot)
+        where = self.where(spot)
+        arm = polar(self.length(), self.direction())
+        link = self.link('crank', {spot.point: where, self.name('A'): where + arm})
+        self._drive_turn(on, link)
+        self._known(DrivenLink(link, on, len(self.inputs) - 1))
+        return link
+
+    def sliding(self, on: str) -> str:
+        """Add a link that an input slides along a line of another, or whose line slides."""
+        start = self.where(self.spot(on)) + polar(self.length(), self.direction())
+        name = self.name('C')
+        if self.rng.random() < 0.3:
+            # The line is on the new link: it slides through a block that is part of the known one.
+            through = self.name('Q')
+            line = polar(1.0, self.direction())
+            link = self.link('rod', {through: start - line * self.length()}, axis=self.axis(on))
+            self.put(on, name, start)
+            self._drive_slide(line, link, through, name, on)
+        else:
+            line = polar(1.0, self.direction())
+            link = self.link('slide', {name: start}, axis=self.axis(on))
+            through = self.name('Q')
+            self.put(on, through, start - line * self.length() * self.rng.choice((1, -1)))
+            self._drive_slide(line, on, through, name, link)
+        self._known(DrivenLink(link, on, len(self.inputs) - 1))
+        return link
+
+    def _drive_turn(self, parent: str, child: str) -> None:
+        if self.rng.random() < 0.3:
+            parent, child = child, parent
+        self.inputs.append(Input(self.name('in'), parent, child))
+        value = phase(self.axis(child) * self.axis(parent).conjugate())
+        self._start.append(value)
+        self._step.append(0.3)
+
+    def _drive_slide(
+        self, line: complex, along: str, through: str, point: str, block: str
+    ) -> None:
+        # A block against a line that looks the other way is a slide below 0.
+        line *= self.rng.choice((1, -1))
+        name = self.slide(line, along, through, point, block)
+        self.inputs.append(Input(self.name('in'), slider=name))
+        between = self.where(Spot(block, point)) - self.where(Spot(along, through))
+        self._start.append((between * line.conjugate()).real)
+        self._step.append(0.3 * abs(between))
+        self._joints[name] = name
+
+    def dyad(self, kind: str, known: str, other: str) -> list[str]:
+        """Add a random dyad between two links, the first one for the pin, or the rail's pin."""
+        if kind == 'PRP':
+            return add_prp(self, known, other)
+        pin = self.spot(known)
+        if kind == 'RRP':
+            return add_rrp(self, pin, other)
+        if kind == 'RPP':
+            return add_rpp(self, pin, other)
+        end = self.spot(other)
+        return (add_rrr if kind == 'RRR' else add_rpr)(self, pin, end)
+
+    def driven_dyad(self, known: str, other: str, count: int = 1) -> list[str]:
+        """Add two bodies pinned together, with inputs between the links of one or of both."""
+        ends = self.spot(known), self.spot(other)
+        places = [self.where(end) for end in ends]
+        where = places[0] + polar(self.length(), self.direction())
+        pin = self.name('B')
+        arms: list[tuple[str, ...]] = []
+        driven = (0, 1) if count == 2 else (self.rng.choice((0, 1)),)
+        for k, (end, place) in enumerate(zip(ends, places, strict=True)):
+            if k in driven:
+                arms.append(self._driven_arm(end, place, pin, where))
+            else:
+                arms.append((self.link('link', {end.point: place, pin: where}),))
+        self._name_side(ends, (arms[0][-1], arms[1][-1]), pin)
+        self._known(DrivenRRR((arms[0], arms[1]), ends, pin))
+        return [link for arm in arms for link in arm]
+
+    def _driven_arm(self, end: Spot, start: complex, pin: str, where: complex) -> tuple[str, str]:
+        if self.rng.random() < 0.5:
+            elbow = start + polar(self.length(), self.direction())
+            joint = self.name('E')
+            one = self.link('upper', {end.point: start, joint: elbow})
+            other = self.link('lower', {joint: elbow, pin: where})
+            self._drive_turn(one, other)
+            return one, other
+        line = polar(1.0, self.direction())
+        if self.rng.random() < 0.5:
+            line = (where - start) / abs(where - start)
+        barrel = self.link('barrel', {end.point: start}, axis=line)
+        through = self.name('Q')
+        self.put(barrel, through, where - line * self.length())
+        rod = self.link('rod', {pin: where}, axis=line)
+        self._drive_slide(line, barrel, through, pin, rod)
+        return barrel, rod
+
+    def platform(self, knowns: list[str], legs: list[str]) -> list[str]:
+        """
+        Add a link on three legs, each to a known link: three links or more that no dyad covers.
+
+        A leg is a link with two pins ('RR'), a slot in which a pin of the platform runs ('PR'), or
+        a link with a pin on which the platform slides as a block ('RP').
+        """
+        centre = self.where(self.spot(knowns[0])) + polar(self.length(), self.direction())
+        corners = [centre + polar(self.length(), self.direction()) for _ in legs]
+        names = [self.name('T') for _ in legs]
+        platform = self.link('platform', dict(zip(names, corners, strict=True)))
+        new = [platform]
+        for known, leg, name, corner in zip(knowns, legs, names, corners, strict=True):
+            if leg == 'PR':
+                line = polar(1.0, self.direction())
+                through = self.name('Q')
+                self.put(known, through, corner - line * self.length())
+                self._joints[slide] = (slide := self.slide(line, known, through, name, None))
+            elif leg == 'RP':
+                end, line = self.spot(known), polar(1.0, self.direction())
+                rail = self.link('rail', {end.point: self.where(end)}, axis=line)
+                through = self.name('Q')
+                self.put(rail, through, corner - line * self.length())
+                self._joints[slide] = (slide := self.slide(line, rail, through, name, platform))
+                new.append(rail)
+            else:
+                end = self.spot(known)
+                new.append(self.link('leg', {end.point: self.where(end), name: corner}))
+            self._pose_points[name] = corner
+        for link in new:
+            for point in self._links[link]:
+                self._pose_points[point] = self.where(Spot(link, point))
+            self._rank[link] = len(self._rank)
+        self._groups.append(None)  # type: ignore[arg-type]  # no dyad
+        return new
+
+    def topology(self) -> Topology:
+        """Return what has been built; every angle to the ground and every slide is published."""
+        moving = [link for link in self._links if link != GROUND]
+        joints: dict[str, RevoluteJoint | SlideJoint] = {
+            f'a_{link}': RevoluteJoint(GROUND, link) for link in moving
+        }
+        if len(moving) > 1:
+            one, other = self.rng.sample(moving, 2)
+            joints['between'] = RevoluteJoint(one, other)
+        joints |= {f's_{name}': SlideJoint(name) for name in self._sliders}
+        iterated = None in self._groups
+        points = {name: (z.real, z.imag) for name, z in self._pose_points.items()}
+        pose = Pose(tuple(self._start), points)
+        told = iterated or len(self.inputs) > 1 or self.rng.random() < 0.5
+        return Topology(
+            Linkage(
+                {link: dict(points) for link, points in self._links.items()},
+                tuple(self.inputs),
+                dict(self._assembly),
+                joints,
+                {
+                    name: Slider(
+                        slide.point,
+                        slide.along,
+                        slide.through,
+                        slide.direction,
+                        slide.block or '',
+                        slide.angle,
+                    )
+                    for name, slide in self._sliders.items()
+                },
+                pose=pose if told else None,
+            ),
+            None if iterated else tuple(self._groups),
+            dict(self._sides),
+            tuple(self._start),
+            {
+                link: (phase(self._frames[link][1]), *_parts(self._frames[link][0]))
+                for link in moving
+            },
+            tuple(self._step),
+        )
+
+
+def _parts(z: complex) -> tuple[float, float]:
+    return z.real, z.imag

@@ -1,0 +1,169 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The limits of a linkage's joints: which states are beyond them.
+
+An input is compared as it is sent, an angle with all its turns. A published angle is compared in
+that of its turns which lies nearest to the middle of its limits, since it is the same pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import inf, pi, remainder, tau
+from typing import NamedTuple, TYPE_CHECKING
+
+from linkage_ros.kinematics.linkage import Limits, Linkage, RevoluteJoint
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
+from linkage_ros.kinematics.status import Status
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.batch.arrays import Array, Mask
+    from linkage_ros.kinematics.closure import Position
+
+_UNDISTURBED = (Status.CLOSED, Status.CHANGE_POINT)
+"""What a state beyond the limits would be without them; a toggle stays one, without rates."""
+
+_ROUNDINGS = 4.0
+"""A value may be beyond by as many roundings: the sum of two typed numbers is within."""
+
+
+class Bound(NamedTuple):
+    """
+    The limits of one joint, ready to be compared with.
+
+    Attributes
+    ----------
+    name
+        Of the joint.
+    number
+        Its number among the inputs, or among the published joints.
+    low, high
+        In [rad] or [m], widened by rounding.
+    middle
+        About which a published angle is taken, in [rad]; None where turns count.
+
+    """
+
+    name: str
+    number: int
+    low: float
+    high: float
+    middle: float | None
+
+    def beyond(self, value: float) -> bool:
+        """Return whether a value of the joint is beyond the limits."""
+        if self.low <= value <= self.high:
+            return False
+        if self.middle is None:
+            return True
+        return not self.low <= self.turned(value) <= self.high
+
+    def turned(self, value: float) -> float:
+        """Return a value in that of its turns in which it is compared."""
+        if self.middle is None:
+            return value
+        return value - tau * round((value - self.middle) / tau)
+
+    def margin(self, value: float) -> float:
+        """Return how far within the limits a value is, negative beyond them; continuous."""
+        if self.middle is None:
+            return min(value - self.low, self.high - value)
+        return self.high - self.middle - abs(remainder(value - self.middle, tau))
+
+
+class Bounds:
+    """
+    All limits of a linkage between which its joints stay.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+
+    Attributes
+    ----------
+    inputs, joints
+        Of driven joints, and of published ones.
+
+    """
+
+    def __init__(self, linkage: Linkage) -> None:
+        limits = {name: of for name, of in linkage.limits.items() if of.bounded}
+        driven = [given.joint for given in linkage.inputs]
+        self.inputs = tuple(
+            _bound(name, number, limits[name])
+            for number, name in enumerate(driven)
+            if name in limits
+        )
+        self.joints = tuple(
+            _bound(name, number, limits[name], turning=isinstance(joint, RevoluteJoint))
+            for number, (name, joint) in enumerate(linkage.joints.items())
+            if name in limits and name not in driven
+        )
+
+    def __bool__(self) -> bool:
+        """Whether there are any."""
+        return bool(self.inputs or self.joints)
+
+    def exceeded(self, inputs: Sequence[float], joints: Sequence[float]) -> Bound | None:
+        """Return the first limits that a state is beyond, none where it is within all."""
+        for bound in self.inputs:
+            if bound.beyond(inputs[bound.number]):
+                return bound
+        for bound in self.joints:
+            if bound.beyond(joints[bound.number]):
+                return bound
+        return None
+
+    def beyond(self, inputs: Sequence[Array], joints: Array) -> Mask:
+        """Return of many states which are beyond; arrays (N,) of inputs and (joints, N)."""
+        import numpy as np  # local import: the batch alone needs it
+
+        found = np.zeros(joints.shape[1], bool)
+        for bound in self.inputs:
+            value = inputs[bound.number]
+            found |= ~((bound.low <= value) & (value <= bound.high))
+        for bound in self.joints:
+            value = joints[bound.number]
+            within = (bound.low <= value) & (value <= bound.high)
+            if bound.middle is not None:
+                value = value - tau * np.rint((value - bound.middle) / tau)
+                within |= (bound.low <= value) & (value <= bound.high)
+            found |= ~within
+        return found
+
+
+def limited(position: Callable[..., Position], bounds: Bounds) -> Callable[..., Position]:
+    """Return what closes the loops, and says of a pose that it is beyond the limits."""
+    exceeded = bounds.exceeded
+
+    def close(*inputs: float) -> Position:
+        found = position(*inputs)
+        if found[0] in _UNDISTURBED and exceeded(inputs, found[2]) is not None:
+            return found._replace(status=Status.LIMITED)
+        return found
+
+    return close
+
+
+def _bound(name: str, number: int, limits: Limits, *, turning: bool = False) -> Bound:
+    low, high = limits.low, limits.high
+    slack = _ROUNDINGS * UNIT_ROUNDOFF * max(abs(end) for end in (low, high) if abs(end) < inf)
+    if not turning:
+        return Bound(name, number, low - slack, high + slack, None)
+    slack += _ROUNDINGS * UNIT_ROUNDOFF * pi
+    return Bound(name, number, low - slack, high + slack, 0.5 * (low + high))

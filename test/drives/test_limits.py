@@ -1,0 +1,220 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Drives and the limits of joints: what would leave them is refused, and a torque is stopped."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from linkage_ros.drives.profile import curve, extent, ProfileParameters
+from linkage_ros.errors import FileError
+from linkage_ros.joint_effort import EffortCommand
+from linkage_ros.kinematics.status import Status
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import parse_scene
+import pytest
+
+MS = 1_000_000
+BEGIN = 1_700_000_000 * 1_000 * MS
+OWN = ', input: {limits: [0.5, 1.5]}'
+PUBLISHED = ', joints: {rocker_joint: {limits: [1.5, 2]}}'
+MASSES = """
+links:
+  ground: {O2: [0, 0], O4: [0.05, 0]}
+  crank: {O2: [0, 0], A: [0.1, 0]}
+  coupler: {A: [0, 0], B: [0.07, 0]}
+  rocker: {O4: [0, 0], B: [0.06, 0]}
+input: {joint: crank_joint, parent: ground, child: crankLIMITS}
+assembly: {B: left}
+joints: {rocker_joint: {parent: ground, child: rockerROCKER}}
+masses:
+  crank: {mass: 0.1, center: [0.05, 0], inertia: 1e-4}
+  coupler: {mass: 0.1, center: [0.035, 0], inertia: 1e-4}
+  rocker: {mass: 0.1, center: [0.03, 0], inertia: 1e-4}
+"""
+
+
+def four_bar(limits):
+    return f'four_bar: {{a: 0.04, b: 0.12, c: 0.08, d: 0.1{limits}}}'
+
+
+def pipeline(drive, linkage):
+    scene = f'linkage: linkage.yaml\ndrive: {{{drive}}}'
+    files = {'scene.yaml': scene.encode(), 'linkage.yaml': linkage.encode()}
+    return Pipeline(parse_scene('s', 's', files))
+
+
+CHIRP = 'chirp: {amplitude: 0.6, mean: 1, start_frequency: 0.01, end_frequency: 0.02, seconds: 5}'
+
+# Drive and limits; what is said, '' where it is run.
+DRIVES = {
+    'at rest': ('constant_rate: {rate: 0, start: 1}', OWN, ''),
+    'on and on': (
+        'constant_rate: {rate: 0.1, start: 1}',
+        OWN,
+        "drive.constant_rate: takes 'crank_joint' from 1 to inf, beyond its limits [0.5, 1.5];",
+    ),
+    'at rest beyond': ('constant_rate: {rate: 0, start: 2}', OWN, "'crank_joint' from 2 to 2, be"),
+    'a sine to the limits': ('sine: {amplitude: 0.5, mean: 1, frequency: 1}', OWN, ''),
+    'a sine to limits in tenths': (
+        'sine: {amplitude: 0.35, mean: 0.45, frequency: 1}',
+        ', input: {limits: [0.1, 0.8]}',
+        '',
+    ),
+    'a sine beyond': (
+        'sine: {amplitude: 0.51, mean: 1, frequency: 1}',
+        OWN,
+        "drive.sine: takes 'crank_joint' from 0.49 to 1.51, beyond its limits [0.5, 1.5]",
+    ),
+    'a chirp beyond': (
+        'chirp: {amplitude: 0.6, mean: 1, start_frequency: 1, end_frequency: 2, seconds: 3}',
+        OWN,
+        "takes 'crank_joint' from 0.4 to 1.6",
+    ),
+    'a chirp that ends on its way up': (
+        CHIRP,
+        OWN,
+        '',
+    ),
+    'the same, there and back': (
+        f'{CHIRP[:-1]}, repeat: true}}',
+        OWN,
+        "takes 'crank_joint' from 0.4 to 1.6",
+    ),
+    'rows within': ('profile: {table: [[0, 1], [1, 1.5]], interpolation: linear}', OWN, ''),
+    'a spline that swings beyond its rows': (
+        'profile: {table: [[0, 1], [1, 1.5], [2, 1.49], [3, 1]]}',
+        OWN,
+        "drive.profile: takes 'crank_joint' from 1 to 1.61884, beyond its limits [0.5, 1.5]",
+    ),
+    'rows that gain': (
+        'profile: {table: [[0, 1], [1, 1.2]], interpolation: linear, repeat: true}',
+        OWN,
+        "takes 'crank_joint' from 1 to inf",
+    ),
+    'a joint that follows': (
+        'constant_rate: {rate: 1, start: 2}',
+        PUBLISHED,
+        "takes 'crank_joint' from 2 to inf, beyond 2.79718, where 'rocker_joint' is at its limit",
+    ),
+    'a joint within': ('sine: {amplitude: 0.4, mean: 2.2, frequency: 1}', PUBLISHED, ''),
+    'a start where a joint is beyond': (
+        'sine: {amplitude: 0.1, mean: 1, frequency: 1}',
+        PUBLISHED,
+        'starts at 1, beyond limits: rocker_joint at 1.11226, limits [1.5, 2]; start within them',
+    ),
+    'no limits': ('constant_rate: {rate: 1}', '', ''),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', DRIVES)
+def test_what_is_refused_when_the_scene_is_built(name):
+    drive, limits, expected = DRIVES[name]
+    if not expected:
+        built = pipeline(drive, four_bar(limits))
+        for number in range(4000):
+            (look,) = built.tick(BEGIN + number * MS).looks
+            assert look.position.status is Status.CLOSED
+        return
+    with pytest.raises(FileError) as error:
+        pipeline(drive, four_bar(limits))
+    assert expected in str(error.value)
+    assert '\n' not in str(error.value)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    values=st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=6),
+    interpolation=st.sampled_from(['linear', 'cubic', 'minimum_jerk']),
+    repeat=st.booleans(),
+)
+def test_between_which_values_a_table_stays(values, interpolation, repeat):
+    table = tuple((float(2 * i), value) for i, value in enumerate(values))
+    parameters = ProfileParameters(table, interpolation, repeat)
+    low, high = extent(parameters)
+    seen = [curve(parameters)(time * 5 * MS)[0] for time in range(400 * (len(values) - 1) + 1)]
+    if not repeat or values[0] == values[-1]:
+        assert low == pytest.approx(min(seen), abs=1e-4)
+        assert high == pytest.approx(max(seen), abs=1e-4)
+    assert low - 1e-12 <= min(seen)
+    assert max(seen) <= high + 1e-12
+
+
+def test_one_input_of_several_is_named():
+    linkage = """
+links:
+  ground: {A: [0, 0], E: [0.3, 0]}
+  left: {A: [0, 0], B: [0.2, 0]}
+  left_rod: {B: [0, 0], C: [0.25, 0]}
+  right_rod: {C: [0, 0], D: [0.25, 0]}
+  right: {E: [0, 0], D: [0.2, 0]}
+input:
+- {joint: left_joint, parent: ground, child: left, limits: [1, 2]}
+- {joint: right_joint, parent: ground, child: right}
+assembly: {C: right}
+joints: {rod_joint: {parent: left, child: left_rod}}
+"""
+    drive = 'sine: {amplitude: 0.2, mean: 1.5, frequency: 1, inputs: {left_joint: SAID}}'
+    fine = '{amplitude: 0.5, mean: 1.5, frequency: 1}'
+    assert pipeline(drive.replace('SAID', fine), linkage)
+    with pytest.raises(FileError, match=r"drive\.sine\.inputs\.left_joint: takes 'left_"):
+        pipeline(drive.replace('SAID', fine.replace('0.5', '0.6')), linkage)
+
+
+def pushed(limits, effort, rocker='', seconds=3.0, start=1.0, **more):
+    """Return the linkage at work, and where a constant effort has brought the crank to."""
+    said = ''.join(f', {key}: {value}' for key, value in more.items())
+    built = pipeline(
+        f'torque: {{start: {start}, timeout: 100{said}}}',
+        MASSES.replace('LIMITS', limits).replace('ROCKER', rocker),
+    )
+    (line,) = built.lines
+    line.drive.state(BEGIN)
+    assert line.drive.offer(EffortCommand(0, effort), BEGIN) is None
+    (value,) = line.drive.state(BEGIN + round(seconds * 1000) * MS).angles
+    return line, value
+
+
+@pytest.mark.parametrize(('effort', 'stop'), [(0.5, 1.5), (-0.5, 0.5)])
+def test_a_limit_is_a_stop_itself(effort, stop):
+    """Toggles have a margin, since nothing can be pushed there; limits need none."""
+    _, value = pushed(', limits: [0.5, 1.5]', effort, stop_margin=0.1)
+    assert value == stop
+
+
+def test_a_toggle_beside_a_limit_keeps_its_margin():
+    line, low = pushed(', limits: [0.5, 3]', -0.5, stop_margin=0.1)
+    (one,) = line.closure.input_ranges
+    _, high = pushed(', limits: [0.5, 3]', 0.5, stop_margin=0.1)
+    assert low == 0.5
+    assert high == pytest.approx(one.highest - 0.1 * (one.highest - one.lowest), abs=1e-9)
+
+
+def test_a_limit_of_a_published_joint_stops_it_too():
+    free, _ = pushed('', 0.0)
+    low, high = sorted(free.closure.position(value).joints[-1] for value in (1.2, 1.4))
+    line, value = pushed('', 0.5, f', limits: [{low!r}, {high!r}]', start=1.3)
+    assert value == pytest.approx(1.4, abs=1e-9)
+    assert line.closure.position(value).status is Status.CLOSED
+
+
+def test_an_effort_beyond_the_limit_is_cut_to_it_and_counted():
+    least, most = pushed(', effort: 0.01', 0.01, seconds=0.05), pushed('', 0.01, seconds=0.05)
+    cut = pushed(', effort: 0.01', 5.0, seconds=0.05)
+    assert cut[1] == least[1] == most[1]
+    assert [line.drive.saturated for line, _ in (least, most, cut)] == [0, 0, 1]
+    down = pushed(', effort: 0.01', -5.0, seconds=0.05)
+    assert down[1] == pushed('', -0.01, seconds=0.05)[1]

@@ -1,0 +1,222 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Limits in linkage files: what may be said, what is refused, and that it is written again."""
+
+from __future__ import annotations
+
+from math import inf
+
+from linkage_ros.errors import FileError
+from linkage_ros.kinematics.linkage import Limits
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_text import linkage_text
+from linkage_ros.scene.load import parse_scene
+from linkage_ros.scene.yaml_file import parse_yaml
+import pytest
+
+from .files import is_one_line
+
+SHORT = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, SAID}'
+LONG = """
+links:
+  ground: {O2: [0, 0], O4: [0.1, 0]}
+  crank: {O2: [0, 0], A: [0.04, 0]}
+  coupler: {A: [0, 0], B: [0.12, 0]}
+  rocker: {O4: [0, 0], B: [0.08, 0]}
+input: {joint: crank_joint, parent: ground, child: crankINPUT}
+assembly: {B: left}
+joints:
+  coupler_joint: {parent: crank, child: couplerCOUPLER}
+  rocker_joint: {parent: ground, child: rockerROCKER}
+"""
+
+
+def read(text):
+    return read_linkage(parse_yaml(text.encode(), 'f.yaml'))
+
+
+def long(driven='', rocker='', coupler='', more=''):
+    text = LONG.replace('INPUT', driven).replace('ROCKER', rocker).replace('COUPLER', coupler)
+    return text + more
+
+
+SAID = {
+    'all': (', limits: [0.5, 1.5], velocity: 2, effort: 3.5', Limits(0.5, 1.5, 2.0, 3.5)),
+    'a range alone': (', limits: [0.5, 1.5]', Limits(0.5, 1.5)),
+    'no range': (', velocity: 2', Limits(velocity=2.0)),
+    'none below': (', limits: [-.inf, 1.5]', Limits(high=1.5)),
+    'none above': (', limits: [0.5, .inf]', Limits(low=0.5)),
+    'none at all': (', limits: [-.inf, .inf]', Limits()),
+}
+
+
+@pytest.mark.parametrize('name', SAID)
+def test_what_an_input_may_say(name):
+    said, limits = SAID[name]
+    linkage = read(long(said))
+    assert linkage.inputs[0].limits == limits
+    assert read(linkage_text(linkage)) == linkage
+    assert read(SHORT.replace('SAID', f'input: {{{said[2:]}}}')) == linkage
+
+
+def test_what_a_published_joint_may_say():
+    said = 'limits: [1, 2.1], velocity: 4, effort: 5'
+    linkage = read(long(rocker=f', {said}'))
+    assert linkage.joints['rocker_joint'].limits == Limits(1.0, 2.1, 4.0, 5.0)
+    assert linkage.limits == {'rocker_joint': Limits(1.0, 2.1, 4.0, 5.0)}
+    assert read(linkage_text(linkage)) == linkage
+    assert read(SHORT.replace('SAID', f'joints: {{rocker_joint: {{{said}}}}}')) == linkage
+
+
+def test_where_nothing_is_said_there_are_none():
+    linkage = read(long())
+    assert linkage.limits == {}
+    assert linkage.inputs[0].limits == Limits(-inf, inf, inf, inf)
+    assert 'limits' not in linkage_text(linkage)
+
+
+START = 'pose: {inputs: [1.0]}\n'
+# What the input, the rocker and the coupler say, and what stands behind; the error and its remedy.
+REFUSED = {
+    'one number': ([', limits: 3'], ':7: input.limits: 3 is not two numbers; write [low, high]'),
+    'three': ([', limits: [1, 2, 3]'], ':7: input.limits: [1, 2, 3] is not two numbers; write'),
+    'a text': ([', limits: wide'], ":7: input.limits: 'wide' is not two numbers; write"),
+    'a list of texts': ([', limits: [a, b]'], ":7: input.limits: ['a', 'b'] is not two numbers;"),
+    'not a number': ([', limits: [.nan, 1]'], ':7: input.limits: [nan, 1] is not two numbers;'),
+    'crossing': (
+        [', limits: [2, 1]'],
+        ":7: input.limits: [2, 1] of 'crank_joint' cross; write [low, high], the lower one first",
+    ),
+    'equal': ([', limits: [1, 1]'], ":7: input.limits: [1, 1] of 'crank_joint' are the same numb"),
+    'both infinite above': (
+        [', limits: [.inf, .inf]'],
+        ":7: input.limits: [inf, inf] of 'crank_joint' are no limits; write [low, high]; -.inf or",
+    ),
+    'beyond machines': ([', limits: [0, 1e12]'], ':7: input.limits: [0, 1000000000000.0] is out'),
+    'no rate': (
+        [', velocity: 0'],
+        ':7: input.velocity: 0 is out of bounds; write a finite number',
+    ),
+    'negative rate': (
+        [', velocity: -1'],
+        ':7: input.velocity: -1 is out of bounds; write a finit',
+    ),
+    'negative effort': ([', effort: -1'], ':7: input.effort: -1 is out of bounds; write a finite'),
+    'misspelt': ([', limit: [0, 1]'], ":7: input.limit: unknown key; did you mean 'limits'?"),
+    'a published angle on one side': (
+        ['', ', limits: [1, .inf]'],
+        ':11: joints.rocker_joint.limits: [1, inf] limits the angle on one side, and angles come',
+    ),
+    'a published joint, crossing': (
+        ['', ', limits: [2, 1]'],
+        ":11: joints.rocker_joint.limits: [2, 1] of 'rocker_joint' cross; write",
+    ),
+    'the start is beyond': (
+        [', limits: [1.5, 2]', '', '', START],
+        ":12: pose.inputs: 1 is beyond the limits [1.5, 2] of 'crank_joint'; start within",
+    ),
+    'the start brings a joint beyond': (
+        ['', ', limits: [1.5, 2]', '', START],
+        ":12: pose.inputs: bring 'rocker_joint' to 1.11226, beyond its limits [1.5, 2]; start",
+    ),
+    'never met by a joint': (
+        ['', ', limits: [0.1, 0.2]'],
+        " [0.1, 0.2] of 'rocker_joint' are never met: it goes from 0.958196 to 2.24593; widen",
+    ),
+    'never met by a joint while the input is within its own': (
+        [', limits: [2, 2.5]', ', limits: [1, 1.2]'],
+        ":11: joints.rocker_joint.limits: [1, 1.2] of 'rocker_joint' are never met: it goes from",
+    ),
+    'never met together': (
+        ['', ', limits: [0.95, 1]', ', limits: [-2, -1.9]'],
+        ":9: joints: the limits of 'coupler_joint', 'rocker_joint' are met, but never together",
+    ),
+}
+
+
+@pytest.mark.parametrize('name', REFUSED)
+def test_refused(name):
+    said, expected = REFUSED[name]
+    with pytest.raises(FileError) as error:
+        read(long(*said))
+    assert expected in str(error.value)
+    assert is_one_line(error.value)
+
+
+def test_limits_that_the_range_never_meets():
+    text = 'four_bar: {a: 0.1, b: 0.07, c: 0.06, d: 0.05, input: {limits: [2.5, 3]}}'
+    with pytest.raises(FileError) as error:
+        read(text)
+    assert str(error.value) == (
+        "f.yaml:1: four_bar.input.limits: [2.5, 3] of 'crank_joint' never meet its range, "
+        '-2.0264 to 2.0264 rad; widen them'
+    )
+
+
+def test_limits_of_several_inputs_that_nothing_meets():
+    """The sides stand so that the pin between the two bars is out of reach."""
+    text = """
+links:
+  ground: {A: [0, 0], E: [0.3, 0]}
+  left: {A: [0, 0], B: [0.2, 0]}
+  left_rod: {B: [0, 0], C: [0.25, 0]}
+  right_rod: {C: [0, 0], D: [0.25, 0]}
+  right: {E: [0, 0], D: [0.2, 0]}
+input:
+- {joint: left_joint, parent: ground, child: left, limits: [3.0, 3.3]}
+- {joint: right_joint, parent: ground, child: right, limits: [-0.1, 0.1]}
+assembly: {C: right}
+joints: {rod_joint: {parent: left, child: left_rod}}
+"""
+    with pytest.raises(FileError) as error:
+        read(text)
+    assert "no state was found within the limits of 'left_joint', 'right_joint'" in str(
+        error.value
+    )
+    assert is_one_line(error.value)
+
+
+def scene(said, linkage):
+    files = {'scene.yaml': f'linkage: linkage.yaml\n{said}'.encode(), 'linkage.yaml': linkage}
+    return parse_scene('s', 's', files)
+
+
+LIMITED = SHORT.replace('SAID', 'input: {limits: [0, 1]}').encode()
+
+
+def test_what_is_published_beyond_them_is_a_choice():
+    assert not scene('', LIMITED).members[0].silent_beyond_limits
+    assert not scene('beyond_limits: publish', LIMITED).members[0].silent_beyond_limits
+    assert scene('beyond_limits: silent', LIMITED).members[0].silent_beyond_limits
+
+
+SCENES = {
+    'another word': ('beyond_limits: stop', LIMITED, "'stop' is none; write publish or silent"),
+    'no limits': (
+        'beyond_limits: silent',
+        SHORT.replace(', SAID', '').encode(),
+        ':2: beyond_limits: no joint of the linkage has limits; leave it out, or write limits:',
+    ),
+}
+
+
+@pytest.mark.parametrize('name', SCENES)
+def test_refused_in_a_scene(name):
+    said, linkage, expected = SCENES[name]
+    with pytest.raises(FileError) as error:
+        scene(said, linkage)
+    assert expected in str(error.value)
+    assert is_one_line(error.value)
