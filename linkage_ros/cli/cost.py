@@ -13,18 +13,24 @@
 # limitations under the License.
 
 
-"""Say what each effect of a scene costs on this machine, and what leaving it out would save."""
+"""Say what effects, drives and faults cost on this machine, and what leaving them out saves."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from math import tau
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from threading import Event
 
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cli.tables import show, Table
-from linkage_ros.cost.measure import EffectCost, measure, SceneCost, Times
+from linkage_ros.cost.measure import compare, EffectCost, measure, SceneCost, Times
 from linkage_ros.effects.stage import NEEDS
 from linkage_ros.errors import LinkageError
+from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.scene.load import LINKAGE_FILE, load_scene, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
 from linkage_ros.shipped import shipped
@@ -60,13 +66,40 @@ effects:
 """
 """A scene with every effect, each for one joint, pin or link, on the four-bar that is shipped."""
 
+_BAG = 'samples'
+"""Name of the bag of the drive that takes its samples from one."""
+
+EVERY_DRIVE = {
+    'topic': '{}',
+    'constant_rate': '{rate: 6.2832}',
+    'profile': '{table: [[0, 0], [1, 2], [1.5, 2], [2.5, 0.5]], repeat: true}',
+    'sine': '{mean: 1.0, amplitude: 0.5, frequency: 1.0}',
+    'chirp': '{mean: 1.0, amplitude: 0.5, start_frequency: 0.5, end_frequency: 4.0, '
+    'seconds: 4.0, repeat: true}',
+    'bag': f'{{file: {_BAG}, repeat: true}}',
+    'torque': '{start: 1.0, rate: 6.2832}',
+}
+"""Every drive with its parameters, moving the four-bar that is shipped."""
+
+EVERY_FAULT = {
+    'time_jump': '{by: 1.0}',
+    'not_a_number': '{}',
+    'broken_link': '{link: coupler}',
+    'stuck': '{joint: rocker_joint}',
+    'freeze': '{}',
+    'silence': '{}',
+}
+"""Every fault with its parameters, on the four-bar that is shipped."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     one = parser.add_mutually_exclusive_group(required=True)
     one.add_argument('scene', nargs='?', help='the scene file, or a linkage file')
     one.add_argument(
-        '--all', action='store_true', help='every effect, alone, on the four-bar that is shipped'
+        '--all',
+        action='store_true',
+        help='every effect, drive and fault, alone, on the four-bar that is shipped',
     )
     parser.add_argument(
         '--ticks',
@@ -97,15 +130,53 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 def all_effects(ticks: int, stopped: Callable[[], bool] = lambda: False) -> Table | None:
-    """Measure every effect, alone, on the four-bar; return nothing where it was stopped."""
+    """Measure all there is, alone, on the four-bar; return nothing where it was stopped."""
     cost = measure(every_effect(), ticks, leave_out=False, stopped=stopped)
-    return table_of_all(cost, ticks) if cost else None
+    if cost is None:
+        return None
+    with TemporaryDirectory() as folder:
+        _record_samples(Path(folder) / _BAG)
+        bare = _of_four_bar(_with_drive('topic'))
+        drives = {name: _of_four_bar(_with_drive(name), folder) for name in EVERY_DRIVE}
+        del drives['topic']
+        faults = {name: _of_four_bar(_with_fault(name)) for name in EVERY_FAULT}
+        found = compare(bare, {**drives, **faults}, ticks, stopped=stopped)
+    if found is None:
+        return None
+    return table_of_all(
+        cost, ticks, {name: found[name] for name in drives}, {name: found[name] for name in faults}
+    )
 
 
 def every_effect() -> Scene:
     """Return the scene of all effects."""
+    return _of_four_bar(EVERY_EFFECT.decode())
+
+
+def _of_four_bar(text: str, folder: str = '') -> Scene:
     linkage = shipped('linkages/four_bar.yaml').read_bytes()
-    return parse_scene(ALL, ALL, {SCENE_FILE: EVERY_EFFECT, LINKAGE_FILE: linkage})
+    return parse_scene(ALL, ALL, {SCENE_FILE: text.encode(), LINKAGE_FILE: linkage}, folder)
+
+
+def _with_drive(name: str) -> str:
+    """Return a scene of one drive; all publish the input, as those do that are no topic."""
+    return f'linkage: four_bar.yaml\npublish_input: true\ndrive: {{{name}: {EVERY_DRIVE[name]}}}\n'
+
+
+def _with_fault(name: str) -> str:
+    """Return the scene that others are compared with, and a fault that nobody injects."""
+    return f'{_with_drive("topic")}faults: {{one: {{{name}: {EVERY_FAULT[name]}}}}}\n'
+
+
+def _record_samples(folder: Path) -> None:
+    """Record a turn of the crank, a hundred samples a second, for the drive that plays a bag."""
+    writer = BagWriter(folder, [Topic('/crank', 'sensor_msgs/msg/JointState', '', '')])
+    write = JointStateWriter(['crank_joint']).write
+    for number in range(100):
+        stamp = number * 10_000_000 + 1
+        sample = write(stamp, [tau * number / 100], [tau])
+        writer.write(0, stamp, stamp, sample)
+    writer.close()
 
 
 def table_of_scene(title: str, cost: SceneCost, ticks: int) -> Table:
@@ -133,8 +204,24 @@ def table_of_scene(title: str, cost: SceneCost, ticks: int) -> Table:
     )
 
 
-def table_of_all(cost: SceneCost, ticks: int) -> Table:
-    """Return the table of all effects, each alone beside the bare scene."""
+def table_of_all(
+    cost: SceneCost, ticks: int, drives: Mapping[str, Times], faults: Mapping[str, Times]
+) -> Table:
+    """
+    Return the table of all effects, drives and faults, each alone beside the bare scene.
+
+    Parameters
+    ----------
+    cost
+        Of the scene of all effects.
+    ticks
+        Of each variant.
+    drives
+        What each takes beyond the topic drive.
+    faults
+        What each takes while nobody injects it.
+
+    """
     rows = [
         (
             effect.name,
@@ -144,9 +231,14 @@ def table_of_all(cost: SceneCost, ticks: int) -> Table:
         )
         for effect in cost.effects
     ]
+    for found, beside in ((drives, 'in the place of topic'), (faults, 'not injected')):
+        rows += [
+            (name, *_adds(times), f'{times.median / cost.bare.median:+.2f}', beside)
+            for name, times in found.items()
+        ]
     bare = f'{cost.bare.median:.2f}', f'{cost.bare.p99:.2f}', '1.00'
     return Table(
-        f'Every effect, alone, on the four-bar: {ticks} ticks each',
+        f'Every effect, drive and fault, alone, on the four-bar: {ticks} ticks each',
         ('', '>median [µs]', '>p99 [µs]', '>in bare ticks', 'with'),
         [('a tick without effects', *bare, ''), *rows],
     )

@@ -23,7 +23,7 @@ times and crank messages: what disturbs the machine disturbs them alike.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from random import Random
@@ -31,8 +31,9 @@ from statistics import median, quantiles
 from typing import NamedTuple
 
 from linkage_ros.cost.feed import feed
-from linkage_ros.cost.variants import FAULTS, Names, Variant, Variants
+from linkage_ros.cost.variants import faults_of, Names, Variant, Variants
 from linkage_ros.effects.stage import bringing, EFFECTS, in_order, LOADED
+from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 
 _BLOCK = 100
@@ -72,7 +73,7 @@ class EffectCost:
     Attributes
     ----------
     name
-        Of the effect, or `FAULTS`.
+        Of the effect; of a fault, which nobody injects, one of `faults_of`.
     adds
         What it, and what it starts from, add to the scene without effects; nothing where it
         cannot be measured alone.
@@ -151,18 +152,21 @@ def measure(
 
     """
     named = Names(name for member in scene.members for name in member.effects)
-    named |= {FAULTS} if scene.faults else set()
+    faults = faults_of(scene)
+    named |= faults
     variants = Variants(scene)
     bare, whole = variants.build(Names()), variants.build(named)
-    effects_of = in_order({*EFFECTS, *named} - {FAULTS})
-    computed = [n for n in (*effects_of, FAULTS) if n in named or bringing(n, named)]
+    effects_of = in_order({*EFFECTS, *named} - faults)
+    computed = [n for n in effects_of if n in named or bringing(n, named)]
+    computed += sorted(faults)
     added = {name: _added(name, named, variants) for name in computed}
     without = {
         name: _left_out(name, named, variants)
         for name in computed
         if leave_out and not bringing(name, named)
     }
-    if not _run(variants, ticks, stopped):
+    built = list(variants.built.values())
+    if not _run([(feed(scene, built[0].pipeline), built)], ticks, stopped):
         return None
 
     effects = []
@@ -210,19 +214,66 @@ def _left_out(name: str, named: Names, variants: Variants) -> tuple[Variant | No
     return None, ''
 
 
-def _run(variants: Variants, ticks: int, stopped: Callable[[], bool]) -> bool:
-    """Let all variants tick; return whether nobody stopped it."""
-    contenders = list(variants.built.values())
-    times = feed(variants.scene, contenders[0].pipeline)
+def compare(
+    bare: Scene,
+    others: Mapping[str, Scene],
+    ticks: int,
+    *,
+    stopped: Callable[[], bool] = lambda: False,
+) -> dict[str, Times] | None:
+    """
+    Measure by how much the ticks of scenes differ from those of a bare one.
+
+    Parameters
+    ----------
+    bare
+        The scene to compare with.
+    others
+        Scenes that differ from it in one thing each, by a name for each; of the same rate.
+    ticks, stopped
+        As for `measure`.
+
+    Returns
+    -------
+    differences
+        By the names of the others; None where it was stopped.
+
+    """
+    variants = {name: Variant(Pipeline(scene)) for name, scene in others.items()}
+    first = Variant(Pipeline(bare))
+    each = [(feed(bare, first.pipeline), [first])]
+    each += [(feed(others[name], one.pipeline), [one]) for name, one in variants.items()]
+    if not _run(each, ticks, stopped):
+        return None
+    return {name: _difference(one.ticks, first.ticks) for name, one in variants.items()}
+
+
+def _run(
+    fed: Sequence[tuple[Iterator[tuple[int, bytes]], Sequence[Variant]]],
+    ticks: int,
+    stopped: Callable[[], bool],
+) -> bool:
+    """
+    Let variants tick in turn; return whether nobody stopped it.
+
+    Parameters
+    ----------
+    fed
+        Times with crank messages, and the variants that tick by them.
+    ticks, stopped
+        As for `measure`.
+
+    """
+    contenders = [(number, one) for number, (_, ones) in enumerate(fed) for one in ones]
     shuffle = Random(0).shuffle
     for number, size in enumerate((_WARM_UP, *_blocks(ticks))):
         if stopped():
             return False
-        nows, messages = zip(*[next(times) for _ in range(size)], strict=True)
+        blocks = [tuple(zip(*[next(times) for _ in range(size)], strict=True)) for times, _ in fed]
         # Who runs first, or behind a slow one, finds the caches cold: nobody always does.
         shuffle(contenders)
-        for contender in contenders:
-            contender.run(nows, messages)
+        for by, contender in contenders:
+            contender.run(*blocks[by])
             if number == 0:
                 contender.forget()
     return True

@@ -27,10 +27,15 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.scene import Member, Scene
 
-FAULTS = 'faults'
-"""What stands in the place of an effect for all faults of a scene, while none is injected."""
+_FAULT = 'fault '
+"""With the name of a fault, what stands in the place of an effect for it: it is not injected."""
 
 Names = frozenset[str]
+
+
+def faults_of(scene: Scene) -> Names:
+    """Return the faults of a scene, as they stand among the names of effects."""
+    return Names(f'{_FAULT}{name}' for name in scene.faults)
 
 
 class Variant:
@@ -43,10 +48,14 @@ class Variant:
         self.published = 0
 
     def run(self, nows: Sequence[int], messages: Sequence[bytes]) -> None:
-        """Tick at these times, in [ns], each after its message."""
+        """Tick at these times, in [ns], each after its message, as the node does."""
         offer, tick, clock = self.pipeline.offer, self.pipeline.tick, perf_counter_ns
+        injection = self.pipeline.injection
         for now, message in zip(nows, messages, strict=True):
             begin = clock()
+            if injection is not None:
+                injection.advance(now)
+                now = injection.clock(now)  # noqa: PLW2901 (the time by which the tick goes)
             if message:
                 offer(message, now)
                 self.offers.append(clock() - begin)
@@ -80,7 +89,12 @@ class Variants:
         scene = replace(
             self.scene,
             members=tuple(_with(member, named) for member in self.scene.members),
-            faults=self.scene.faults if FAULTS in named else {},
+            faults={
+                # Nobody injects it, nor does a timeline.
+                name: replace(fault, at=(), seconds=0.0)
+                for name, fault in self.scene.faults.items()
+                if f'{_FAULT}{name}' in named
+            },
             record=None,
         )
         # To solve a linkage for the first time may take a second where it is iterated.

@@ -81,6 +81,21 @@ class CrankState(NamedTuple):
     age: int
 
 
+class CrankBehindPlay(CrankState):
+    """
+    The crank at a tick, behind the play between it and its motor.
+
+    Attributes
+    ----------
+    free_motors
+        For each input the acceleration of its motor, in [rad/s²] or [m/s²], where the motor moves
+        within the play and pushes nothing; None where it pushes the crank.
+
+    """
+
+    free_motors: tuple[float | None, ...] = ()
+
+
 class Drive(Protocol):
     """A drive at work; it remembers, and a reset builds it again."""
 

@@ -46,6 +46,9 @@ from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velo
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.tuples import new
 
+_ROUNDING = 1e-9
+"""A slip below this part of the rates that it comes from is none."""
+
 
 class Terms(NamedTuple):
     """
@@ -63,6 +66,9 @@ class Terms(NamedTuple):
         C; the force on q is −C·q̇.
     coulomb
         F; the force on q is −F·sign(q̇), and anything up to F either way where q stands.
+    slips
+        T·ψ' of each joint with Coulomb friction, so that F is the sum of their sizes; 0 where ψ'
+        is 0 but for rounding. Empty where no joint has such friction.
 
     """
 
@@ -71,6 +77,7 @@ class Terms(NamedTuple):
     potential_slope: float
     viscous: float
     coulomb: float
+    slips: tuple[float, ...] = ()
 
 
 class Rubbing(NamedTuple):
@@ -164,6 +171,7 @@ class Mechanics:
         gravity = self._gravity
         slope = -(gravity.real * momentum.real + gravity.imag * momentum.imag)
         viscous = coulomb = 0.0
+        slips: tuple[float, ...] = ()
         for stiffness, free_length, damping, start, end in self._springs:
             length, growth = stretched(places, velocities, start, end)
             slope += stiffness * (length - free_length) * growth
@@ -172,9 +180,11 @@ class Mechanics:
             slip = factor * (v[one] - v[other])
             viscous += drag * slip * slip
             coulomb += limit * abs(slip)
+            if limit:
+                slips += (0.0 if _stands(v, one, other) else limit * slip,)
         if not (isfinite(inertia) and isfinite(half_slope)):
             return None
-        return new(Terms, (inertia, half_slope, slope, viscous, coulomb))
+        return new(Terms, (inertia, half_slope, slope, viscous, coulomb, slips))
 
     def potential(self, position: Position) -> float:
         """Return V at a closed position, in [J]; weight is 0 at the height of the origin."""
@@ -287,10 +297,21 @@ class Mechanics:
 
 
 def resistance(rubbing: Rubbing, v: list[float]) -> float:
-    """Return what a joint resists its motion with, in [N·m] or [N], of the sign of its rate."""
+    """
+    Return what a joint resists its motion with, in [N·m] or [N], of the sign of its rate.
+
+    Coulomb friction is 0 in a joint that stands, rounding apart.
+    """
     _, viscous, coulomb, one, other, factor = rubbing
     slip = factor * (v[one] - v[other])
-    return viscous * slip + (copysign(coulomb, slip) if slip else 0.0)
+    dry = copysign(coulomb, slip) if coulomb and not _stands(v, one, other) else 0.0
+    return viscous * slip + dry
+
+
+def _stands(v: list[float], one: int, other: int) -> bool:
+    """Return whether the difference of two rates is 0 but for rounding."""
+    rates = abs(v[one]) + abs(v[other]) + abs(v[1])
+    return abs(v[one] - v[other]) <= _ROUNDING * rates
 
 
 def stretched(

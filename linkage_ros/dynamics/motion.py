@@ -26,6 +26,12 @@ found at which it is zero: the mechanism stands there, until |τ − V'| exceeds
 the other way at once. For one freedom this is Coulomb's law itself, with no rate below which the
 friction would be rounded off. Where there is no friction nothing is looked for.
 
+F(q) = Σ T·|ψ'(q)| has a kink where the slip ψ' of a joint turns, as in the pin of a rocker at
+either end of its swing. A step across it is of order 2, whatever the method. So within a step the
+signs of the slips too are those at its start; where one has turned at its end, the instant is
+found and the step is cut there. Both pieces are smooth, and the order is that of the method
+(`test/dynamics/test_kinks.py`). Where no joint has Coulomb friction nothing is looked for.
+
 A stop is hard: the instant is found at which it is met, the rate becomes −e·q̇, and the rest of
 the step goes on from there. A mechanism that is pushed against a stop rests at it.
 
@@ -62,6 +68,9 @@ Into how many pieces a step may fall, at stops, where it sticks, and where it is
 Then it rests: bounces that are so many within one step come to their end.
 """
 
+_KINKS = 20
+"""How many times a step is cut where slips turn; what comes then is integrated as it is."""
+
 _SHORTEST = 0.5**30
 """Share of a step, below which a piece of it is none."""
 
@@ -92,6 +101,7 @@ class _Event(Enum):
     LOW = 'lower stop'
     HIGH = 'upper stop'
     TURN = 'rate zero'
+    KINK = 'slip zero'
 
 
 class OneFreedom:
@@ -156,12 +166,14 @@ class OneFreedom:
 
         """
         left = seconds
-        for _ in range(_PIECES):
+        pieces = kinks = 0
+        while pieces < _PIECES:
             sense = self._sense(motion, force, brake)
             if sense == 0.0:
                 return motion
             sticks = motion.terms.coulomb + brake > 0.0
-            reach = self._reach(motion, force, sense * brake, sense)
+            slips = motion.terms.slips if kinks < _KINKS else ()
+            reach = self._reach(motion, force, sense * brake, sense, slips)
             length = left
             reached = reach(length)
             while reached is None:
@@ -171,14 +183,18 @@ class OneFreedom:
                 reached = reach(length)
             event = None
             # At the last state before one thing another may have happened already.
-            while (found := self._event(reached, sense, sticks)) is not None:
-                margin = self._margin(found, sense)
+            while (found := self._event(reached, sense, sticks, slips)) is not None:
+                margin = self._margin(found, sense, slips)
                 length, last, known = last_before(reach, margin, motion, length, reached)
                 reached, event = last, found if known else None
             motion = reached
+            if event is _Event.KINK:
+                kinks += 1
+            else:
+                pieces += 1
             if event is _Event.TURN:
                 motion = _at_rest(motion)
-            elif event is not None:
+            elif event in (_Event.LOW, _Event.HIGH):
                 motion = self._stopped(motion, event)
             left -= length
             if left <= seconds * NARROW:
@@ -187,18 +203,23 @@ class OneFreedom:
 
     def _sense(self, motion: Motion, force: float, brake: float) -> float:
         """Return which way it moves, 1 or -1, or 0 where it stays."""
-        value, rate, (_, _, slope, _, coulomb) = motion
+        value, rate, terms = motion
         if rate:
             return copysign(1.0, rate)
-        push = force - slope
+        push = force - terms.potential_slope
         low, high = self._stops
-        held = abs(push) <= coulomb + brake
+        held = abs(push) <= terms.coulomb + brake
         if held or (value >= high and push > 0.0) or (value <= low and push < 0.0):
             return 0.0
         return copysign(1.0, push)
 
     def _reach(
-        self, motion: Motion, force: float, braking: float, sense: float
+        self,
+        motion: Motion,
+        force: float,
+        braking: float,
+        sense: float,
+        slips: tuple[float, ...],
     ) -> Callable[[float], Motion | None]:
         """Return what gives the state after some seconds of one step."""
         value, rate, here = motion
@@ -211,7 +232,9 @@ class OneFreedom:
             found = terms(q)
             if found is None or found[0] < _LEAST:
                 return None
-            return _acceleration(found, w, force, braking, sense)
+            return _acceleration(
+                found, w, force, braking, sense, _turned(found, slips) if slips else 0.0
+            )
 
         def reach(seconds: float) -> Motion | None:
             found = step(field, value, rate, start, seconds)
@@ -227,24 +250,36 @@ class OneFreedom:
             return None
         return new(Motion, (value, rate, terms))
 
-    def _event(self, motion: Motion, sense: float, sticks: bool) -> _Event | None:
+    def _event(
+        self, motion: Motion, sense: float, sticks: bool, slips: tuple[float, ...]
+    ) -> _Event | None:
         """Return what has happened on the way to a state."""
-        value, rate, _ = motion
+        value, rate, terms = motion
         low, high = self._stops
         if sticks and sense * rate < 0.0:
             return _Event.TURN
         if value > high:
             return _Event.HIGH
-        return _Event.LOW if value < low else None
+        if value < low:
+            return _Event.LOW
+        return _Event.KINK if slips and _turned(terms, slips) else None
 
-    def _margin(self, event: _Event, sense: float) -> Callable[[Motion], float]:
+    def _margin(
+        self, event: _Event, sense: float, slips: tuple[float, ...]
+    ) -> Callable[[Motion], float]:
         """Return what says how far a state is from an event."""
         low, high = self._stops
         if event is _Event.TURN:
             return lambda motion: sense * motion.rate
         if event is _Event.HIGH:
             return lambda motion: high - motion.value
-        return lambda motion: motion.value - low
+        if event is _Event.LOW:
+            return lambda motion: motion.value - low
+        return lambda motion: min(
+            copysign(1.0, before) * now
+            for before, now in zip(slips, motion.terms.slips, strict=True)
+            if before
+        )
 
     def _stopped(self, motion: Motion, event: _Event) -> Motion:
         """Return the state behind an impact."""
@@ -262,10 +297,25 @@ def _at_rest(motion: Motion) -> Motion:
     return new(Motion, (motion.value, 0.0, motion.terms))
 
 
-def _acceleration(terms: Terms, rate: float, force: float, braking: float, sense: float) -> float:
-    """Return q̈ of the equation of motion, friction and brake against ``sense``; 0 where it is."""
+def _turned(terms: Terms, before: tuple[float, ...]) -> float:
+    """Return the Coulomb friction of the joints whose slip has turned since, in [N·m] or [N]."""
+    turned = 0.0
+    for slip, earlier in zip(terms.slips, before, strict=True):
+        if slip * earlier < 0.0:
+            turned += abs(slip)
+    return turned
+
+
+def _acceleration(
+    terms: Terms, rate: float, force: float, braking: float, sense: float, turned: float = 0.0
+) -> float:
+    """
+    Return q̈ of the equation of motion, friction and brake against ``sense``; 0 where it is.
+
+    The friction ``turned`` of some joints counts the other way, as it would go on without a kink.
+    """
     if sense == 0.0:
         return 0.0
-    inertia, half_slope, slope, viscous, coulomb = terms
-    resisted = viscous * rate + coulomb * sense + braking
+    inertia, half_slope, slope, viscous, coulomb, _ = terms
+    resisted = viscous * rate + (coulomb - 2.0 * turned) * sense + braking
     return (force - slope - resisted - half_slope * rate * rate) / inertia

@@ -27,6 +27,14 @@ Where the motor touches an end and its rate pushes on, the crank has the motor's
 acceleration; else it rests. It does not fly ahead of a motor that slows down: that would take its
 inertia. At the first tick it stands in the middle of the play.
 
+A crank that rests is held by friction, which bears the weight of the links, the springs, and what
+other inputs do to it. Its motor then moves alone, and `effort` is what the motor's own inertia
+takes (see `CrankBehindPlay`). Where the motor pushes, it bears all of it. Without play, a play of
+0, it always pushes.
+
+Under the torque drive a scene with backlash is refused: motor and crank would be two masses there,
+which meet and part, and the equation of motion knows one.
+
 The model depends on the path and not on the speed, so what happens between two ticks is lost: a
 motor that turns back and forth between them has moved nothing. A turning motor may come wrapped:
 between two ticks it turns by less than half a turn.
@@ -38,7 +46,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi, tau
 
-from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.drives.drive import Context, CrankBehindPlay, CrankState
 from linkage_ros.effects.stage import DriveStage
 from linkage_ros.parameters import each, Number, number
 from linkage_ros.tuples import new
@@ -75,18 +83,26 @@ def drive_stage(parameters: BacklashParameters, context: Context) -> DriveStage:
 
         def backlash(motor: CrankState) -> CrankState:
             (angle,), (rate,), (acceleration,), age = motor
-            angle, rate, acceleration = follow(angle, rate, acceleration)
-            return new(CrankState, ((angle,), (rate,), (acceleration,), age))
+            angle, rate, acceleration, free = follow(angle, rate, acceleration)
+            crank = new(CrankBehindPlay, ((angle,), (rate,), (acceleration,), age))
+            crank.free_motors = (free,)
+            return crank
 
         return backlash
 
     def backlash_of_all(motor: CrankState) -> CrankState:
-        *motion, age = motor
-        moved = [
-            play.follow(*values)
-            for play, values in zip(plays, zip(*motion, strict=True), strict=True)
-        ]
-        return new(CrankState, (*zip(*moved, strict=True), age))
+        angles, rates, accelerations, free_motors = zip(
+            *[
+                play.follow(*of_one)
+                for play, *of_one in zip(
+                    plays, motor.angles, motor.rates, motor.accelerations, strict=True
+                )
+            ],
+            strict=True,
+        )
+        crank = new(CrankBehindPlay, (angles, rates, accelerations, motor.age))
+        crank.free_motors = free_motors
+        return crank
 
     return backlash_of_all
 
@@ -112,14 +128,23 @@ class Play:
         self._crank: float | None = None
         self._motor = 0.0
 
-    def follow(self, motor: float, rate: float, acceleration: float) -> tuple[float, float, float]:
+    def follow(
+        self, motor: float, rate: float, acceleration: float
+    ) -> tuple[float, float, float, float | None]:
         """
-        Return position, rate and acceleration of the crank.
+        Return position, rate and acceleration of the crank, and the motor's where that is free.
 
         Parameters
         ----------
         motor, rate, acceleration
             Of the motor, in [rad] or [m], by [s] and [s²].
+
+        Returns
+        -------
+        crank, rate, acceleration
+            Of the crank.
+        free
+            The motor's acceleration where it moves alone; None where it pushes the crank.
 
         """
         crank = self._crank
@@ -130,7 +155,9 @@ class Play:
         low, high = motor - self._half, motor + self._half
         self._crank = crank = min(max(crank, low), high)
         self._motor = motor
-        pushed = (crank <= low and (rate > 0.0 or (rate == 0.0 and acceleration > 0.0))) or (
-            crank >= high and (rate < 0.0 or (rate == 0.0 and acceleration < 0.0))
+        pushed = (
+            (crank <= low and (rate > 0.0 or (rate == 0.0 and acceleration > 0.0)))
+            or (crank >= high and (rate < 0.0 or (rate == 0.0 and acceleration < 0.0)))
+            or not self._half
         )
-        return (crank, rate, acceleration) if pushed else (crank, 0.0, 0.0)
+        return (crank, rate, acceleration, None) if pushed else (crank, 0.0, 0.0, acceleration)

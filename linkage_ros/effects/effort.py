@@ -22,6 +22,9 @@ of it, and comes from the drive; a topic does not say it, and then it counts as 
 drive the effort is the one that makes the motion, which where the linkage sticks or lies against a
 stop is not the one commanded.
 
+Behind backlash a motor that moves within the play pushes nothing. Friction holds the crank, and
+what that drive must give is for its own inertia alone: drive_inertia·φ̈, φ̈ of the motor.
+
 At a toggle no rates exist, and no effort.
 """
 
@@ -30,7 +33,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite
 
-from linkage_ros.drives.drive import Context
+from linkage_ros.drives.drive import Context, CrankBehindPlay
 from linkage_ros.effects.stage import Motion, Stage
 from linkage_ros.tuples import new
 
@@ -57,4 +60,24 @@ def stage(_parameters: EffortParameters, context: Context) -> Stage:
             return motion
         return new(Motion, (crank, position, velocity, acceleration, efforts, reactions, shift))
 
-    return effort
+    return _behind_play(effort, context) if 'backlash' in context.effects else effort
+
+
+def _behind_play(effort: Stage, context: Context) -> Stage:
+    """Return the stage for drives with play: one that moves within it bears its own inertia."""
+    inertia = context.mechanics.loads.drive_inertia
+
+    def effort_behind_play(motion: Motion) -> Motion:
+        borne = effort(motion)
+        crank = motion.crank
+        # An effect of one's own between the two may have made another crank, without play.
+        if not borne.efforts or not isinstance(crank, CrankBehindPlay) or not crank.free_motors:
+            return borne
+        return borne._replace(
+            efforts=tuple(
+                of_all if free is None else inertia * free
+                for of_all, free in zip(borne.efforts, crank.free_motors, strict=True)
+            )
+        )
+
+    return effort_behind_play

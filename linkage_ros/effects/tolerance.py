@@ -20,9 +20,16 @@ Each link is a part of its own, with holes of its own: of a pin's two holes, one
 deviates by itself, in both coordinates, and so do the pivots of the ground. What matters of a link
 with two pins is its length, which deviates by √2 of the deviation of a coordinate.
 
-A deviation is normal and cut off at three standard deviations, so that ±t on a drawing is a
-standard deviation of t/3: limits that hold 99.73 % of a normal distribution (JCGM 100:2008, Guide
-to the expression of uncertainty in measurement, 4.3.9); the parts beyond them are not delivered.
+A deviation is normal, and what lies beyond three standard deviations is not delivered: it is drawn
+again. The standard deviation is that of what is delivered, so that ±t on a drawing, which no part
+exceeds, is a standard deviation of t/3. What is cut off takes from a standard deviation; so the
+normal distribution that is cut is wider than the one that is left by a factor w, with c = 3/w::
+
+    w²·(1 − 2·c·φ(c)/(2·Φ(c) − 1)) = 1        w = 1.01539
+
+(N. L. Johnson, S. Kotz and N. Balakrishnan, Continuous Univariate Distributions, vol. 1, 2nd ed.,
+1994, ch. 13, 10.1). For three standard deviations as the limits of a drawing see JCGM 100:2008,
+Guide to the expression of uncertainty in measurement, 4.3.
 
 All coordinates are drawn, link by link and point by point in the order of the linkage file, x
 before y, and then scaled. So neither the deviation nor the choice of links changes what the others
@@ -44,6 +51,9 @@ from linkage_ros.parameters import each, names, number, Point
 TRUNCATED = 3.0
 """A deviation is at most this many standard deviations."""
 
+BEFORE = 1.0153869850528114
+"""w: standard deviation before cutting off, where that of what is left is 1."""
+
 _KEY = 'effects.tolerance'
 _FARTHEST = 1e9
 
@@ -53,7 +63,8 @@ class ToleranceParameters:
     """Points of links, pivots among them, that lie beside where the linkage file has them."""
 
     standard_deviation: float = number(
-        'of each coordinate of each point, drawn from the seed and cut off at three times it',
+        'of each coordinate of each point as made, drawn from the seed; none is off by more than '
+        'three times it',
         0.0,
         unit='m',
         least=0.0,
@@ -96,9 +107,9 @@ def alter(parameters: ToleranceParameters, linkage: Linkage, random: Random) -> 
 
 
 def _normal(random: Random) -> float:
-    """Draw from the normal distribution that is cut off."""
+    """Draw a deviation of standard deviation 1 from the normal distribution that is cut off."""
     while True:
-        value = random.gauss(0.0, 1.0)
+        value = random.gauss(0.0, BEFORE)
         if abs(value) <= TRUNCATED:
             return value
 

@@ -283,6 +283,12 @@ def _member(
         raise effects.error(
             'effort', 'is that of the input joint', 'set publish_input: true, or name pin_forces'
         )
+    if drive == 'torque' and 'backlash' in effects:
+        raise effects.error(
+            'backlash',
+            'needs a model of motor and crank as two masses, and torque moves them as one',
+            'leave backlash out, or name another drive than torque',
+        )
     parts = parts_of(linkage)
     types = _effects(effects)
     member = Member(

@@ -46,6 +46,13 @@ from linkage_ros.solvers.registry import SOLVERS
 
 _RATE = 'Ticks a second [Hz]; 0: one for every crank sample.'
 _ONE_SOLVER: Schema = {'not': {'required': ['solver', 'accuracy']}}
+_NO_PLAY_UNDER_TORQUE: Schema = {
+    'if': {
+        'required': ['drive'],
+        'properties': {'drive': {'required': ['torque']}},
+    },
+    'then': {'properties': {'effects': {'properties': {'backlash': False}}}},
+}
 _OWN_EFFECT: Schema = {
     'description': "An effect of one's own: a module that Python finds, and its parameters.",
     'type': 'object',
@@ -106,7 +113,7 @@ def scene_schema() -> Schema:
         **whole,
         'if': {'required': ['linkages']},
         'then': {'properties': {'linkage': False}},
-        'else': {'required': ['linkage']},
+        'else': {'required': ['linkage'], **_NO_PLAY_UNDER_TORQUE},
         **_ONE_SOLVER,
         '$defs': _of_a_linkage(),
     }
@@ -125,7 +132,7 @@ def _linkages(own: Mapping[str, Schema]) -> Schema:
         },
         required=('name', 'linkage'),
     )
-    one |= _ONE_SOLVER
+    one |= _ONE_SOLVER | _NO_PLAY_UNDER_TORQUE
     return {
         'description': 'Several linkages in the place of one.',
         'if': {'type': 'array'},

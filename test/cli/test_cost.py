@@ -19,15 +19,20 @@ from __future__ import annotations
 
 import argparse
 from importlib.util import module_from_spec, spec_from_file_location
+from itertools import islice
 from pathlib import Path
 from threading import Event
 
 from linkage_ros.cli import cost as command
 from linkage_ros.cli.tables import Table
+from linkage_ros.cost.feed import feed
 from linkage_ros.cost.measure import _difference, _times, EffectCost, measure, SceneCost, Times
-from linkage_ros.cost.variants import Variants
+from linkage_ros.cost.variants import Variant, Variants
+from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import LinkageError
+from linkage_ros.faults.fault import FAULTS
+from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest
 
@@ -45,6 +50,13 @@ SPEC = spec_from_file_location('make_cost', ROOT / 'docs' / 'make_cost.py')
 make_cost = module_from_spec(SPEC)
 SPEC.loader.exec_module(make_cost)
 BEGIN, END = make_cost.BEGIN, make_cost.END
+EVERYTHING = [
+    'a tick without effects',
+    *EFFECTS,
+    *(drive for drive in DRIVES if drive != 'topic'),
+    *FAULTS,
+]
+"""The rows of the table of all: the bare tick is one by the topic drive."""
 
 
 def scene_of(folder: Path, text: str):
@@ -87,19 +99,31 @@ def test_what_is_brought_in_cannot_be_left_out(tmp_path):
     found = effects_of(measure(scene, FEW))
     assert list(found) == [
         'velocity', 'acceleration', 'friction', 'effort', 'pin_forces', 'clearance', 'bias',
-        'faults',
+        'fault f',
     ]  # fmt: skip
     assert found['velocity'].needed_by == ('effort', 'clearance')
     assert found['acceleration'].needed_by == ('effort', 'clearance')
     assert found['pin_forces'].needed_by == ('clearance',)
     for name in ('velocity', 'acceleration', 'pin_forces'):
         assert found[name].saves is None
-    for name in ('friction', 'effort', 'clearance', 'bias', 'faults'):
+    for name in ('friction', 'effort', 'clearance', 'bias', 'fault f'):
         assert found[name].needed_by == ()
         assert found[name].saves is not None
     # Friction alone acts on nothing.
     assert found['friction'].beside == 'effort'
     assert all(effect.beside == '' for name, effect in found.items() if name != 'friction')
+
+
+def test_each_fault_has_its_price(tmp_path):
+    scene = scene_of(
+        tmp_path,
+        f'linkage: {FOUR_BAR}\nfaults: {{quiet: {{silence: {{}}}}, hung: {{freeze: {{}}}}}}\n',
+    )
+    found = effects_of(measure(scene, FEW))
+    assert list(found) == ['fault hung', 'fault quiet']
+    assert all(fault.adds is not None and fault.saves is not None for fault in found.values())
+    alone = Variants(scene).build(frozenset({'fault hung'}))
+    assert list(alone.pipeline.injection.faults) == ['hung']
 
 
 def test_what_acts_on_nothing_then_is_left_out_too(tmp_path):
@@ -132,7 +156,7 @@ def test_a_variant_consists_of_what_it_is_asked_for(tmp_path):
     assert stages('delay', 'bias') == ('velocity', 'bias', 'delay')
     assert stages('velocity') == ('velocity',)
     assert stages('effort') == ('velocity', 'acceleration', 'effort')
-    assert variants.build(frozenset({'faults'})).pipeline.injection is not None
+    assert variants.build(frozenset({'fault f'})).pipeline.injection is not None
     assert variants.build(frozenset({'bias'})).pipeline.injection is None
     # One that has been built is not built again.
     assert variants.build(frozenset({'bias'})) is variants.build(frozenset({'bias'}))
@@ -204,21 +228,61 @@ def test_the_table_of_a_scene():
 
 
 def test_the_table_of_all_effects():
-    assert list(command.table_of_all(COST, 100).rows) == [
+    drives = {'constant_rate': Times(-1.0, -1.5, -1.0, -1.0)}
+    faults = {'freeze': Times(0.5, 0.25, 0.5, 0.5)}
+    assert list(command.table_of_all(COST, 100, drives, faults).rows) == [
         ('a tick without effects', '4.00', '6.00', '1.00', ''),
         ('velocity', '+2.00', '+2.50', '+0.50', ''),
         ('friction', '-0.50', '+1.00', '-0.12', 'effort'),
         ('effort', '+4.50', '+5.00', '+1.12', 'velocity, acceleration'),
         ('bias', '', '', '', ''),
+        ('constant_rate', '-1.00', '-1.50', '-0.25', 'in the place of topic'),
+        ('freeze', '+0.50', '+0.25', '+0.12', 'not injected'),
     ]
 
 
 def test_all_means_all():
     (member,) = command.every_effect().members
     assert list(member.effects) == list(EFFECTS)
+    assert list(command.EVERY_DRIVE) == list(DRIVES)
+    assert list(command.EVERY_FAULT) == list(FAULTS)
     table = command.all_effects(FEW)
-    assert [row[0] for row in table.rows] == ['a tick without effects', *EFFECTS]
+    assert [row[0] for row in table.rows] == EVERYTHING
     assert all(row[1] for row in table.rows)
+
+
+@pytest.mark.parametrize('name', command.EVERY_DRIVE)
+def test_every_drive_that_is_priced_moves_the_linkage_at_every_tick(tmp_path, name):
+    command._record_samples(tmp_path / 'samples')
+    scene = command._of_four_bar(command._with_drive(name), str(tmp_path))
+    ticked = Variant(Pipeline(scene))
+    times = feed(scene, ticked.pipeline)
+    ticked.run(*zip(*[next(times) for _ in range(2500)], strict=True))
+    assert ticked.published == 2500
+    # A drive that stands would be too cheap.
+    seen = set()
+    for now, message in islice(times, 400):
+        ticked.pipeline.offer(message, now)
+        seen.add(ticked.pipeline.tick(now).message[-24:])
+    assert len(seen) > 300
+
+
+def test_a_fault_is_priced_with_its_clock_and_never_injected(tmp_path):
+    scene = scene_of(
+        tmp_path,
+        f'linkage: {FOUR_BAR}\ndrive: {{sine: {{amplitude: 1, frequency: 1}}}}\nfaults:\n'
+        '  quiet: {silence: {}, at: [0.01], seconds: 1}\n'
+        '  clock: {time_jump: {by: 1.0}, at: [0.01], seconds: 1}\n',
+    )
+    ticked = Variants(scene).build(frozenset({'fault quiet', 'fault clock'}))
+    times = feed(scene, ticked.pipeline)
+    ticked.run(*zip(*[next(times) for _ in range(50)], strict=True))
+    assert ticked.published == 50
+    assert set(ticked.pipeline.injection.injected.values()) == {0}
+    # The switches are looked at in every tick, as in the node: asked for, a fault begins.
+    ticked.pipeline.injection.ask('quiet', on=True)
+    ticked.run(*zip(*[next(times) for _ in range(50)], strict=True))
+    assert ticked.published == 50
 
 
 def test_the_page_has_every_effect():
@@ -226,7 +290,7 @@ def test_the_page_has_every_effect():
     _, _, rest = page.partition(BEGIN)
     table, _, _ = rest.partition(END)
     rows = [line.split('|')[1].strip() for line in table.splitlines() if line.startswith('|')]
-    assert rows == ['', '---', 'a tick without effects', *EFFECTS]
+    assert rows == ['', '---', *EVERYTHING]
 
 
 def test_only_what_lies_between_the_marks_is_written():

@@ -97,6 +97,16 @@ def test_a_scene_is_a_scene_and_has_what_its_section_is_about(section):
         assert section.name in (member.drive[0], *member.effects)
 
 
+def test_the_page_says_what_each_is_held_against_and_where():
+    section = BY_NAME['What each is held against']
+    rows = [line.strip('| ').split(' | ') for line in section.text.splitlines() if line[:1] == '|']
+    assert [name for name, _, _ in rows[2:]] == [*DRIVES, *EFFECTS, *FAULTS]
+    for name, _, tests in rows[2:]:
+        files = re.findall(r'\]\(\.\./(test/\S+\.py)\)', tests)
+        texts = [(ROOT / file).read_text('utf-8') for file in files]
+        assert any(name in text for text in texts), f'no test of {name} among them'
+
+
 def test_every_drive_and_effect_has_a_scene_and_the_faults_have_one_together():
     assert [section.name for section in DRAWN] == [*DRIVES, *EFFECTS, 'Faults']
 

@@ -65,8 +65,9 @@ def test_two_and_a_half_turns_of_the_crank():
     mechanics = Mechanics(closure, Loads(springs=(SPRING,)))
 
     def slope(q, rate):
-        inertia, half_slope, potential_slope, _, _ = mechanics.terms(closure.position(q))
-        return rate, (MOMENT - potential_slope - half_slope * rate * rate) / inertia
+        terms = mechanics.terms(closure.position(q))
+        push = MOMENT - terms.potential_slope - terms.half_slope * rate * rate
+        return rate, push / terms.inertia
 
     q, rate, steps = START, 0.0, 3000
     h = DURATION / steps

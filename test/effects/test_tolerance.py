@@ -33,6 +33,7 @@ from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.load import parse_scene
 from linkage_ros.scene.read import parts_of, read_parameters
 from linkage_ros.scene.yaml_file import parse_yaml
+import mpmath
 import pytest
 
 GALLERY = sorted((Path(__file__).parents[2] / 'config' / 'linkages').glob('*.yaml'))
@@ -88,24 +89,46 @@ def test_without_a_deviation_the_linkage_is_the_drawn_one(file):
     assert made(ToleranceParameters(), drawn=drawn) == drawn
 
 
-def test_what_is_drawn_is_normal_and_cut_off_at_three_standard_deviations():
+def left_of(before):
+    """Return mean square, and mean fourth power, of a normal number that is cut off at 3."""
+    with mpmath.workdps(30):
+        end = 3 / mpmath.mpf(before)
+        whole = mpmath.quad(mpmath.npdf, [-end, 0, end])
+        return [
+            mpmath.quad(lambda x, k=k: (before * x) ** k * mpmath.npdf(x), [-end, 0, end]) / whole
+            for k in (2, 4)
+        ]
+
+
+def test_what_is_cut_off_has_the_standard_deviation_that_is_written():
+    square, _ = left_of(tolerance.BEFORE)
+    assert abs(square - 1) < 1e-15
+
+
+def test_what_comes_out_is_normal_within_three_times_its_standard_deviation():
     sigma = 1e-5
     values = sorted(
         value / sigma
-        for seed in range(1000)
+        for seed in range(5000)
         for pair in deviations(made(ToleranceParameters(sigma), str(seed))).values()
         for value in pair
     )
-    assert max(map(abs, values)) <= 3.0 + 1e-9
-    # Kolmogorov and Smirnov: beyond 1.95/√n in one of a thousand samples.
-    inside = erf(3.0 / sqrt(2.0))
     n = len(values)
-    assert n == 16_000
+    assert n == 80_000
+    assert 2.9 < max(map(abs, values)) <= 3.0 + 1e-9
+    # Kolmogorov and Smirnov: beyond 1.95/√n in one of a thousand samples.
+    wide = tolerance.BEFORE * sqrt(2.0)
+    inside = erf(3.0 / wide)
     distance = max(
-        abs(0.5 * (1.0 + erf(v / sqrt(2.0)) / inside) - (i + 0.5) / n)
-        for i, v in enumerate(values)
+        abs(0.5 * (1.0 + erf(v / wide) / inside) - (i + 0.5) / n) for i, v in enumerate(values)
     )
     assert distance < 1.95 / sqrt(n)
+    # The variance is the one that is written. Four times the standard deviation of its estimate is
+    # 0.018; cut off without more it would be 0.973.
+    _, fourth = left_of(tolerance.BEFORE)
+    error = 4.0 * sqrt((float(fourth) - 1.0) / n)
+    assert error < 0.02
+    assert sum(v * v for v in values) / n == pytest.approx(1.0, abs=error)
 
 
 def test_a_length_deviates_by_the_root_of_two():
@@ -114,8 +137,7 @@ def test_a_length_deviates_by_the_root_of_two():
     for seed in range(2000):
         coupler = made(ToleranceParameters(sigma), str(seed)).links['coupler']
         off.append(hypot(*(b - a for a, b in zip(*coupler.values(), strict=True))) - 0.12)
-    # Of the variance of a normal deviation, cut off at three, 0.97334 is left.
-    found = sum(value * value for value in off) / len(off) / (2.0 * 0.97334 * sigma**2)
+    found = sum(value * value for value in off) / len(off) / (2.0 * sigma**2)
     # The variance of a variance is below 2/n here; four times its root.
     assert found == pytest.approx(1.0, abs=4.0 * sqrt(2.0 / len(off)))
 

@@ -580,3 +580,16 @@ def test_every_shipped_scene_is_read_after_all():
     for path in SCENES:
         assert load_scene(path).members
     assert json.loads(as_text(scene_schema()))['title'] == 'Scene'
+
+
+def test_play_under_torque_is_refused_where_both_stand_in_one_place(valid):
+    play, torque = {'backlash': {'play': 0.1}}, {'torque': {}}
+    here = {'linkage': 'l', 'drive': torque, 'effects': play}
+    assert not valid('scene', here)
+    assert valid('scene', {**here, 'drive': {'sine': {'amplitude': 1, 'frequency': 1}}})
+    assert valid('scene', {**here, 'effects': {}})
+    one = {'name': 'a', **here}
+    assert not valid('scene', {'linkages': [one]})
+    # What the scene says for all, each linkage may say otherwise: the reader decides there.
+    other = {'name': 'a', 'linkage': 'l', 'effects': {}}
+    assert valid('scene', {'linkages': [other], 'drive': torque, 'effects': play})

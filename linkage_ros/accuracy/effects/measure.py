@@ -25,7 +25,7 @@ from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Tabl
 from linkage_ros.accuracy.spread import Spread
 from linkage_ros.cost.feed import feed
 from linkage_ros.cost.measure import EffectCost, measure, SceneCost, Times
-from linkage_ros.cost.variants import FAULTS, Names, Variants
+from linkage_ros.cost.variants import faults_of, Names, Variants
 from linkage_ros.scene.scene import Scene
 
 WHOLE = 'a tick of the scene'
@@ -52,7 +52,7 @@ def measure_effects(scene: Scene, quick: bool, told: Callable[[str, float], None
 
     """
     named = Names(name for member in scene.members for name in member.effects)
-    named |= {FAULTS} if scene.faults else set()
+    named |= faults_of(scene)
     if not named:
         return None
     told('effects', 0.0)
@@ -69,11 +69,11 @@ def measure_effects(scene: Scene, quick: bool, told: Callable[[str, float], None
     rows: list[tuple[str, Times | None, Departure | None, str]] = []
     for number, effect in enumerate(cost.effects, 1):
         found = None
-        if effect.adds is not None and effect.name != FAULTS:
+        if effect.adds is not None and effect.name not in faults_of(scene):
             found = departs(Names({effect.name, effect.beside} - {''}))
         rows.append((effect.name, effect.adds, found, _remark(effect)))
         told('effects', 0.6 + 0.4 * number / (len(cost.effects) + 1))
-    rows.append((WHOLE, cost.whole, departs(named - {FAULTS}), ''))
+    rows.append((WHOLE, cost.whole, departs(named - faults_of(scene)), ''))
     told('effects', 1.0)
     return Part(
         'effects',
