@@ -27,14 +27,12 @@ from collections.abc import Callable, Iterator, Sequence
 from math import ceil, floor, inf, remainder, tau
 from typing import TYPE_CHECKING
 
-from linkage_ros.kinematics.golden import golden
-from linkage_ros.kinematics.ranges import InputRange, last_inside, whole_turns
+from linkage_ros.kinematics.ranges import InputRange, last_inside, search, whole_turns
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure, Position
     from linkage_ros.kinematics.limits import Bound
 
-_SAMPLES = 720
 _SAME = 1e-9
 """What joints may differ by and be the same, in [rad] or of a length."""
 
@@ -179,7 +177,7 @@ def _searched(
     low, high = interval.lowest, interval.highest
     if interval.whole:
         high = low + tau * turns(closure, closure.position)
-    parts = list(parts_within(margin, within, low, high))
+    parts = list(search(within, low, high, margin=margin))
     if parts == [(low, high)]:
         yield interval
         return
@@ -208,43 +206,3 @@ def _by(closure: Closure, bounds: Sequence[Bound], end: float, inside: float) ->
                 return bound.name
     joints = closure.position(end).joints
     return min(bounds, key=lambda bound: bound.margin(joints[bound.number])).name
-
-
-def parts_within(
-    margin: Callable[[float], float], within: Callable[[float], bool], low: float, high: float
-) -> Iterator[tuple[float, float]]:
-    """
-    Yield the parts of an interval in which something holds.
-
-    Parameters
-    ----------
-    margin
-        By how much it holds at a value, negative where it does not; continuous.
-    within
-        Whether it holds.
-    low, high
-        The interval.
-
-    """
-    values = [low + (high - low) * i / _SAMPLES for i in range(_SAMPLES)] + [high]
-    margins = [margin(value) for value in values]
-    places = set(values)
-    for i in range(1, _SAMPLES):
-        before, here, after = margins[i - 1], margins[i], margins[i + 1]
-        # A valley or a summit that may reach to the other side of zero between two samples.
-        if 0.0 < here <= min(before, after):
-            places.add(golden(margin, values[i - 1], values[i + 1])[1])
-        elif 0.0 > here >= max(before, after):
-            places.add(golden(lambda x: -margin(x), values[i - 1], values[i + 1])[1])
-    begin = None
-    before = low
-    for value in sorted(places):
-        if within(value):
-            if begin is None:
-                begin = last_inside(within, value, before) if value > low else value
-        elif begin is not None:
-            yield begin, last_inside(within, before, value)
-            begin = None
-        before = value
-    if begin is not None:
-        yield begin, high

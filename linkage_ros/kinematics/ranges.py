@@ -23,12 +23,14 @@ narrowed down to neighbouring floats.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from math import acos, asin, ceil, inf, lcm, pi, sqrt, tau
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
+from linkage_ros.kinematics.golden import golden
 from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
 
 if TYPE_CHECKING:
@@ -36,6 +38,9 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure
 
 _SAMPLES = 720
+
+_POINT = 1e-9
+"""Of an interval: what is open over no more than this is a place without a pose, and no gap."""
 
 _CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, Turned)
 
@@ -127,7 +132,7 @@ def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:
         far = reach(closure)
         return tuple(
             InputRange(low, high, False, (low > -far, high < far))
-            for low, high in search(_closes(closure), -far, far, 4 * _SAMPLES)
+            for low, high in _searched(closure, -far, far, 4 * _SAMPLES)
         )
     intervals = [(-pi, pi)]
     exact = True
@@ -143,8 +148,7 @@ def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:
             exact = False
     if intervals and not exact:
         start, end = intervals[0][0], intervals[-1][1]
-        closes = _closes(closure)
-        intervals = [part for low, high in intervals for part in search(closes, low, high)]
+        intervals = [part for ends in intervals for part in _searched(closure, *ends, _SAMPLES)]
         ends_meet = end - start >= tau and len(intervals) > 1
         if ends_meet and intervals[0][0] == start and intervals[-1][1] == end:
             # One interval that runs through the end of the turn.
@@ -179,7 +183,7 @@ def _on_a_branch(closure: Closure, branch: Branch | None) -> Iterator[InputRange
     parts = [(low, high)]
     if behind:
         count = _SAMPLES * max(1, ceil((high - low) / tau)) if turning else 4 * _SAMPLES
-        parts = list(search(_closes(closure), low, high, count))
+        parts = _searched(closure, low, high, count)
         if turns and len(parts) > 1 and parts[0][0] == low and parts[-1][1] == high:
             # One interval that runs through the end of the turns.
             (_, end), *others, (begin, _) = parts
@@ -233,16 +237,38 @@ def reach(closure: Closure) -> float:
 
 
 def search(
-    closes: Callable[[float], bool], low: float, high: float, samples: int = _SAMPLES
+    closes: Callable[[float], bool],
+    low: float,
+    high: float,
+    samples: int = _SAMPLES,
+    margin: Callable[[float], float] | None = None,
 ) -> Iterator[tuple[float, float]]:
-    """Yield the parts of an interval in which loops close; what is between samples is missed."""
+    """
+    Yield the parts of an interval in which something holds, as that loops close.
+
+    Parameters
+    ----------
+    closes
+        Whether it holds at a value.
+    low, high
+        The interval.
+    samples
+        Where it is looked at.
+    margin
+        By how much it holds at a value, negative where it does not. Where that has a valley or a
+        summit between samples, it is looked at there, too; without it what is narrower than from
+        sample to sample is missed.
+
+    """
+    values = [low + (high - low) * i / samples for i in range(samples)] + [high]
+    if margin is not None:
+        values = sorted({*values, *_turning_points(margin, values)})
     begin = None
     before = low
-    for i in range(samples + 1):
-        value = low + (high - low) * i / samples
+    for value in values:
         if closes(value):
             if begin is None:
-                begin = last_inside(closes, value, before) if i else value
+                begin = last_inside(closes, value, before) if value > low else value
         elif begin is not None:
             yield begin, last_inside(closes, before, value)
             begin = None
@@ -251,9 +277,47 @@ def search(
         yield begin, high
 
 
-def _closes(closure: Closure) -> Callable[[float], bool]:
-    """Return whether the loops close at a value of the single input."""
-    return lambda value: closure.position(value).status.has_pose
+def _turning_points(margin: Callable[[float], float], values: Sequence[float]) -> Iterator[float]:
+    """Yield where a margin may reach to the other side of zero between samples."""
+    margins = [margin(value) for value in values]
+    for i in range(1, len(values) - 1):
+        before, here, after = margins[i - 1 : i + 2]
+        if 0.0 < here <= min(before, after):
+            yield golden(margin, values[i - 1], values[i + 1])[1]
+        elif 0.0 > here >= max(before, after):
+            yield golden(lambda x: -margin(x), values[i - 1], values[i + 1])[1]
+
+
+def _margin(closure: Closure, value: float) -> float:
+    """Return how far a state is from the limits of its dyads, negative where it does not close."""
+    position = closure.posed(value)
+    if not position.status.has_pose:
+        # Where two pins meet, or two lines are parallel, it does not end.
+        return 0.0 if not position.gap else -position.gap
+    angles = [
+        step.transmission_angle(pose)
+        for step, pose in zip(closure.steps, position.poses, strict=True)
+        if hasattr(step, 'transmission_angle')
+    ]
+    return min(angles, default=inf)
+
+
+def _searched(
+    closure: Closure, low: float, high: float, samples: int
+) -> list[tuple[float, float]]:
+    """Return the parts of an interval in which loops close, the narrow ones, too."""
+
+    def closes(value: float) -> bool:
+        return closure.posed(value).status.has_pose
+
+    parts: list[tuple[float, float]] = []
+    for begin, end in search(closes, low, high, samples, partial(_margin, closure)):
+        if parts and begin - parts[-1][1] < _POINT * (high - low):
+            # Between them two pins meet, or two lines are parallel, and nothing ends.
+            parts[-1] = (parts[-1][0], end)
+        else:
+            parts.append((begin, end))
+    return parts
 
 
 def last_inside(closes: Callable[[float], bool], inside: float, outside: float) -> float:

@@ -16,10 +16,12 @@
 
 from __future__ import annotations
 
-from math import pi
+from cmath import rect
+from math import pi, remainder
 import random
 
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.status import Status
 from mpmath import mp, mpf
@@ -166,3 +168,60 @@ def test_ranges_are_told_in_words() -> None:
     assert words['stretches'] == f'-{float(angle):.6g} to {float(angle):.6g} rad'
     assert words['both'].count(' to ') == 2
     assert ' or ' in words['both']
+
+
+def carried(phi: float) -> complex:
+    """Return where a point of the rocker of a crank-rocker lies, by two circles."""
+    a, b, c, d = 2.0, 7.0, 9.0, 6.0
+    pin = rect(a, phi)
+    between = d - pin
+    s = abs(between)
+    along = (b * b - c * c + s * s) / (2.0 * s)
+    joint = pin + between / s * complex(along, (b * b - along * along) ** 0.5)
+    return d + (joint - d) * rect(0.6, 0.7)
+
+
+def chain(one: float, other: float) -> Linkage:
+    """Return that crank-rocker with a dyad of two lengths from the rocker to the ground."""
+    point = rect(9.0 * 0.6, 0.7)
+    return Linkage(
+        links={
+            'ground': {'O': (0.0, 0.0), 'D': (6.0, 0.0), 'E': (20.0, 4.0)},
+            'crank': {'O': (0.0, 0.0), 'A': (2.0, 0.0)},
+            'coupler': {'A': (0.0, 0.0), 'B': (7.0, 0.0)},
+            'rocker': {'D': (0.0, 0.0), 'B': (9.0, 0.0), 'F': (point.real, point.imag)},
+            'link': {'F': (0.0, 0.0), 'G': (one, 0.0)},
+            'arm': {'E': (0.0, 0.0), 'G': (other, 0.0)},
+        },
+        inputs=(Input('crank_joint', 'ground', 'crank'),),
+        assembly={'B': 'left', 'G': 'left'},
+        joints={'arm_joint': RevoluteJoint('ground', 'arm')},
+        sliders={},
+    )
+
+
+@pytest.mark.parametrize('narrow', [1e-4, 1e-8, 1e-10])
+@pytest.mark.parametrize('gap', [False, True], ids=['a part', 'a gap'])
+def test_what_is_narrower_than_the_samples_is_found(narrow: float, gap: bool) -> None:
+    # The distance from the rocker's point to the ground's has one summit over the turn. A dyad
+    # that reaches all but the last of it leaves a gap there; one that needs it closes only there.
+    def distance(phi: float) -> float:
+        return abs(20.0 + 4.0j - carried(phi))
+
+    summit = max((2.0 * pi * i / 20_000 for i in range(20_000)), key=distance)
+    for step in (1e-4, 1e-6, 1e-8):
+        summit = max((summit + k * step for k in range(-100, 101)), key=distance)
+    limit = distance(summit) - narrow
+    lengths = (limit - 1.5, 1.5) if gap else (limit + 1.5, 1.5)
+    closure = Closure(chain(*lengths))
+    ends = []
+    for side in (-1.0, 1.0):
+        inside, outside = 0.0, 0.3
+        for _ in range(60):
+            middle = 0.5 * (inside + outside)
+            higher = distance(summit + side * middle) > limit
+            inside, outside = (middle, outside) if higher else (inside, middle)
+        ends.append(summit + side * inside)
+    found = [end for interval in closure.input_ranges for end in interval[:2]]
+    for end in ends:
+        assert min(abs(remainder(end - one, 2.0 * pi)) for one in found) < 1e-7
