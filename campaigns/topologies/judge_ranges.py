@@ -88,8 +88,10 @@ def judge_ranges(
     travel = _travel(geometry, start, far, turning)
     zero = _zero_length(topology)
     if zero is not None:
-        start = abs(start - zero) + zero
-        travel = _longer(travel, zero)
+        pose = topology.linkage.pose
+        side = -1.0 if pose is not None and pose.inputs[0] < zero else 1.0
+        start = zero + side * abs(start - zero)
+        travel = _on_a_side(travel, zero, side)
     same = _SAME * (1.0 if turning else far)
     values = _samples(topology.start[0], far, turning)
     for value in values:
@@ -136,11 +138,13 @@ def _zero_length(topology: Topology) -> float | None:
     return None if abs(across) > 1e-12 * abs(between) else -(between * line.conjugate()).real
 
 
-def _longer(travel: Travel, zero: float) -> Travel:
-    """Return what of a cylinder's way lies beyond the slide at which its pins meet."""
+def _on_a_side(travel: Travel, zero: float, side: float) -> Travel:
+    """Return what of a cylinder's way lies on one side of the slide at which its pins meet."""
+    low, high = (zero, inf) if side > 0.0 else (-inf, zero)
+    parts = [(max(one, low), min(other, high)) for one, other in travel.parts]
     return Travel(
-        [(max(low, zero), high) for low, high in travel.parts if high > zero],
-        *([one for one in places if one > zero] for places in travel[1:]),
+        [(one, other) for one, other in parts if one < other],
+        *([one for one in places if low < one < high] for places in travel[1:]),
     )
 
 
