@@ -17,7 +17,8 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
+from functools import lru_cache, partial
 from math import atan, inf, pi, remainder, sin, sqrt, tau
 from operator import attrgetter
 from typing import Any, NamedTuple, TYPE_CHECKING
@@ -37,6 +38,10 @@ _SAME = 1e-9
 
 _BESIDE = 1e-6
 """How far beside a singular input a dyad's side is looked at, in [rad] or [m]."""
+
+
+_STATES = 4096
+"""How many states are kept while a linkage is searched for singular inputs."""
 
 
 class SingularInput(NamedTuple):
@@ -140,12 +145,14 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
         return ()
     ends = [end for interval in closure.closing_ranges for end in interval.toggles]
     found = [SingularInput(end, Status.TOGGLE) for end in ends]
+    # All dyads are looked at in the same states.
+    posed = lru_cache(_STATES)(closure.posed)
     for number, step in enumerate(closure.steps):
         if not hasattr(step, 'transmission_angle') or isinstance(step, RPPDyad):
             continue
         places = _turned_by_input(closure, step)
         if places is None:
-            places = zeros(partial(_room, closure, number), closure.closing_ranges)
+            places = zeros(partial(_room, step, number, posed), closure.closing_ranges)
         for place in places:
             status = _met(closure, number, place)
             distances = (abs(away(closure, place, one.value)) for one in found)
@@ -200,12 +207,11 @@ def _never_toggles(step: Any) -> bool:
     )
 
 
-def _room(closure: Closure, number: int, value: float) -> float:
+def _room(step: Any, number: int, posed: Callable[[float], Position], value: float) -> float:
     """Return how far a dyad is from being singular at an input, in [rad]; 0 without a pose."""
-    position = closure.posed(value)
+    position = posed(value)
     if len(position.poses) <= number or not position.status.has_pose:
         return 0.0
-    step: Any = closure.steps[number]
     pose: Any = position.poses[number]
     if isinstance(step, RPRDyad) and not step.offset:
         return atan(abs(pose.slide))

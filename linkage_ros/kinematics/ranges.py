@@ -42,6 +42,9 @@ _SAMPLES = 720
 _POINT = 1e-9
 """Of an interval: what is open over no more than this is a place without a pose, and no gap."""
 
+_ROUNDED = 1e-9
+"""Of a margin: what is farther from zero has its sign."""
+
 _CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, Turned)
 
 
@@ -261,12 +264,16 @@ def search(
 
     """
     values = [low + (high - low) * i / samples for i in range(samples)] + [high]
+    known: dict[float, bool] = {}
     if margin is not None:
-        values = sorted({*values, *_turning_points(margin, values)})
+        margins = [margin(value) for value in values]
+        # Next to zero the margin may round to either side.
+        known = {v: m > 0.0 for v, m in zip(values, margins, strict=True) if abs(m) > _ROUNDED}
+        values = sorted({*values, *_turning_points(margin, values, margins)})
     begin = None
     before = low
     for value in values:
-        if closes(value):
+        if known[value] if value in known else closes(value):
             if begin is None:
                 begin = last_inside(closes, value, before) if value > low else value
         elif begin is not None:
@@ -277,11 +284,12 @@ def search(
         yield begin, high
 
 
-def _turning_points(margin: Callable[[float], float], values: Sequence[float]) -> Iterator[float]:
+def _turning_points(
+    margin: Callable[[float], float], values: Sequence[float], margins: Sequence[float]
+) -> Iterator[float]:
     """Yield where a margin may reach to the other side of zero between samples."""
-    margins = [margin(value) for value in values]
     for i in range(1, len(values) - 1):
-        before, here, after = margins[i - 1 : i + 2]
+        before, here, after = margins[i - 1], margins[i], margins[i + 1]
         if 0.0 < here <= min(before, after):
             yield golden(margin, values[i - 1], values[i + 1])[1]
         elif 0.0 > here >= max(before, after):
