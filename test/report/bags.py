@@ -86,6 +86,7 @@ def write(
         attachments = {file: ('application/yaml', data) for file, data in loaded.files.items()}
         said = {
             'scene': name or loaded.name,
+            'seed': loaded.seed,
             'joint_states_topic': STATES,
             'crank_topic': CRANK,
             'faults_topic': FAULTS,

@@ -92,7 +92,8 @@ def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
         'resets_topic': '/resets',
     }
     folder_of_scene = str(scene_file.parent)
-    said = {'scene': 's', 'scene_folder': folder_of_scene, 'extra_topics': others, **names}
+    said = {'scene': 's', 'scene_folder': folder_of_scene, 'seed': scene.seed}
+    said |= {'extra_topics': others, **names}
     files = {name: ('application/yaml', data) for name, data in scene.files.items()}
     topics = [Topic(name, 'sensor_msgs/msg/JointState', '', '') for name in names.values()]
     attached = {**files, 'run.json': ('application/json', json.dumps(said).encode())}
