@@ -216,11 +216,6 @@ class Line:
         """Names of the effects that are computed, in physical order."""
 
     @property
-    def sees_gaps(self) -> bool:
-        """Return whether a sensor is told of ticks without a pose."""
-        return bool(self._seeing_gaps)
-
-    @property
     def gap_begins(self) -> bool:
         """Return whether a gap began with the last tick, if that had no pose."""
         return any(sensor.gap_begins for sensor in self._seeing_gaps)
