@@ -228,17 +228,16 @@ def _samples(start: float, far: float, turning: bool) -> Array:
 
 
 def _travel(geometry: Geometry, start: float, far: float, turning: bool) -> Travel:
-    values = _samples(start, far, turning)
-    places = geometry.place(values[None, :].astype(Real))
-    spare = _spare(places.margins, len(values))
-    closes = (spare >= -_FLAT).all(0)
+    samples = _samples(start, far, turning)
+    spare = _spare_at(geometry, samples)
+    values = np.union1d(samples, _turning_points(geometry, samples, spare))
+    closes = (_spare_at(geometry, values) >= -_FLAT).all(0)
     borders = [i for i in range(len(values) - 1) if closes[i] != closes[i + 1]]
     inner = np.array([values[i] if closes[i] else values[i + 1] for i in borders])
     outer = np.array([values[i + 1] if closes[i] else values[i] for i in borders])
     for _ in range(60 if borders else 0):
         middle = 0.5 * (inner + outer)
-        found = geometry.place(middle[None, :].astype(Real))
-        good = (_spare(found.margins, len(middle)) >= 0.0).all(0)
+        good = (_spare_at(geometry, middle) >= 0.0).all(0)
         inner, outer = np.where(good, middle, inner), np.where(good, outer, middle)
     edges = inner.tolist()
     parts, ends = [], list(edges)
@@ -257,8 +256,39 @@ def _travel(geometry: Geometry, start: float, far: float, turning: bool) -> Trav
     open_ones = (_spare(there.margins, len(fine)) < -_FLAT).any(0)
     parallels = _parallel(geometry, there.crossings, fine, ~open_ones)
     # Next to parallel lines a dyad is far away, and small against that.
-    changes = _flat(geometry, values, spare, closes, [*ends, *parallels], turning)
+    changes = _flat(geometry, samples, spare, [*ends, *parallels], turning)
     return Travel(parts, ends, changes, parallels)
+
+
+def _turning_points(geometry: Geometry, values: Array, spare: Array) -> Array:
+    """Return where a dyad has least or most to spare between samples: a border on either side."""
+    found = []
+    for k, row in enumerate([*spare, spare.min(0)]):
+        before, here, after = row[:-2], row[1:-1], row[2:]
+        valley = (here > 0.0) & (here <= np.minimum(before, after))
+        summit = (here < 0.0) & (here >= np.maximum(before, after))
+        # Where a dyad before it does not close, all samples are alike.
+        summit &= here > np.minimum(before, after)
+        for sign, at in ((1.0, valley), (-1.0, summit)):
+            places, width = values[1:-1][at], float(np.diff(values).max())
+            least = sign * here[at]
+            for _ in range(14 if len(places) else 0):
+                near = places[:, None] + width * np.linspace(-1.0, 1.0, 41)
+                fine = _spare_at(geometry, near.ravel())
+                one = sign * (fine[k] if k < len(spare) else fine.min(0)).reshape(near.shape)
+                nearest = np.argmin(one, axis=1)[:, None]
+                places = np.take_along_axis(near, nearest, 1)[:, 0]
+                least = np.take_along_axis(one, nearest, 1)[:, 0]
+                width /= 15.0
+            # What only comes to zero touches it, as next to parallel lines, where a dyad is small
+            # against how far away it is.
+            found.append(places[least < -_FLAT])
+    return np.concatenate(found)
+
+
+def _spare_at(geometry: Geometry, values: Array) -> Array:
+    """Return what each dyad has to spare at values of the input, of its lengths, (dyads, N)."""
+    return _spare(geometry.place(values[None, :].astype(Real)).margins, len(values))
 
 
 def _spare(margins: list[Margin], count: int) -> Array:
@@ -273,12 +303,12 @@ def _flat(
     geometry: Geometry,
     values: Array,
     spare: Array,
-    closes: Array,
     borders: list[float],
     turning: bool,
 ) -> list[float]:
     """Return where a dyad has nothing to spare and goes on."""
     found: list[float] = []
+    closes = (spare >= -_FLAT).all(0)
     for k, row in enumerate(spare):
         # Where a slide is looked at no farther, it may be stretched, and need not go on.
         for i in range(0 if turning else 1, len(row) - (0 if turning else 1)):
@@ -292,7 +322,7 @@ def _flat(
             at = float(values[i])
             for _ in range(11):
                 near = at + width * np.linspace(-1.0, 1.0, 41)
-                fine = _spare(geometry.place(near[None, :].astype(Real)).margins, 41)[k]
+                fine = _spare_at(geometry, near)[k]
                 at, width = float(near[np.argmin(np.abs(fine))]), width / 15.0
             least = float(np.abs(fine).min())
             at_a_border = any(abs(at - border) < 1e-3 for border in borders)

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf, nextafter, pi, remainder, tau
+import random
 
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -34,6 +35,8 @@ from linkage_ros.solvers.newton import NewtonClosure
 from linkage_ros.solvers.table import TableClosure
 import numpy as np
 import pytest
+
+from test.kinematics.platforms import linkage_of, platform
 
 CLOSED, LIMITED, TOGGLE, OPEN = Status.CLOSED, Status.LIMITED, Status.TOGGLE, Status.OPEN
 
@@ -325,6 +328,63 @@ def test_positions_arrays_and_ranges_agree(sides, own, rocker, coupler):
         interval = Way(closure).range_about(value)
         assert interval is not None
         assert interval.whole or interval.lowest <= value <= interval.highest
+
+
+@pytest.mark.parametrize(
+    ('lines', 'seed', 'turns'),
+    [(0, 10, 0), (0, 50, 0), (1, 27, 0), (2, 11, 0), (2, 38, 0), (0, 0, 1), (0, 2, 1)],
+)
+def test_links_that_are_iterated(lines, seed, turns):
+    """
+    Of platforms on a branch that has other poses a turn on (turns 0), or the same (1).
+
+    Where they can go is worked out here from the same linkage without limits, in 2,001 values.
+    """
+    rng = random.Random(seed)
+    linkage = linkage_of(platform(rng, lines=lines), rng)
+    free = Closure(linkage)
+    (whole,) = free.input_ranges
+    assert whole.turns == turns
+    low, high = (whole.lowest, whole.highest) if not whole.whole else (-tau, tau)
+    values = np.linspace(low + 1e-6, high - 1e-6, 2001)
+    angles = free.solve(values, derivatives=0).positions[0]
+    (driven,) = linkage.inputs
+    assert linkage.pose is not None
+    (start,) = linkage.pose.inputs
+    for draw in range(12):
+        own = published = Limits()
+        if draw % 3 != 1:
+            own = Limits(start - rng.uniform(0.0, 5.0), start + rng.uniform(0.0, 5.0))
+        if draw % 3:
+            middle = rng.choice(angles.tolist())
+            published = Limits(middle - rng.uniform(0.05, 1.5), middle + rng.uniform(0.05, 1.5))
+        joints = {**linkage.joints}
+        name = next(iter(joints))
+        joints[name] = replace(joints[name], limits=published)
+        closure = Closure(replace(linkage, inputs=(replace(driven, limits=own),), joints=joints))
+        batch = closure.solve(values, derivatives=0)
+        ranges = closure.input_ranges
+        for value, angle, code in zip(
+            values.tolist(), angles.tolist(), batch.status.tolist(), strict=True
+        ):
+            turned = max(
+                min(angle + n * tau - published.low, published.high - angle - n * tau)
+                for n in range(-4, 5)
+            )
+            left = min(value - own.low, own.high - value, turned)
+            now = closure.position(value)
+            assert CODES[now.status] == code
+            if abs(left) < 1e-6:
+                continue
+            assert (now.status is LIMITED) == (left < 0.0)
+            away = [0.0] if own.low > -inf or not turns else [n * tau for n in range(-3, 4)]
+            inside = any(
+                one.whole or one.lowest - 1e-6 <= value + turn <= one.highest + 1e-6
+                for one in ranges
+                for turn in away
+            )
+            # In a narrow part the pose may be missed, but none may be too wide.
+            assert inside == (left > 0.0)
 
 
 def test_rounding_of_typed_numbers_is_within():
