@@ -265,10 +265,9 @@ def _turning_points(geometry: Geometry, values: Array, spare: Array) -> Array:
     found = []
     for k, row in enumerate([*spare, spare.min(0)]):
         before, here, after = row[:-2], row[1:-1], row[2:]
-        valley = (here > 0.0) & (here <= np.minimum(before, after))
-        summit = (here < 0.0) & (here >= np.maximum(before, after))
-        # Where a dyad before it does not close, all samples are alike.
-        summit &= here > np.minimum(before, after)
+        # Where nothing can miss, or a dyad before it does, all samples are alike.
+        valley = (here > 0.0) & (here <= np.minimum(before, after)) & (here < before)
+        summit = (here < 0.0) & (here >= np.maximum(before, after)) & (here > before)
         for sign, at in ((1.0, valley), (-1.0, summit)):
             places, width = values[1:-1][at], float(np.diff(values).max())
             least = sign * here[at]
