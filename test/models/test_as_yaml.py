@@ -118,6 +118,10 @@ def test_a_file_with_an_odd_name(tmp_path):
     assert ET.fromstring(data).get('name') == 'leg: v2 ��'
 
 
+def test_the_macro_of_ros2_control():
+    check((CONFIG / 'ros2_control' / 'linkage.ros2_control.xacro').read_bytes())
+
+
 @pytest.mark.parametrize('file', [None, *FILES[::9]], ids=str)
 def test_what_xacro_makes_of_it(file, tmp_path):
     """As ``Command(['xacro ', file])`` in a launch file; None is the macro of ros2_control."""
