@@ -29,7 +29,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from linkage_ros.cli.model_file import model_of
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import LinkageError, quoted
 from linkage_ros.models.urdf import urdf as write_urdf
 
 SHARE = Path(get_package_share_directory('linkage_ros'))
@@ -38,7 +38,10 @@ ARGUMENTS = {
     'scene': ('', "Scene file; '' takes the one that params_file names."),
     'params_file': (str(SHARE / 'config' / 'linkage_node.yaml'), 'Parameters of linkage_node.'),
     'namespace': ('', 'Namespace of both nodes and their relative topics.'),
-    'use_sim_time': ('false', 'Tick on /clock instead of the steady clock.'),
+    'use_sim_time': (
+        '',
+        "true: tick on /clock instead of the steady clock; '' takes what params_file says.",
+    ),
     'crank_states': (
         'crank_states',
         'Topic that brings the crank; joint_states where joint_state_broadcaster publishes it.',
@@ -51,12 +54,15 @@ ARGUMENTS = {
 }
 
 
+FLAGS = {'true': True, '1': True, 'false': False, '0': False}
+
+
 def nodes(context):
     """Return the nodes to start; only now are the values of the arguments known."""
     value = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
-    clock = {'use_sim_time': value['use_sim_time'].lower() in ('true', '1')}
-    # Later parameters go before earlier ones: an empty argument must not hide the file's scene.
+    # Later parameters go before earlier ones: an empty argument must not hide what the file says.
     scene = {'scene': value['scene']} if value['scene'] else {}
+    clock = {'use_sim_time': flag(value, 'use_sim_time')} if value['use_sim_time'] else {}
     yield Node(
         package='linkage_ros',
         executable='linkage_node',
@@ -65,11 +71,12 @@ def nodes(context):
         parameters=[value['params_file'], {**clock, **scene}],
         remappings=[('crank_states', value['crank_states'])],
         output='screen',
+        on_exit=tell_failure,
     )
     urdf = ''
     if value['robot_description_file']:
-        urdf = Path(value['robot_description_file']).read_text(encoding='utf-8')
-    elif value['robot_state_publisher'].lower() in ('true', '1'):
+        urdf = text_of(value['robot_description_file'])
+    elif flag(value, 'robot_state_publisher'):
         if not value['scene']:
             raise LinkageError('robot_state_publisher', 'has no scene', 'name scene:=FILE too')
         urdf = model_of(value['scene'], write_urdf).decode()
@@ -79,9 +86,36 @@ def nodes(context):
             executable='robot_state_publisher',
             name='robot_state_publisher',
             namespace=value['namespace'],
-            parameters=[{**clock, 'robot_description': urdf}],
+            # The file for its clock, which has to be that of the node.
+            parameters=[value['params_file'], {**clock, 'robot_description': urdf}],
             output='screen',
         )
+
+
+def flag(value, name):
+    """Return what an argument that is true or false says."""
+    said = value[name].lower()
+    if said not in FLAGS:
+        raise LinkageError(name, f'{quoted(value[name])} is not a flag', 'write true or false')
+    return FLAGS[said]
+
+
+def text_of(file):
+    """Return the robot model in a file."""
+    try:
+        return Path(file).read_text(encoding='utf-8')
+    except (OSError, ValueError) as error:  # the latter for a NUL in the name, or no UTF-8
+        reason = getattr(error, 'strerror', None) or str(error)
+        where = f'robot_description_file {quoted(file)}'
+        raise LinkageError(where, f'cannot be read ({reason})', 'name a URDF file') from None
+
+
+def tell_failure(event, context):
+    """Let launch end with 1 where the node does not end well, and leave the other nodes alone."""
+    if event.returncode:
+        # An exception that is raised would shut down all that a robot's launch file starts.
+        said = f'linkage_node ended with {event.returncode}: its last lines say why'
+        context.asyncio_loop.call_exception_handler({'message': said})
 
 
 def generate_launch_description():

@@ -18,10 +18,15 @@ Effort commands as bytes (CDR): that of one joint read out of a ``sensor_msgs/ms
 
 Controllers fill name and effort; positions and velocities may be there or not, and are not looked
 at. Nor is the stamp: a command holds from when it comes.
+
+The topic-based hardware of ros2_control (joint_state_topic_hardware_interface 1.1.0) names all
+joints of a system, and gives efforts of those alone that have a command: nothing says which. That
+a joint which follows from others has none is known.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from struct import Struct
 from typing import NamedTuple
 
@@ -64,13 +69,16 @@ class JointEffortReader:
     ----------
     joint
         Its name. In a message it may stand anywhere among others.
+    dependent
+        Names of joints that nobody can command. A message may name them without an effort.
 
     """
 
-    __slots__ = ('_joint', '_layout')
+    __slots__ = ('_dependent', '_joint', '_layout')
 
-    def __init__(self, joint: str) -> None:
+    def __init__(self, joint: str, dependent: Collection[str] = ()) -> None:
         self._joint = joint.encode()
+        self._dependent = frozenset(name.encode() for name in dependent)
         self._layout: _Layout | None = None
 
     def read(self, data: bytes) -> EffortCommand | Rejection:
@@ -84,14 +92,14 @@ class JointEffortReader:
                 )
                 if (order, names, rates, efforts) == fixed:
                     return new(EffortCommand, (seconds * NANOSECONDS + nanoseconds, effort))
-        found = _find(data, self._joint)
+        found = _find(data, self._joint, self._dependent)
         if isinstance(found, Rejection):
             return found
         self._layout = found
         return self.read(data)
 
 
-def _find(data: bytes, joint: bytes) -> _Layout | Rejection:
+def _find(data: bytes, joint: bytes, dependent: Collection[bytes]) -> _Layout | Rejection:
     found = arrays_of(data)
     if isinstance(found, Rejection):
         return found
@@ -99,13 +107,14 @@ def _find(data: bytes, joint: bytes) -> _Layout | Rejection:
     (position_at, n_positions, _), (rate_at, n_rates, _), (effort_at, n_efforts, efforts) = arrays
     if not n_efforts:
         return Rejection.NO_EFFORT
-    n_names = len(names)
-    if n_efforts != n_names or n_positions not in (0, n_names) or n_rates not in (0, n_names):
+    able = [name for name in names if name not in dependent]
+    if not {n_positions, n_rates, n_efforts} <= {0, len(able), len(names)}:
         return Rejection.UNEQUAL
     if names.count(joint) != 1:
         return Rejection.TWICE if joint in names else Rejection.MISSING
     named = position_at + 4  # with the count of the positions
-    effort = efforts + 8 * names.index(joint)
+    commanded = names if n_efforts == len(names) else able
+    effort = efforts + 8 * commanded.index(joint)
     return _Layout(
         size=efforts + 8 * n_efforts,
         fields=Struct(

@@ -105,6 +105,35 @@ def test_what_is_no_command_is_refused(parts, rejection):
     assert reader.read(serialized(**parts)) is rejection, 'also with a layout known'
 
 
+DEPENDENT = ('coupler_joint', 'rocker_joint')
+
+
+@pytest.mark.parametrize(
+    ('names', 'efforts', 'expected'),
+    [
+        # As joint_state_topic_hardware_interface 1.1.0 sends them: efforts in the order of the
+        # joints that have a command.
+        ([CRANK, 'coupler_joint', 'rocker_joint'], [4.0], 4.0),
+        (['coupler_joint', CRANK, 'rocker_joint'], [4.0], 4.0),
+        (['rocker_joint', 'coupler_joint', CRANK], [4.0], 4.0),
+        (['arm', 'rocker_joint', CRANK], [1.0, 4.0], 4.0),
+        ([CRANK, 'rocker_joint', 'arm'], [4.0, 1.0], 4.0),
+        (['rocker_joint', CRANK], [1.0, 4.0], 4.0),
+        # Whose the effort is, nothing says.
+        (['arm', CRANK], [4.0], Rejection.UNEQUAL),
+        (['arm', 'rocker_joint', CRANK], [4.0], Rejection.UNEQUAL),
+        (['arm', 'rocker_joint'], [4.0], Rejection.MISSING),
+        ([CRANK, 'rocker_joint', CRANK], [4.0, 4.0], Rejection.TWICE),
+    ],
+)
+@pytest.mark.parametrize('little', [True, False])
+def test_joints_that_follow_from_others_need_no_effort(names, efforts, expected, little):
+    reader = JointEffortReader(CRANK, DEPENDENT)
+    for _ in range(2):  # also with a layout known
+        read = reader.read(serialized(names, efforts, little=little))
+        assert read == (EffortCommand(NS + 2, 4.0) if expected == 4.0 else expected)
+
+
 def test_a_stamp_of_zero_is_as_good_as_any():
     command = JointEffortReader(CRANK).read(serialized([CRANK], [4.0], stamp=(0, 0)))
     assert command == EffortCommand(0, 4.0)

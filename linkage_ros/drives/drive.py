@@ -132,6 +132,8 @@ class Context:
         In its joints; nothing where the scene names none.
     prefix
         What the joints' names have before their own in messages; '' for nothing.
+    dependent
+        Names in messages of the joints of all linkages that follow from driven ones.
     effects
         Names of the effects that the scene names.
     moves_by_rates
@@ -147,6 +149,7 @@ class Context:
     loads: Loads | None
     friction: Friction | None
     prefix: str = ''
+    dependent: frozenset[str] = frozenset()
     effects: frozenset[str] = frozenset()
     moves_by_rates: bool = True
 

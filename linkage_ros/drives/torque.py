@@ -83,7 +83,7 @@ PARAMETERS = TorqueParameters
 
 def reader(context: Context) -> Reader:
     """Build what reads the messages."""
-    return JointEffortReader(context.inputs_in_messages[0]).read
+    return JointEffortReader(context.inputs_in_messages[0], context.dependent).read
 
 
 def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:

@@ -106,7 +106,7 @@ def urdf(name: str, parts: Sequence[Part]) -> bytes:
 def _head(models: Sequence[_Model]) -> Iterator[str]:
     yield from _HEAD.splitlines()
     if len(models) > 1:
-        yield 'A scene does not say where its linkages stand: change the origin of NAME_mount.'
+        yield 'A scene does not say where its linkages stand. Change the origin of NAME_mount.'
     if any(joint.mimics for model in models for joint in model.tree.joints):
         yield 'Frames without a body between joints at one pin turn with joints that they mimic,'
         yield 'so that a published joint starts from the link that it is measured from.'
@@ -120,19 +120,19 @@ def _head(models: Sequence[_Model]) -> Iterator[str]:
             what = 'pin' if cut.kind == 'pin' else 'slider'
             line = f'{met} is on the x axis of {first}'
             how = line if cut.kind == 'line' else f'{first} meets {met}'
-            yield f'cut {what} {cut.name}: {how}'
+            yield f'{what} {cut.name} is cut, {how}'
         if spare := ', '.join(map(model.names.own, model.tree.spare)):
-            yield f'joints that no link hangs by: {spare}'
+            yield f'no link hangs by {spare}'
 
 
 _HEAD = f"""\
 A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are those of
 the published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
-Links are bars in layers, of no particular shape; those with a mass are thin plates: ixx = iyy =
-izz/2.
-limit: as the linkage gives it; else what the joint comes to over the range of the input that the
-linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
-angles, the reach for slides. effort and velocity, where not known: {EFFORT:g} and {VELOCITY:g}."""
+Links are bars in layers, of no particular shape; those with a mass are thin plates, with ixx =
+iyy = izz/2.
+A limit is as the linkage gives it; else what the joint comes to over the range of the input that
+the linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
+angles, the reach for slides. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
 
 
 def _write(robot: ET.Element, model: _Model) -> None:

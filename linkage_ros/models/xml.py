@@ -13,13 +13,26 @@
 # limitations under the License.
 
 
-"""XML as robot models have it: numbers that read as the same floats, comments of any text."""
+"""
+XML as robot models have it: numbers that read as the same floats, comments of any text.
+
+``-p robot_description:="$(cat leg.urdf)"`` and a substitution in a launch file are read as YAML.
+So a whole file is a plain scalar of YAML too: no colon stands before a blank in it, and no hash
+behind one (https://yaml.org/spec/1.1/, ns-plain-char).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+import re
 from typing import Any
 from xml.etree import ElementTree as ET
+
+_STRUCTURE = re.compile(r':(?=\s)|(?<=\s)#')
+"""What ends a plain scalar. In a file of ours that is in names only, and in comments."""
+
+_UNREADABLE = re.compile('[^\\n -~\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]')
+"""What XML or YAML has no character for; of all names only that of a file can hold it."""
 
 
 def number(value: float) -> str:
@@ -49,5 +62,6 @@ def comment(lines: Sequence[str]) -> Any:
 def document(root: ET.Element) -> bytes:
     """Return a whole file, the same bytes for the same content."""
     ET.indent(root)
-    text: str = ET.tostring(root, 'unicode')
+    text = _UNREADABLE.sub('\ufffd', ET.tostring(root, 'unicode'))
+    text = _STRUCTURE.sub(lambda found: f'&#{ord(found[0])};', text)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n'.encode()

@@ -15,12 +15,13 @@
 
 """linkage.launch.py, run against stubs: no launch that pip could install exists."""
 
+import asyncio
 from dataclasses import dataclass, field
 import importlib.util
 import sys
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import LinkageError, quoted
 import pytest
 
 
@@ -81,10 +82,7 @@ def start(launch_file):
 def test_by_default_the_node_runs_alone_with_the_installed_parameters(root, start):
     (node,) = start()
     assert node['executable'] == 'linkage_node'
-    assert node['parameters'] == [
-        str(root / 'config' / 'linkage_node.yaml'),
-        {'use_sim_time': False},
-    ]
+    assert node['parameters'] == [str(root / 'config' / 'linkage_node.yaml'), {}]
 
 
 def test_a_scene_goes_before_that_of_the_parameter_file(start):
@@ -100,19 +98,91 @@ def test_arguments_reach_the_node(start):
     assert node['remappings'] == [('crank_states', 'joint_states')]
 
 
+@pytest.mark.parametrize(
+    ('said', 'meant'),
+    [
+        ('true', True),
+        ('True', True),
+        ('1', True),
+        ('false', False),
+        ('FALSE', False),
+        ('0', False),
+    ],
+)
+def test_a_clock_that_is_said_goes_before_that_of_the_parameter_file(start, said, meant):
+    (node,) = start(use_sim_time=said, params_file='/mine.yaml')
+    assert node['parameters'] == ['/mine.yaml', {'use_sim_time': meant}]
+
+
+@pytest.mark.parametrize('said', ['yes', 'no', 'on', 'tru', '2', ' '])
+@pytest.mark.parametrize('name', ['use_sim_time', 'robot_state_publisher'])
+def test_what_is_no_flag_is_refused(start, name, said):
+    with pytest.raises(LinkageError) as caught:
+        start(**{name: said})
+    assert str(caught.value) == ' '.join(
+        f'{name}: {said!r} is not a flag; write true or false'.split()
+    )
+
+
+@pytest.mark.parametrize(
+    ('file', 'reason'),
+    [
+        ('none.urdf', 'No such file or directory'),
+        ('.', 'Is a directory'),
+        (
+            'latin.urdf',
+            "'utf-8' codec can't decode byte 0xff in position 6: invalid start byte",
+        ),
+    ],
+)
+def test_a_description_that_cannot_be_read(start, tmp_path, file, reason):
+    (tmp_path / 'latin.urdf').write_bytes(b'<robot\xff')
+    path = tmp_path / file
+    with pytest.raises(LinkageError) as caught:
+        start(robot_description_file=str(path))
+    assert str(caught.value) == (
+        f'robot_description_file {quoted(str(path))}: cannot be read ({reason}); name a URDF file'
+    )
+
+
+@pytest.mark.parametrize('code', [2, 1, -9, 0])
+def test_launch_ends_with_1_where_the_node_does_not_end_well(start, code):
+    """
+    As launch ends where an exception is handled (launch_service.py, run_async).
+
+    That is what its loop's handler of exceptions sets, without a shutdown of other nodes.
+    """
+    (node,) = start()
+    loop = asyncio.new_event_loop()
+    handled = []
+    loop.set_exception_handler(lambda _, what: handled.append(what['message']))
+    context = SimpleNamespace(asyncio_loop=loop)
+    assert node['on_exit'](SimpleNamespace(returncode=code), context) is None
+    loop.close()
+    said = f'linkage_node ended with {code}: its last lines say why'
+    assert handled == ([said] if code else [])
+
+
+def test_both_nodes_have_one_clock(start, root):
+    scene = root / 'config' / 'scenes' / 'bare.yaml'
+    own, publisher = start(scene=str(scene), params_file='/mine.yaml', robot_state_publisher='1')
+    assert own['parameters'][0] == publisher['parameters'][0] == '/mine.yaml'
+    assert 'use_sim_time' not in publisher['parameters'][1]
+
+
 def test_a_urdf_starts_robot_state_publisher(start, tmp_path):
     urdf = tmp_path / 'robot.urdf'
     urdf.write_text('<robot name="r"/>', encoding='utf-8')
     _, publisher = start(robot_description_file=str(urdf), namespace='arm')
     assert publisher['package'] == publisher['executable'] == 'robot_state_publisher'
     assert publisher['namespace'] == 'arm'
-    assert publisher['parameters'][0]['robot_description'] == '<robot name="r"/>'
+    assert publisher['parameters'][-1]['robot_description'] == '<robot name="r"/>'
 
 
 def test_robot_state_publisher_takes_the_model_that_the_scene_makes(start, root):
     scene = root / 'config' / 'scenes' / 'two_fingers.yaml'
     _, publisher = start(scene=str(scene), robot_state_publisher='true')
-    model = publisher['parameters'][0]['robot_description']
+    model = publisher['parameters'][-1]['robot_description']
     assert '<robot name="two_fingers">' in model
     assert '<joint name="left_rocker_joint" type="revolute">' in model
 

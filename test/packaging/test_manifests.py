@@ -54,6 +54,41 @@ def test_every_ros_import_is_declared(root, package_xml):
     assert imported <= {depend.text for depend in package_xml.iter('exec_depend')}
 
 
+ROS_PACKAGES = {
+    'ament_copyright', 'ament_flake8', 'ament_pep257', 'builtin_interfaces', 'diagnostic_msgs',
+    'launch', 'launch_ros', 'lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'robot_state_publisher',
+    'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs', 'trajectory_msgs',
+    'visualization_msgs',
+}  # fmt: skip
+"""Released into Jazzy: rosdep takes them from ros-jazzy-…. (rosdistro, jazzy/distribution.yaml)"""
+
+OF_UBUNTU = {
+    'python3-hypothesis', 'python3-jsonschema', 'python3-numpy', 'python3-pytest',
+    'python3-pytest-timeout', 'python3-yaml',
+}  # fmt: skip
+"""Keys that are packages of Ubuntu 24.04. (rosdistro, rosdep/python.yaml)"""
+
+
+def test_rosdep_of_the_readme_stops_at_no_key(root, package_xml):
+    """What is no package of ROS or of Ubuntu goes to pip, which refuses on Ubuntu 24.04."""
+    keys = {each.text for each in package_xml if each.tag.endswith('depend')}
+    readme = (root / 'README.md').read_text('utf-8')
+    (skipped,) = re.findall(r'^rosdep install .*--skip-keys (\S+)$', readme, re.MULTILINE)
+    assert keys == ROS_PACKAGES | OF_UBUNTU | {skipped}
+    # It is installed by hand, under the name that it has on PyPI.
+    assert skipped == 'mcap-ros2-support'
+    assert re.search(r'\npython3 -m pip install .*--break-system-packages mcap\n', readme)
+
+
+def test_commands_that_are_not_on_the_path_of_a_robot_are_run_by_ros2(root):
+    """After colcon, executables lie in lib/linkage_ros, which is on no path."""
+    readme = (root / 'README.md').read_text('utf-8')
+    on_a_robot = readme.partition('## On a robot')[2].partition('**Fed from')[0]
+    assert 'ros2 run linkage_ros linkage ' in on_a_robot
+    (block,) = re.findall(r'```sh.*?\n(.*?)```', on_a_robot, re.DOTALL)
+    assert not re.findall(r'^(?:linkage|linkage_node|crank_source)\b', block, re.MULTILINE)
+
+
 def test_executables_go_where_ros2_run_looks(root):
     config = ConfigParser()
     config.read(root / 'setup.cfg')

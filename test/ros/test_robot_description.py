@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -55,6 +56,22 @@ def test_a_late_comer_sees_a_linkage_that_moves(graph, write_scene, start):
         model.pose(list(state.name), list(state.position))
         ends = [model.place(f'B_on_{link}') for link in ('coupler', 'rocker')]
         assert abs(ends[0] - ends[1]) < 1e-12 * 0.12
+
+
+def test_a_node_takes_it_on_its_command_line(graph, write_scene, start):
+    """``-p robot_description:="$(cat leg.urdf)"``: rcl reads it as YAML."""
+    start(write_scene('as_text', TURNING + 'robot_description: true'))
+    heard = late(graph)
+    wait_for(lambda: heard, 'a robot model')
+    node = Node(
+        'taker',
+        context=graph.node.context,
+        cli_args=['--ros-args', '-p', f'robot_description:={heard[0].data}'],
+        automatically_declare_parameters_from_overrides=True,
+    )
+    taken = node.get_parameter('robot_description').value
+    node.destroy_node()
+    assert taken.split() == heard[0].data.split(), 'lines are folded, and that is all'
 
 
 def test_several_linkages_are_one_model(graph, folder, start, request):
