@@ -345,6 +345,10 @@ class LinkageNode(LifecycleNode):
                 )
         return SetParametersResult(successful=True)
 
+    def report(self, failure: str) -> None:
+        """Warn of a call that failed, once in a while."""
+        self._warnings.say('failure', failure, self.get_parameter('warning_period').value)
+
     # Watching.
 
     def _watch(self) -> None:
