@@ -126,6 +126,8 @@ class Pipeline:
             self.tick = _ticking_one(line)
         else:
             self._routes = Routes({line: line.member.inputs for line in self.lines})
+            self._offered = 0
+            self._newest: dict[Line, int] = {}
             self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
             self.tick = self._tick_many
 
@@ -144,8 +146,21 @@ class Pipeline:
         if len(self.lines) == 1:
             return self.lines[0].offer(message, now)
         # It may be for one linkage or for several: it is good if one of them takes it.
-        rejections = [line.offer(message, now) for line in self._routes.find(message)]
+        self._offered += 1
+        rejections = []
+        for line in self._routes.find(message):
+            rejections.append(line.offer(message, now))
+            if rejections[-1] is None:
+                self._newest[line] = self._offered
         return None if None in rejections else next(iter(rejections), Rejection.MISSING)
+
+    def newly_used(self) -> int:
+        """Return of how many of the good messages since the last call no newer one came."""
+        if len(self.lines) == 1:
+            return 1
+        numbers = set(self._newest.values())
+        self._newest.clear()
+        return len(numbers)
 
     def remembers(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes what comes after it."""

@@ -26,6 +26,9 @@ from linkage_ros.joint_state import head_of
 _MOST = 1000
 """How many kinds of messages are remembered; a bound against one who sends ever new names."""
 
+_LONGEST = 100_000
+"""Where names may end at most that are remembered, in bytes; a bound against huge messages."""
+
 Receiver = TypeVar('Receiver')
 
 
@@ -60,6 +63,8 @@ class Routes(Generic[Receiver]):
             return self._all
         names, end = head
         found = tuple(to for to, joints in self._wanted.items() if joints <= names)
+        if end > _LONGEST:
+            return found
         if len(self._found) >= _MOST:
             self._ends.clear()
             self._found.clear()

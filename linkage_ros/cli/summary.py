@@ -34,7 +34,6 @@ def summary(node: LinkageNode) -> str:
     if loop is None:
         return 'nothing ran'
     counts = loop.counts
-    rejected = sum(counts.rejected.values())
     per_second = counts.ticks / loop.seconds
     rows = [('ticks', f'{counts.ticks} in {loop.seconds:.2f} s, {per_second:.1f} a second')]
     if counts.lateness.count:
@@ -50,8 +49,7 @@ def summary(node: LinkageNode) -> str:
     if counts.withheld:
         rows.append(('withheld', f'{counts.withheld} readings, by what the scene does to sensors'))
     if node.crank_topic:
-        samples = f'{counts.received} received, {counts.used} used, {rejected} rejected'
-        rows.append(('samples', samples))
+        rows.append(('samples', loop.samples))
     rows += [
         (status.value, f'{counts.unclosed[status]} ticks')
         for status in Status

@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from linkage_ros.cdr import TIME_END
 from linkage_ros.faults.fault import Switch
 from linkage_ros.parameters import number
 
@@ -44,6 +45,7 @@ def clock(parameters: TimeJumpParameters, switch: Switch) -> Callable[[int], int
     step = round(parameters.by * 1e9)
 
     def jumping(now: int) -> int:
-        return now + step if switch.on else now
+        # No message has a stamp before 1970, or from 2038 on.
+        return max(0, min(now + step, TIME_END - 1)) if switch.on else now
 
     return jumping

@@ -46,6 +46,9 @@ OK, WARN, ERROR, STALE = (
 
 _RATE_TOLERANCE = 0.1
 
+CLOCK_PATIENCE = 2.0
+"""For how long ``/clock`` may be silent, in [s] of the machine."""
+
 _NEARNESS = {
     'transmission_angle': 'Transmission angle (rad)',
     'conditioning': 'Conditioning',
@@ -100,7 +103,7 @@ class Health:
     crank_topic
         Resolved name of the topic that the drives listen to; '' for none.
     publishers
-        Who publishes on it.
+        Who else publishes on it.
     loop
         The tick.
     before, now
@@ -111,6 +114,12 @@ class Health:
         For each attribute of the nearness to trouble below what it is warned of; 0 for never.
     snapshots
         The memory of the last seconds; nothing where a bag is written as the run goes.
+    clock_silence
+        For how long ``/clock`` has been silent, in [s]; 0 where the node does not follow it.
+    clock_refused
+        How many of its messages held no time.
+    crank_shared
+        Whether the crank's topic is for other joints, too: then it may have several publishers.
 
     """
 
@@ -126,6 +135,9 @@ class Health:
     recording_failure: str
     limits: Mapping[str, float]
     snapshots: RunSnapshots | None = None
+    clock_silence: float = 0.0
+    clock_refused: int = 0
+    crank_shared: bool = False
 
     def statuses(self) -> list[DiagnosticStatus]:
         """Return the statuses, one for each task."""
@@ -141,7 +153,9 @@ class Health:
         actual = ticks / window
         lowest = self.rate * (1.0 - _RATE_TOLERANCE)
         level, message = OK, 'Ticking'
-        if actual < lowest:
+        if self.clock_silence > CLOCK_PATIENCE:
+            level, message = STALE, no_clock(self.clock_silence)
+        elif actual < lowest:
             level, message = WARN, f'{actual:.1f} ticks a second, {self.rate:g} wanted'
         elif lost:
             level, message = WARN, f'{lost} ticks lost'
@@ -168,6 +182,7 @@ class Health:
             'Joint states published': self.loop.counts.published,
             **self._lost_time(),
             'Clock jumps back': self.loop.counts.clock_jumps,
+            **({'Clock messages refused': self.clock_refused} if self.clock_refused else {}),
             'Resets': self.loop.counts.resets,
         }
         return self._status('tick', level, message, values)
@@ -196,19 +211,25 @@ class Health:
         max_age = self.loop.pipeline.max_age
         if not self.crank_topic:
             message = 'Driven by the scene'
+        elif counts.ignored and counts.ignored == counts.received:
+            level, message = STALE if max_age else WARN, 'No crank yet, but messages without it'
         elif max_age and age * NANOSECONDS > max_age:
             level = STALE
             message = f'No crank for {age:.1f} s, by its stamps' if stamp else 'No crank yet'
-        elif len(self.publishers) > 1:
+        elif len(self.publishers) > 1 and not self.crank_shared:
             level, message = WARN, f'Several publishers: {", ".join(self.publishers)}'
         elif rejected:
             level, message = WARN, f'{rejected} samples rejected'
+        missed = self.loop.missed
         values: dict[str, object] = {
             'Topic': self.crank_topic,
             'Publishers': ', '.join(self.publishers),
             'Samples received': counts.received,
             'Samples used': counts.used,
+            'Samples superseded': counts.superseded,
             'Samples rejected': self.now.rejected,
+            'Messages without the crank': counts.ignored,
+            'Messages lost before': 'unknown' if missed is None else missed,
             'Age of the newest sample (s)': f'{age:.3f}',
         }
         values |= {f'Rejected: {why.value}': n for why, n in counts.rejected.items() if n}
@@ -391,6 +412,11 @@ class Health:
             hardware_id=self.scene,
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
+
+
+def no_clock(silence: float) -> str:
+    """Return that ``/clock`` has been silent for a time, in [s]."""
+    return 'No /clock yet' if silence == inf else f'No /clock for {silence:.1f} s'
 
 
 def _exertions(line: Line, look: Look) -> dict[str, tuple[float | None, float | None]]:

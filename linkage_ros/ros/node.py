@@ -25,6 +25,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial, wraps
+from math import inf
+from sys import maxsize
 import time
 from typing import Any, TYPE_CHECKING
 
@@ -36,18 +38,21 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros import pacing
 from linkage_ros.ros.bag_topics import bag_topic
-from linkage_ros.ros.diagnostics import Health, Snapshot
+from linkage_ros.ros.diagnostics import CLOCK_PATIENCE, Health, no_clock, Snapshot
 from linkage_ros.ros.late_answers import LateAnswers
 from linkage_ros.ros.parameters import declare_parameters, nearness_limits
 from linkage_ros.ros.run_recording import RunRecording
 from linkage_ros.ros.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
+from linkage_ros.ros.simulated_time import ClockGuard
 from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
 from linkage_ros.ros.warnings import Warnings
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
+from rcl_interfaces.msg import SetParametersResult
 from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.serialization import serialize_message
@@ -117,6 +122,9 @@ class LinkageNode(LifecycleNode):
         self.create_timer(_WATCH_PERIOD, self._watch, clock=steady)
         change = self._service_change_state
         change.callback = partial(self._on_change_state, change.callback)
+        self._clock_guard = ClockGuard(self._time_source)
+        self._activated = 0
+        self.add_on_set_parameters_callback(self._on_parameters)
         self._warnings = Warnings(self.get_logger())
         self._before = Snapshot()
 
@@ -124,6 +132,11 @@ class LinkageNode(LifecycleNode):
     def crank_topic(self) -> str:
         """Return the resolved name of the topic that the drives listen to; '' for none."""
         return self._scene_topics.crank_topic
+
+    @property
+    def _cranks(self) -> str:
+        assert self.scene is not None
+        return ', '.join(joint for member in self.scene.members for joint in member.inputs)
 
     # Transitions.
 
@@ -162,17 +175,17 @@ class LinkageNode(LifecycleNode):
         self._warnings = Warnings(self.get_logger())  # as new as the counts that it compares
         while (take := self._scene_topics.take) is not None and take() is not None:
             pass  # what came before this moment is not of this run
-        self._before = Snapshot.of(self.loop.counts, time.monotonic_ns())
+        self._activated = time.monotonic_ns()
+        self._before = Snapshot.of(self.loop.counts, self._activated)
         if self.scene.record is not None:
             self._start_recording()
         self.loop.start(self._pace(self.scene.rate))
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
-        cranks = ', '.join(joint for member in self.scene.members for joint in member.inputs)
         drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))
         source = f'from {self.crank_topic}' if self.crank_topic else f'driven by {drives}'
         to = [each.topic_name for each in (self._joint_states, *self._scene_topics.extras)]
         self.get_logger().info(
-            f'{self.scene.name}: ticking {rate}; crank {cranks} {source}; '
+            f'{self.scene.name}: ticking {rate}; crank {self._cranks} {source}; '
             f'{", ".join(self.scene.joints)} to {" and ".join(to)}'
         )
         return TransitionCallbackReturn.SUCCESS
@@ -212,6 +225,7 @@ class LinkageNode(LifecycleNode):
             # Found before the first tick, which would wait for it: iterated links are followed
             # there.
             _ = closure.singular_inputs
+        crank = self._scene_topics.crank
         return TickLoop(
             partial(Pipeline, scene, closures, injection),
             self._scene_topics.take,
@@ -219,6 +233,8 @@ class LinkageNode(LifecycleNode):
             JointStateWriter(scene.joints).names if shared else b'',
             [extra.handle.publish_raw for extra in self._scene_topics.extras],
             self._scene_topics.publish_change,
+            # A queue without bounds is taken from for as long as a tick may.
+            depth=(crank.qos_profile.depth if crank is not None else 0) or maxsize,
         )
 
     def _pace(self, rate: float) -> Pace:
@@ -237,6 +253,8 @@ class LinkageNode(LifecycleNode):
         if self.loop is not None and self.loop.running:
             self.loop.stop()
             self._diagnose()
+            if self.crank_topic:
+                self.get_logger().info(f'{self.crank_topic}: {self.loop.samples}')
             self.recording.stop(self.loop)
 
     def _start_recording(self) -> str:
@@ -315,6 +333,22 @@ class LinkageNode(LifecycleNode):
         with suppress(InvalidHandle):  # a disk may answer when the node is gone
             self._snapshot_written.trigger()
 
+    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
+        simulated = self.get_parameter('use_sim_time').value
+        running = self.loop is not None and self.loop.running
+        for parameter in parameters:
+            if parameter.name == 'use_sim_time' and parameter.value != simulated and running:
+                return SetParametersResult(
+                    successful=False,
+                    reason='use_sim_time cannot change while the node is active; deactivate it '
+                    'first',
+                )
+        return SetParametersResult(successful=True)
+
+    def report(self, failure: str) -> None:
+        """Warn of a call that failed, once in a while."""
+        self._warnings.say('failure', failure, self.get_parameter('warning_period').value)
+
     # Watching.
 
     def _watch(self) -> None:
@@ -324,6 +358,15 @@ class LinkageNode(LifecycleNode):
             return
         period = self.get_parameter('warning_period').value
         self._warnings.look(loop.counts, loop.pipeline.closures, self.crank_topic, period)
+        ignored = loop.counts.ignored
+        if ignored and ignored == loop.counts.received:
+            line = f'{self.crank_topic}: {ignored} messages, none with {self._cranks}: '
+            remedy = 'name the joint so there, or remap the topic'
+            self._warnings.say('ignored', line + remedy, period)
+        silence = self._clock_silence()
+        if min(silence, (time.monotonic_ns() - self._activated) / NANOSECONDS) > CLOCK_PATIENCE:
+            remedy = 'start the simulation, or set use_sim_time: false'
+            self._warnings.say('clock', f'{no_clock(silence)}: {remedy}', period)
         if loop.failure:
             self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
         if loop.recorder is not None and loop.recorder.failure is not None:
@@ -336,7 +379,11 @@ class LinkageNode(LifecycleNode):
         assert self.scene is not None
         assert self.loop is not None
         publishers = self._crank_publishers()
-        if len(publishers) > 1:
+        several = len(publishers) > 1
+        self.loop.several_publishers |= several
+        # Where messages come without the crank, others share the topic, and no one can tell.
+        shared = self.crank_topic == self._joint_states.topic_name or self.loop.counts.ignored
+        if several and not shared:
             self._warnings.say(
                 'publishers',
                 f'{self.crank_topic}: several publishers, {" and ".join(publishers)}; '
@@ -347,12 +394,15 @@ class LinkageNode(LifecycleNode):
         clock = self.get_clock().now()
         now = Snapshot.of(self.loop.counts, time.monotonic_ns())
         health = Health(
-            node=self.get_name(),
+            node=self.get_fully_qualified_name(),
             scene=self.scene.name,
             rate=0.0 if simulated else self.scene.rate,
             clock=clock.nanoseconds,
+            clock_silence=self._clock_silence(),
+            clock_refused=self._clock_guard.refused,
             crank_topic=self.crank_topic,
             publishers=publishers,
+            crank_shared=bool(shared),
             loop=self.loop,
             before=self._before,
             now=now,
@@ -369,14 +419,20 @@ class LinkageNode(LifecycleNode):
             self.loop.recorder.offer(DIAGNOSTICS, clock.nanoseconds, clock.nanoseconds, data)
 
     def _crank_publishers(self) -> list[str]:
-        """Return who publishes the crank; where others share the topic, no one can tell."""
-        if self.crank_topic in ('', self._joint_states.topic_name):
-            return []
-        return [
+        """Return who else publishes on the drives' topic."""
+        names = [
             f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-            for info in self.get_publishers_info_by_topic(self.crank_topic)
+            for info in self._scene_topics.crank_publishers
             if info.node_name != _NOT_YET_KNOWN
         ]
+        return [name for name in names if name != self.get_fully_qualified_name()]
+
+    def _clock_silence(self) -> float:
+        """Return for how long ``/clock`` has been silent, in [s]; 0 where it does not count."""
+        if not self.get_parameter('use_sim_time').value:
+            return 0.0
+        heard = self._clock_guard.heard
+        return (time.monotonic_ns() - heard) / NANOSECONDS if heard else inf
 
 
 def _answer(response: Any, success: bool, message: str) -> Any:

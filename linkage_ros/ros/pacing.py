@@ -22,6 +22,7 @@ from threading import Event
 from time import monotonic_ns, sleep, time_ns
 
 from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.ros.simulated_time import nanoseconds_of
 from linkage_ros.ros.tick_loop import Pace, TickLoop
 from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -69,7 +70,7 @@ def steady(rate: float) -> Pace:
                     lost = int(lateness // period)
                     counts.lost += lost
                     number += lost
-            tick_at(time_ns())
+            tick_at(time_ns(), time_ns)
 
     return pace
 
@@ -93,7 +94,7 @@ def on_samples(context: Context, subscription: Subscription, now: Callable[[], i
         wait = _waiter(context, subscription)
         while not stopping.is_set():
             if wait():
-                loop.tick_samples(now())
+                loop.tick_samples(now(), now)
 
     return pace
 
@@ -117,21 +118,26 @@ def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
     def pace(loop: TickLoop, stopping: Event) -> None:
         wait = _waiter(context, clock)
         due = 0
-        last = 0
+        last = newest = -1
+
+        def read() -> int:
+            nonlocal newest
+            # The queue is one message deep, so that what is taken is the newest.
+            taken = clock.handle.take_message(ClockMessage, False)
+            now = None if taken is None else nanoseconds_of(taken[0])
+            newest = newest if now is None else now
+            return newest
+
         while not stopping.is_set():
-            if not wait():
+            now = read()
+            if now == last:
+                wait()
                 continue
-            newest = None
-            while (taken := clock.handle.take_message(ClockMessage, False)) is not None:
-                newest = taken[0].clock
-            if newest is None:
-                continue
-            now = newest.sec * NANOSECONDS + newest.nanosec
             if now < last:
                 due = now
             last = now
             if now >= due:
-                loop.tick_at(now)
+                loop.tick_at(now, read)
                 due = now - now % period + period
 
     return pace

@@ -29,7 +29,11 @@ from typing import Protocol
 from linkage_ros.ros.node import LinkageNode
 from linkage_ros.stop import bounded_end
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import (
+    ExternalShutdownException,
+    ShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
@@ -38,6 +42,8 @@ EXIT_OK, EXIT_INCOMPLETE, EXIT_CONFIGURATION = 0, 1, 2
 
 _SWITCH_INTERVAL = 1e-4
 _LOOK = 0.1
+_AFTER_FAILURE = 0.01
+"""How long the executor rests, in [s], lest it does nothing but fail."""
 
 
 class View(Protocol):
@@ -182,12 +188,17 @@ def _attend(
 
 
 def _serve(node: LinkageNode, executor: SingleThreadedExecutor, ended: Event) -> None:
-    # As the tick: a defect here must neither vanish with its thread nor show a traceback.
-    try:
-        while not ended.is_set():
+    # rclpy raises here what a service raises, as its own do for a parameter of no known type: what
+    # somebody asks for must not end the node, nor show a traceback.
+    while not ended.is_set():
+        try:
             executor.spin_once()
-    except Exception as error:  # noqa: BLE001 (see above)
-        node.get_logger().error(f'the executor has stopped: {type(error).__name__}: {error}')
+        except (ExternalShutdownException, ShutdownException) as error:  # noqa: PERF203
+            node.get_logger().error(f'the executor has stopped: {type(error).__name__}: {error}')
+            return
+        except Exception as error:  # noqa: BLE001 (see above)
+            node.report(f'a call failed: {type(error).__name__}: {_first_line(error)}')
+            ended.wait(_AFTER_FAILURE)
 
 
 def _first_line(error: Exception) -> str:

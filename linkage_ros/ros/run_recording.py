@@ -103,7 +103,7 @@ class RunRecording:
 
         """
         record = scene.record or _DEFAULT
-        storage, runs = record.storage, Path(directory or record.directory)
+        storage = record.storage
         # What a running tick remembers is not in the bag: a replay has to know.
         with_the_run = not loop.running
 
@@ -114,12 +114,14 @@ class RunRecording:
             return BagWriter(folder, [t for _, t in described], files, storage)
 
         try:
+            # Who calls a service does not know in which folder this process runs.
+            runs = Path(directory or record.directory).absolute()
             described = topics()
             if storage.snapshot_seconds:
                 compression_type(storage.compression, runs)  # not found out at the first snapshot
                 return self._remember(loop, storage, [t for _, t in described], new_bag)
             writer = new_bag(True)
-        except RecordingError as error:
+        except (RecordingError, FileNotFoundError) as error:  # the folder we run in may be gone
             self.failure = f'not recording: {error}'
             self._logger.error(self.failure)
             return self.failure

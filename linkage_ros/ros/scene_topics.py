@@ -35,6 +35,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
 
@@ -79,6 +80,7 @@ class SceneTopics:
         self._withholds = False
         self.extras: list[Publisher] = []
         """Publishers of the pipeline's extras."""
+        self._crank_name = ''
         self.crank: Subscription | None = None
         """To the topic that the drives listen to; nothing where they listen to none."""
 
@@ -104,6 +106,7 @@ class SceneTopics:
                     qos_overriding_options=overridable,
                 )
             )
+        self._crank_name = pipeline.topic
         if pipeline.topic:
             self.crank = node.create_subscription(
                 JointState,
@@ -160,6 +163,14 @@ class SceneTopics:
         return '' if self.crank is None else str(self.crank.topic_name)
 
     @property
+    def crank_publishers(self) -> list[TopicEndpointInfo]:
+        """Return who publishes on that topic."""
+        # By the name before remapping: rclpy remaps what it is asked for, a second time too.
+        if self.crank is None:
+            return []
+        return self._node.get_publishers_info_by_topic(self._crank_name)
+
+    @property
     def take(self) -> Take | None:
         """Return what takes the next message for the drives, if they listen to a topic."""
         if self.crank is None:
@@ -177,7 +188,7 @@ class SceneTopics:
         """Describe the topics for a bag, in the order of the tick's numbers."""
         node, topics = self._node, []
         if self.crank_topic:
-            publishers = node.get_publishers_info_by_topic(self.crank_topic)
+            publishers = self.crank_publishers
             qos = publishers[0].qos_profile if publishers else CRANK_QOS
             topics.append(('crank_topic', bag_topic(self.crank_topic, JointState, qos)))
         if (changes := self._changes) is not None:

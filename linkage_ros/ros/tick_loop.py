@@ -23,7 +23,7 @@ for another thread; what it has seen stands in its counts, for others to read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from threading import Event, Thread
 from time import monotonic_ns
@@ -48,6 +48,9 @@ the ticks without a message, and those of the pipeline's extras. The last is tha
 
 _CLOSED = Status.CLOSED
 
+_LONGEST_DRAIN = 20_000_000
+"""How long a tick takes messages at most, in [ns]: huge ones, each read for the first time."""
+
 
 @dataclass(slots=True)
 class Counts:
@@ -62,7 +65,14 @@ class Counts:
     clock_jumps: int = 0
     resets: int = 0
     received: int = 0
+    """Messages on the drives' topic: used + superseded + ignored + those rejected."""
     used: int = 0
+    superseded: int = 0
+    """Good ones of which the same tick took a newer."""
+    ignored: int = 0
+    """Those that do not name the crank: others may share the topic."""
+    missed: int = 0
+    """Numbers left out where one publisher counts its messages."""
     rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
     lateness: DurationHistogram = field(default_factory=DurationHistogram)
     last: Tick | None = None
@@ -71,7 +81,8 @@ class Counts:
     """Number of the linkage and its position, where one had the status last."""
 
 
-Take = Callable[[], tuple[bytes, dict[str, Any]] | None]
+_Taken = tuple[bytes, dict[str, Any]]
+Take = Callable[[], _Taken | None]
 Pace = Callable[['TickLoop', Event], None]
 """Runs a tick loop until the event: waits, and calls `tick_at` or `tick_samples`."""
 
@@ -100,6 +111,8 @@ class TickLoop:
         For each of the pipeline's extras what publishes it, serialized.
     publish_change
         Publishes that a fault has begun or ended, and returns the message, serialized.
+    depth
+        How many messages a tick takes at most: as many as the queue before it holds.
 
     """
 
@@ -111,11 +124,14 @@ class TickLoop:
         own: bytes = b'',
         publish_extras: Sequence[Callable[[bytes], None]] = (),
         publish_change: Callable[[Change], bytes] | None = None,
+        depth: int = 100,
     ) -> None:
         self._build = build
         self._take = take or _take_nothing
         self._publish = publish
         self._own = own
+        self._depth = depth
+        self._sequence = 0
         self._last_time = 0
         self._pipeline = build()
         self.injection = self._pipeline.injection
@@ -132,6 +148,8 @@ class TickLoop:
         self.counts = Counts()
         self.recorder: Recorder | None = None
         self.reset_requested = False
+        self.several_publishers = False
+        """Whether more than one was seen on the drives' topic: their numbers go apart."""
         self.failure = ''
         self._begun = 0
         self.seconds = 0.0
@@ -157,6 +175,29 @@ class TickLoop:
         return self._thread is not None
 
     @property
+    def samples(self) -> str:
+        """Return what became of the messages on the drives' topic, in words."""
+        counts = self.counts
+        return (
+            f'{counts.received} received, {counts.used} used, {counts.superseded} superseded, '
+            f'{sum(counts.rejected.values())} rejected'
+            + (f', {counts.ignored} without the crank' if counts.ignored else '')
+            + (f'; {self.missed} lost before' if self.missed else '')
+        )
+
+    @property
+    def missed(self) -> int | None:
+        """
+        Return how many messages got lost between publisher and tick; None where none can tell.
+
+        The queue of the middleware lets the oldest go where it is full, and says nothing of it.
+        But a publisher numbers its messages.
+        """
+        if self.several_publishers or (self.counts.received and not self._sequence):
+            return None
+        return self.counts.missed
+
+    @property
     def newest_stamp(self) -> int:
         """Stamp of the newest good sample, in [ns]; 0 before the first."""
         return self._pipeline.newest_stamp
@@ -172,38 +213,74 @@ class TickLoop:
             return False
         counts = self.counts
         counts.received += 1
+        if number := info.get('publication_sequence_number'):
+            if 0 < self._sequence < number:  # else it is the first, or of a publisher begun anew
+                counts.missed += number - self._sequence - 1
+            self._sequence = number
         if (recorder := self.recorder) is not None:  # another thread takes it away
             recorder.offer(self._crank_number, now, info['source_timestamp'], message)
         rejection = self._pipeline.offer(message, now)
-        if rejection is not None:
+        if rejection is None:
+            return True
+        if rejection is Rejection.MISSING:
+            counts.ignored += 1
+        else:
             counts.rejected[rejection] += 1
-            return False
-        return True
+        return False
 
-    def tick_at(self, now: int) -> None:
-        """Take every message that has come and tick at a time, in [ns]."""
+    def _drain(self, clock: Callable[[], int] | None) -> Iterator[_Taken]:
+        """Yield the messages that have come; `_last_time` is when each was taken."""
+        end = monotonic_ns() + _LONGEST_DRAIN
+        for _ in range(self._depth):
+            if (taken := self._take()) is None:
+                return
+            if clock is not None:
+                time = clock()
+                # A message may be younger than the tick that takes it.
+                if self.injection is not None:
+                    time = self.injection.clock(time)
+                self._last_time = max(self._last_time, time)
+            yield taken
+            if monotonic_ns() > end:
+                return
+
+    def tick_at(self, now: int, clock: Callable[[], int] | None = None) -> None:
+        """
+        Take the messages that have come, and tick.
+
+        Parameters
+        ----------
+        now
+            The time of the tick, in [ns].
+        clock
+            Returns the time when a message is taken, in [ns]; absent, that is the tick's.
+
+        """
         if self.injection is not None:
             now = self._inject(self.injection, now)
         if now < self._last_time or self.reset_requested:
             self._rebuild(now)
         self._last_time = now
-        good = False
-        while (taken := self._take()) is not None:
-            good |= self._offer(*taken, now)
-        self.counts.used += good
-        self._tick(now, now)
+        good = 0
+        for taken in self._drain(clock):
+            good += self._offer(*taken, self._last_time)
+        if good:
+            used = self._pipeline.newly_used()
+            self.counts.used += used
+            self.counts.superseded += good - used
+        self._tick(self._last_time, now)
 
-    def tick_samples(self, now: int) -> None:
-        """Take every message that has come and tick once for each, at its stamp."""
+    def tick_samples(self, now: int, clock: Callable[[], int] | None = None) -> None:
+        """Take the messages that have come, as `tick_at`, and tick for each, at its stamp."""
         if self.injection is not None:
             now = self._inject(self.injection, now)
         if now < self._last_time or self.reset_requested:
             self._rebuild(now)
         self._last_time = now
-        while (taken := self._take()) is not None:
-            if self._offer(*taken, now):
+        for taken in self._drain(clock):
+            if self._offer(*taken, self._last_time):
                 self.counts.used += 1
-                self._tick(now, self._pipeline.newest_stamp)
+                self._tick(self._last_time, self._pipeline.newest_stamp)
 
     def _rebuild(self, now: int) -> None:
         """Build the pipeline anew, since time has jumped back or one has asked."""

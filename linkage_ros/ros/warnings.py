@@ -36,7 +36,6 @@ _REMEDIES = {
     Rejection.MALFORMED: 'the publisher must send sensor_msgs/JointState as plain CDR',
     Rejection.EMPTY: 'fill name, position and velocity',
     Rejection.UNEQUAL: 'give each joint that is named a number in every array that is filled',
-    Rejection.MISSING: 'remap the topic, or name the joint as the linkage does',
     Rejection.TWICE: 'name the joint once',
     Rejection.NO_RATE: 'fill velocity, or set carry_forward: false and leave out velocity',
     Rejection.NOT_FINITE: 'look at the sensor',

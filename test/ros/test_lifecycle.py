@@ -199,6 +199,24 @@ def test_recording_by_service(write_scene, start, folder, trigger, turn):
     assert node.end() == 0
 
 
+def test_services_answer_absolute_folders(write_scene, start, folder, trigger, turn):
+    # Who asks runs elsewhere, and could not find what is said relative to the node's own folder.
+    where = ('-p', 'runs_directory:=beside')
+    start(write_scene('beside', 'rate: 100'), *where)
+    for service in ('start_recording', 'start_recording', 'stop_recording'):
+        _, message = trigger(service)
+        assert f'{folder / "beside"}/beside_' in message, service
+
+
+def test_a_snapshot_answers_an_absolute_folder(write_scene, start, folder, trigger, turn):
+    scene = write_scene('kept', 'rate: 100\nrecord: {snapshot_seconds: 5, directory: kept}')
+    start(scene)
+    turn()
+    success, message = trigger('snapshot')
+    assert success, message
+    assert f'recorded to {folder / "kept"}/kept_' in message
+
+
 def parameter(name, **value):
     kind = {
         'double_value': ParameterType.PARAMETER_DOUBLE,

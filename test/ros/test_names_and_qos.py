@@ -69,7 +69,7 @@ def test_names_under_its_own_follow_the_node(graph, write_scene, start):
     wait_for(lambda: markers, 'markers')
     assert graph.call(Trigger, '/arm/press/reset').success
     tick = graph.next_status('tick')
-    assert tick.name == 'press: tick'
+    assert tick.name == '/arm/press: tick'
     assert node.end() == 0
     assert 'to /arm/joint_states and /arm/press/markers' in node.log
 
@@ -97,6 +97,49 @@ def test_remapped_topics_are_heard_recorded_and_replayed(folder, graph, write_sc
     )
     said = json.loads(answer.stdout)
     assert said['verdict'] == 'identical'
+
+
+def test_the_diagnostics_of_two_namespaces_can_be_told_apart(graph, write_scene, start):
+    scene = write_scene('apart', TICKED)
+    for side in ('left', 'right'):
+        start(scene, '-r', f'__ns:=/{side}')
+    tasks = ('tick', 'crank', 'loop closure', 'recording')
+    expected = {f'/{side}/linkage_node: {task}' for side in ('left', 'right') for task in tasks}
+
+    def named():
+        return {status.name for message in graph.diagnostics for status in message.status}
+
+    wait_for(lambda: len(named()) >= len(expected), 'the diagnostics of both')
+    assert named() == expected
+
+
+def test_with_both_remappings_of_the_readme_it_does_not_take_itself_for_the_crank(
+    folder, graph, write_scene, start
+):
+    # README, "RViz, Foxglove and ros2_control": the crank from where its joint states would be.
+    scene = f'{TICKED}record: {{directory: {folder}, name: both}}'
+    publisher = graph.node.create_publisher(
+        JointState, '/joint_states', QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    )
+    wait_for(lambda: graph.node.count_publishers('/joint_states') == 1, 'the crank on the graph')
+    node = start(
+        write_scene('both', scene),
+        *('-r', 'joint_states:=/linkage/joint_states', '-r', 'crank_states:=joint_states'),
+    )
+    states = graph.listen(JointState, '/linkage/joint_states')
+    wait_for(lambda: publisher.publish(crank(0.7)) or len(states) > 5, 'joint states')
+    wait_for(lambda: graph.value('crank', 'Publishers') == '/tester', 'who publishes the crank')
+    assert graph.value('crank', 'Topic') == '/joint_states'
+    graph.publisher(JointState, '/joint_states', node='impostor')
+    wait_for(
+        lambda: publisher.publish(crank(0.7)) or 'Several' in graph.status('crank').message,
+        'the warning of a second publisher',
+    )
+    named = graph.value('crank', 'Publishers').split(', ')
+    assert sorted(named) == ['/impostor', '/tester']
+    assert node.end() == 0
+    (topic,) = [t for t in read_bag(folder / 'both').topics if t.name == '/joint_states']
+    assert topic.qos.reliability == 'best_effort', 'of the publisher, not of the node'
 
 
 def test_qos_is_what_the_overrides_say(folder, graph, write_scene, start):

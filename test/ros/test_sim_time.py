@@ -17,13 +17,20 @@
 
 import time
 
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 import pytest
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool
 
 from .graph import crank, NS, stamp_of, wait_for
 
 BEGIN = 100 * NS
+STALE = b'\3'
 
 
 class Simulation:
@@ -42,8 +49,12 @@ class Simulation:
         self.now += step
         if turning:
             self._crank.publish(crank(self.now / NS, 1.0, self.now))
+        self.say(*divmod(self.now, NS))
+
+    def say(self, sec, nanosec):
+        """Send a message on /clock, whatever it says."""
         message = Clock()
-        message.clock.sec, message.clock.nanosec = divmod(self.now, NS)
+        message.clock.sec, message.clock.nanosec = sec, nanosec
         self._clock.publish(message)
         time.sleep(0.005)
 
@@ -118,3 +129,100 @@ def test_rate_0_judges_stamps_by_the_clock(graph, write_scene, start):
     simulation = Simulation(graph)
     simulation.run_until_heard()
     assert stamp_of(simulation.heard[-1]) <= simulation.now
+
+
+LARGEST = 2**31 - 1
+ATTACKS = {
+    'negative': ((-5, 0), 'refused'),
+    'the most negative': ((-(2**31), 0), 'refused'),
+    'a second of nanoseconds': ((100, NS), 'refused'),
+    'the most nanoseconds': ((100, 2**32 - 1), 'refused'),
+    'both at their ends': ((LARGEST, 2**32 - 1), 'refused'),
+    'back to zero': ((0, 0), 'a jump'),
+    'a leap of 1e9 s': ((10**9, 0), 'a jump'),
+    'the last second': ((LARGEST, NS - 1), 'a jump'),
+}
+"""What /clock says once, in the middle of a simulation, and what that is."""
+
+SCENES = {
+    'rate 50': 'rate: 50',
+    'rate 0': 'rate: 0',
+    'jumping': (
+        'rate: 50\ndrive: {constant_rate: {rate: 1}}\nfaults: {jump: {time_jump: {by: 10}}}'
+    ),
+}
+
+
+@pytest.mark.parametrize('text', SCENES)
+def test_whatever_the_clock_says_the_node_goes_on(graph, folder, write_scene, start, text):
+    name = text.replace(' ', '_')
+    scene = f'{SCENES[text]}\nrecord: {{directory: {folder}, name: {name}}}'
+    node = start(write_scene(f'clock_{name}', scene), '-p', 'use_sim_time:=true')
+    simulation = Simulation(graph)
+    simulation.run_until_heard()
+    if 'faults' in SCENES[text]:  # no time that it makes up is beyond those of messages
+        assert graph.call(SetBool, '/linkage_node/inject/jump', SetBool.Request(data=True)).success
+    refused = 0
+    for said, what in ATTACKS.values():
+        for _ in range(10):  # /clock is best effort
+            simulation.say(*said)
+            time.sleep(0.01)
+        simulation.run_until_heard()
+        assert stamp_of(simulation.heard[-1]) < simulation.now + 20 * NS, 'it is back in time'
+        refused += 10 * (what == 'refused')
+    assert 'the executor' not in node.log
+    assert int(wait_for(lambda: graph.value('tick', 'Clock messages refused'), 'counts')) > 0
+    assert int(graph.value('tick', 'Clock messages refused')) <= refused
+    assert node.end() == 0
+    assert 'Traceback' not in node.log
+    assert all(0 <= stamp_of(message) < (LARGEST + 1) * NS for message in simulation.heard)
+
+
+def test_without_a_clock_it_warns_and_is_stale(graph, write_scene, start):
+    node = start(
+        write_scene('no_clock', 'rate: 50\ndrive: {constant_rate: {rate: 1}}'),
+        *('-p', 'use_sim_time:=true', '-p', 'warning_period:=0.5'),
+    )
+    assert graph.wait_for_level('tick', STALE).message == 'No /clock yet'
+    node.wait_for_log('No /clock yet: start the simulation, or set use_sim_time: false')
+    simulation = Simulation(graph)
+    simulation.run_until_heard()
+    wait_for(
+        lambda: simulation.step(10_000_000) or graph.next_status('tick').message == 'Ticking',
+        'a status that is well',
+    )
+    assert 'No /clock for' in graph.wait_for_level('tick', STALE).message, 'the clock has stopped'
+    simulation.run_until_heard()
+
+
+def test_use_sim_time_is_refused_while_active(graph, write_scene, start):
+    node = start(write_scene('steady', 'rate: 50\ndrive: {constant_rate: {rate: 1}}'))
+    heard = graph.listen(JointState, '/joint_states')
+
+    def set_use_sim_time(value):
+        value = ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=value)
+        request = SetParameters.Request(
+            parameters=[ParameterMessage(name='use_sim_time', value=value)]
+        )
+        return graph.call(SetParameters, '/linkage_node/set_parameters', request).results[0]
+
+    def transit(number):
+        request = ChangeState.Request(transition=Transition(id=number))
+        assert graph.call(ChangeState, '/linkage_node/change_state', request).success
+
+    refused = set_use_sim_time(True)
+    assert not refused.successful
+    assert refused.reason == (
+        'use_sim_time cannot change while the node is active; deactivate it first'
+    )
+    assert set_use_sim_time(False).successful, 'which changes nothing'
+    wait_for(lambda: heard, 'joint states')
+    transit(Transition.TRANSITION_DEACTIVATE)
+    assert set_use_sim_time(True).successful
+    transit(Transition.TRANSITION_ACTIVATE)
+    simulation = Simulation(graph)
+    simulation.run_until_heard()
+    assert stamp_of(simulation.heard[-1]) <= simulation.now
+    simulation.say(-5, 0)
+    simulation.run_until_heard()
+    assert node.end() == 0

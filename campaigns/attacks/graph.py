@@ -1,0 +1,309 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Floods and storms: a node that runs, and another that sends it whatever a graph can send.
+
+First messages as many and as large as they come, then calls of services, parameters and
+transitions in any order. Nothing may end the node, every joint state is the pose of a crank that
+was sent, and every message is accounted for. ``python -m campaigns.attacks.graph`` is the one
+that attacks; `attack` starts both, each a process on a graph of its own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+import json
+from math import inf, nan
+import os
+from pathlib import Path
+from random import Random
+import re
+import sys
+from tempfile import TemporaryDirectory
+import time
+from typing import Any
+
+from bench.processes import BenchError, Graph
+from linkage_ros.joint_state import JointStateReader, JointStateWriter
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import read_yaml
+from linkage_ros.shipped import shipped
+
+GOOD, BAD = 0.5, 2.0
+"""The only angle of messages that are good, and that of all others, in [rad]."""
+
+LARGEST = 60_000
+"""Joints of the largest messages: 2.8 MB."""
+
+_CRANK = 'crank_joint'
+_PATIENCE = 20.0
+_SCENE = """
+linkage: {linkage}
+rate: 200
+drive: {{topic: {{carry_forward: false, max_age: 5.0}}}}
+faults: {{mute: {{silence: {{}}}}}}
+record: {{snapshot_seconds: 1, snapshot_bytes: 10000000, directory: runs}}
+"""
+
+_CLOSING = re.compile(
+    r'/crank_states: (?P<received>\d+) received, (?P<used>\d+) used, '
+    r'(?P<superseded>\d+) superseded, (?P<rejected>\d+) rejected'
+    r'(?:, (?P<ignored>\d+) without the crank)?(?:; (?P<lost>\d+) lost before)?'
+)
+
+
+def attack(seconds: float, seed: int, tried: Counter[str] | None = None) -> list[str]:
+    """
+    Attack a node; return what must not be, which is nothing.
+
+    Parameters
+    ----------
+    seconds
+        How long floods and storms last together, in [s].
+    seed
+        Of all that is drawn.
+    tried
+        Takes how much of what was tried.
+
+    """
+    tried = Counter() if tried is None else tried
+    with TemporaryDirectory(prefix='linkage_ros_attack_') as name:
+        folder = Path(name)
+        linkage = shipped('linkages/four_bar.yaml')
+        (folder / 'attacked.yaml').write_text(_SCENE.format(linkage=linkage))
+        # Below 102, so that the ports stay below those which the kernel hands out.
+        graph = Graph(2 + os.getpid() % 100, folder, longest=round(seconds) + 200)
+        node_arguments = (
+            *('--ros-args', '-p', f'scene:={folder / "attacked.yaml"}'),
+            *('-p', f'runs_directory:={folder}', '-p', 'diagnostics_period:=0.5'),
+        )
+        try:
+            with graph.run('linkage_ros.ros.linkage_node', node_arguments) as node:
+                with graph.run('campaigns.attacks.graph', (str(seconds), str(seed))) as attacker:
+                    outcome = attacker.read(patience=seconds + 8 * _PATIENCE)
+                node.check()
+            node.check_end()
+        except BenchError as error:
+            return [str(error)]
+        log = (folder / 'linkage_node.log').read_text(errors='replace')
+    findings = outcome['findings'] + _judged(log, outcome['tried'])
+    tried.update(outcome['tried'])
+    return findings
+
+
+def _judged(log: str, tried: dict[str, int]) -> list[str]:
+    """Return what is wrong with what a node has said."""
+    closings = [
+        {key: int(value or 0) for key, value in found.groupdict().items()}
+        for found in _CLOSING.finditer(log)
+    ]
+    findings = [
+        f'counts do not close: {counts}'
+        for counts in closings
+        if counts['received']
+        != sum(counts[of] for of in ('used', 'superseded', 'rejected', 'ignored'))
+    ]
+    if not closings:
+        return ['the node has not said what became of the messages']
+    # Only the first that were sent may have found nobody who would count them.
+    sent = tried['messages of the floods']
+    untold = sent - closings[0]['received'] - closings[0]['lost']
+    if not 0 <= untold <= tried['first messages']:
+        findings.append(f'{untold} of {sent} messages are unaccounted for: {closings[0]}')
+    tried |= {f'of these {what}': number for what, number in closings[0].items()}
+    findings += [line for line in log.splitlines() if 'Traceback' in line or 'has stopped' in line]
+    return findings
+
+
+def crank(angle: float, *, joints: int = 1, rate: float = 0.0) -> bytes:
+    """Return a message of the crank and so many joints in all, stamped now, serialized."""
+    names = [_CRANK, *(f'joint_with_a_long_name_{number}' for number in range(1, joints))]
+    return JointStateWriter(names).write(time.time_ns(), [angle] * joints, [rate] * joints)
+
+
+def malformed(random: Random) -> bytes:
+    """Return what is no good message of a crank, of any size."""
+    joints = int(LARGEST ** random.random())
+    message = crank(BAD, joints=joints)
+    kind = random.randrange(7)
+    if kind == 0:
+        return message[: random.randrange(len(message) - 8)]
+    if kind == 1:
+        return random.randbytes(int(2.8e6 ** random.random()))
+    if kind == 2:  # a count that promises more than there is
+        at = 20  # behind a frame_id that is empty
+        return (
+            message[:at]
+            + random.randrange(joints + 1, 2**32).to_bytes(4, 'little')
+            + (message[at + 4 :])
+        )
+    if kind == 3:
+        return (
+            message[:4]
+            + (-random.randrange(1, 2**31)).to_bytes(4, 'little', signed=True)
+            + (message[8:])
+        )
+    if kind == 4:
+        return crank(random.choice((nan, inf, -inf, 1e11, 1.7e308)), joints=joints)
+    if kind == 5:
+        return crank(BAD, joints=joints, rate=random.choice((nan, -inf, 1e300)))
+    names = [f'of_somebody_else_{number}' for number in range(joints)]
+    return JointStateWriter(names).write(time.time_ns(), [BAD] * joints, [0.0] * joints)
+
+
+class Attacker:
+    """
+    The node that attacks.
+
+    Parameters
+    ----------
+    seconds
+        How long it does so, in [s].
+    seed
+        Of all that is drawn.
+
+    """
+
+    def __init__(self, seconds: float, seed: int) -> None:
+        from campaigns.attacks.calls import Calls  # local import: as above
+        import rclpy  # local import: who judges needs no ROS
+        from rclpy.node import Node  # local import: as above
+        from sensor_msgs.msg import JointState  # local import: as above
+
+        rclpy.init()
+        self._spin = lambda wait: rclpy.spin_once(self.node, timeout_sec=wait)
+        self.node = Node('attacker')
+        self.findings: list[str] = []
+        self.tried: Counter[str] = Counter()
+        self._seconds = seconds
+        self._random = Random(seed)
+        self._publisher = self.node.create_publisher(JointState, 'crank_states', 100)
+        self._calls = Calls(self.node, '/linkage_node', self._random)
+        self._heard = 0
+        linkage = read_linkage(read_yaml(str(shipped('linkages/four_bar.yaml')))[0])
+        self._reader = JointStateReader(tuple(linkage.joints))
+        self._pose = Closure(linkage).position(GOOD).joints
+        self.node.create_subscription(JointState, 'joint_states', self._hear, 100, raw=True)
+
+    def run(self) -> None:
+        """Attack, and see that the node is well afterwards."""
+        self._wait(lambda: self._publisher.get_subscription_count() > 0, 'no node to attack')
+        self._see_it_tick()
+        self.tried['first messages'] = self.tried['messages']
+        self._flood(0.3 * self._seconds, lambda: crank(GOOD))
+        self._flood(0.3 * self._seconds, self._of_any_kind)
+        self._see_it_tick()
+        self.tried['messages of the floods'] = self.tried['messages']
+        if not self.findings:
+            self._bring_to_work()  # and have it say what became of them
+            self._storm(0.4 * self._seconds)
+            self._spin_empty()
+            self._bring_to_work()
+            self._see_it_tick()
+
+    def _hear(self, message: bytes) -> None:
+        self._heard += 1
+        state = self._reader.read(message)
+        angles = getattr(state, 'angles', ())
+        off = [a - b for a, b in zip(angles, self._pose, strict=False)]
+        if len(angles) != len(self._pose) or any(not abs(each) < 1e-9 for each in off):
+            self.findings.append(f'a joint state of no crank that was sent: {state}'[:200])
+
+    def _send(self, message: bytes) -> None:
+        self._publisher.publish(message)
+        self.tried['messages'] += 1
+        self.tried['bytes'] += len(message)
+
+    def _wait(self, condition: Callable[[], Any], finding: str) -> None:
+        end = time.monotonic() + _PATIENCE
+        while not condition():
+            if time.monotonic() > end:
+                self.findings.append(finding)
+                return
+            self._spin(0.01)
+
+    def _see_it_tick(self) -> None:
+        """Send good samples, slowly, until joint states come of ticks that begin now."""
+        time.sleep(0.2)
+        self._spin_empty()
+        heard = self._heard
+        self._wait(
+            lambda: self._send(crank(GOOD)) or time.sleep(0.02) or self._heard > heard + 5,
+            'the node does not tick',
+        )
+
+    def _spin_empty(self) -> None:
+        for _ in range(200):
+            self._spin(0.0)
+
+    def _flood(self, seconds: float, make: Callable[[], bytes]) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            message = make()
+            for _ in range(100 if len(message) < 1000 else 1):
+                self._send(message)
+            self._spin(0.0)
+
+    def _of_any_kind(self) -> bytes:
+        if self._random.random() < 0.3:
+            joints = int(LARGEST ** self._random.random())
+            return crank(GOOD, joints=joints)
+        return malformed(self._random)
+
+    def _storm(self, seconds: float) -> None:
+        """Ask for whatever there is to ask for, in any order, 50 calls at once."""
+        waiting: list[Any] = []
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if len(waiting) < 50:
+                name, future = self._calls.any()
+                self.tried[name] += 1
+                waiting.append(future)
+            else:  # some are never answered: rclpy raises for parameters of no type
+                waiting.pop(0)
+            self._send(crank(GOOD))
+            self._spin(0.001)
+            waiting = [future for future in waiting if not future.done()]
+
+    def _bring_to_work(self) -> None:
+        """Deactivate it, where it is active, and activate it again, from whatever state."""
+        calls = self._calls
+
+        def ask(future: Any, finding: str) -> Any:
+            self._wait(future.done, finding)
+            return future.result() if future.done() else None
+
+        for number in (4, 2, 1, 3):  # deactivate, clean up, configure, activate
+            if number == 1:
+                ask(calls.by_the_machine(), 'no answer to a parameter')
+            ask(calls.transition(number), f'no answer to transition {number}')
+        state = ask(calls.state(), 'no answer to get_state')
+        if state is None or state.current_state.label != 'active':
+            self.findings.append(f'cannot be brought to work again: {state}')
+
+
+def main() -> int:
+    """Attack, and tell how it went."""
+    attacker = Attacker(float(sys.argv[1]), int(sys.argv[2]))
+    attacker.run()
+    print(json.dumps({'findings': attacker.findings[:20], 'tried': attacker.tried}), flush=True)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
