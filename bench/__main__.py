@@ -25,6 +25,7 @@ import sys
 from tempfile import TemporaryDirectory
 import time
 
+from bench.coming import ComersPlan, measure_comers
 from bench.empty_scene import EmptyPlan, measure_empty_scene
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
@@ -43,6 +44,8 @@ _LATENCY_QUICK = LatencyPlan(rate=1000.0, size=200, parts=3)
 _EMPTY = EmptyPlan(rounds=31, ticks=5000)
 _EMPTY_QUICK = EmptyPlan(rounds=3, ticks=1000)
 _SPEED = SpeedPlan(rounds=11, states=5000, batch=1_000_000)
+_COMERS = ComersPlan(comers=200, listens=0.05, busy=2)
+_COMERS_QUICK = ComersPlan(comers=2, listens=0.05, busy=1)
 _SPEED_QUICK = SpeedPlan(rounds=3, states=1000, batch=100_000)
 
 
@@ -52,14 +55,14 @@ def main() -> int:
     parser.add_argument('--quick', action='store_true', help='less than half a minute, rougher')
     parser.add_argument(
         '--only',
-        choices=('a', 'b', 'c', 'many', 'empty', 'kinematics'),
+        choices=('a', 'b', 'c', 'many', 'empty', 'kinematics', 'comers'),
         help='only one of the comparisons',
     )
     parser.add_argument(
         '--runs', type=Path, default=Path('runs'), help='where the tables are kept'
     )
     arguments = parser.parse_args()
-    parts = {'kinematics': '', 'empty': '', 'many': ''}
+    parts = {'kinematics': '', 'empty': '', 'many': '', 'comers': ''}
     wanted = parts.get(arguments.only, arguments.only or 'abc')
     started = time.monotonic()
     begin = datetime.now().astimezone()
@@ -76,6 +79,11 @@ def main() -> int:
                 tables += _ticks(graph, folder, wanted, arguments.quick)
             if arguments.only in (None, 'many'):
                 tables.append(_many(graph, folder, arguments.quick))
+            if arguments.only == 'comers':
+                say('subscribers that come and go')
+                rates = (SLOW,) if arguments.quick else (SLOW, FAST)
+                plan_of_comers = _COMERS_QUICK if arguments.quick else _COMERS
+                tables.append(measure_comers(graph, folder, rates, plan_of_comers))
             if arguments.only in (None, 'empty'):
                 say('a tick of the empty scene')
                 tables.append(measure_empty_scene(_EMPTY_QUICK if arguments.quick else _EMPTY))

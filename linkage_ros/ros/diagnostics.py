@@ -111,6 +111,8 @@ class Health:
         For each attribute of the nearness to trouble below what it is warned of; 0 for never.
     snapshots
         The memory of the last seconds; nothing where a bag is written as the run goes.
+    standstill
+        Why ticks may stand still when a subscriber comes; '' where they do not.
 
     """
 
@@ -126,6 +128,7 @@ class Health:
     recording_failure: str
     limits: Mapping[str, float]
     snapshots: RunSnapshots | None = None
+    standstill: str = ''
 
     def statuses(self) -> list[DiagnosticStatus]:
         """Return the statuses, one for each task."""
@@ -170,6 +173,8 @@ class Health:
             'Clock jumps back': self.loop.counts.clock_jumps,
             'Resets': self.loop.counts.resets,
         }
+        if self.standstill:
+            values['Middleware'] = self.standstill
         return self._status('tick', level, message, values)
 
     def _lost_time(self) -> dict[str, object]:

@@ -42,6 +42,7 @@ from linkage_ros.ros.parameters import declare_parameters, nearness_limits
 from linkage_ros.ros.run_recording import RunRecording
 from linkage_ros.ros.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
 from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
+from linkage_ros.ros.transports import standstill
 from linkage_ros.ros.warnings import Warnings
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
@@ -119,6 +120,9 @@ class LinkageNode(LifecycleNode):
         change.callback = partial(self._on_change_state, change.callback)
         self._warnings = Warnings(self.get_logger())
         self._before = Snapshot()
+        self._standstill = standstill()
+        if self._standstill:
+            self.get_logger().info(self._standstill)
 
     @property
     def crank_topic(self) -> str:
@@ -359,6 +363,7 @@ class LinkageNode(LifecycleNode):
             recording_failure=self.recording.failure,
             snapshots=self.recording.snapshots,
             limits=nearness_limits(self),
+            standstill=self._standstill,
         )
         self._before = now
         message = DiagnosticArray(status=health.statuses())

@@ -1,0 +1,174 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What subscribers that come and go cost the ticks, by how Fast DDS carries the messages.
+
+A publisher opens the shared-memory port of every subscriber that comes, on the thread that
+publishes. The check of a port that nobody has written to for long waits a third of the
+``healthy_check_timeout_ms`` of whoever made the port: 0.33 s (Fast-DDS issue 6535).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+import time
+
+from bench.cpu_time import cpu_time
+from bench.processes import BenchError, Graph, Process
+from bench.report import say, Table
+from bench.scenes import write_turning
+from linkage_ros.shipped import shipped
+
+_APPEARING = 15.0
+"""How long the node may take to tick, in [s]."""
+
+_TELLING = 1.3
+"""After so many [s] the node has published its diagnostics anew."""
+
+_TIMEOUT = 30
+"""Of the profile that has a shorter one, in [ms]."""
+
+_SHARED = f"""\
+    <transport_descriptor>
+      <transport_id>shm</transport_id>
+      <type>SHM</type>
+      <healthy_check_timeout_ms>{_TIMEOUT}</healthy_check_timeout_ms>
+    </transport_descriptor>
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class ComersPlan:
+    """
+    How much is measured.
+
+    Attributes
+    ----------
+    comers
+        Subscribers that come and go, one after the other.
+    listens
+        How long each hears messages, in [s].
+    busy
+        Processes that take a processor each where there is load.
+
+    """
+
+    comers: int
+    listens: float
+    busy: int
+
+
+def measure_comers(
+    graph: Graph, folder: Path, rates: tuple[float, ...], plan: ComersPlan
+) -> Table:
+    """
+    Have subscribers come and go for each way, rate and load, and return the table.
+
+    Parameters
+    ----------
+    graph
+        Where they run.
+    folder
+        For scenes and profiles.
+    rates
+        Ticks a second.
+    plan
+        How much is measured.
+
+    """
+    table = Table(
+        f'{plan.comers} subscribers on defaults come and go',
+        ('', 'ticks', 'lost', 'longest µs', 'CPU µs a tick', 'comers that heard nothing',
+         'messages missed'),
+    )  # fmt: skip
+    for rate in rates:
+        scene = write_turning(folder, rate)
+        for busy in (0, plan.busy):
+            for name, more in _ways(folder).items():
+                ticks, lost, longest, cpu, came = _measure(graph, scene, more, busy, plan)
+                load = f', {busy} busy processes' if busy else ''
+                title = f'{name}, {rate / 1e3:g} kHz{load}'
+                table.rows.append(
+                    (title, str(ticks), str(lost), f'{longest:.0f}', f'{cpu:.1f}',
+                     str(came['deaf']), f'{came["missed"]} of {came["heard"]}')
+                )  # fmt: skip
+                say(f'  {title}: {lost} ticks lost, longest {longest:.0f} µs, {cpu:.1f} µs')
+    return table
+
+
+def _ways(folder: Path) -> Mapping[str, Mapping[str, str]]:
+    """Return for each way to carry messages the node's environment; all stay on the machine."""
+    local = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}
+    profile = shipped('fastdds/local.xml')
+    text = profile.read_text('utf-8')
+    for mark, more in (
+        ('  </transport_descriptors>', _SHARED),
+        ('        <transport_id>udp<', '        <transport_id>shm</transport_id>\n'),
+    ):
+        text = text.replace(mark, more + mark)
+    short = folder / 'short.xml'
+    short.write_text(text, encoding='utf-8')
+    return {
+        'shared memory': {},
+        'UDP only': {**local, 'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile)},
+        f'shared memory, timeout {_TIMEOUT} ms': {
+            **local,
+            'FASTRTPS_DEFAULT_PROFILES_FILE': str(short),
+        },
+        'shared memory, asynchronous': {'RMW_FASTRTPS_PUBLICATION_MODE': 'ASYNCHRONOUS'},
+    }
+
+
+def _measure(
+    graph: Graph, scene: Path, more: Mapping[str, str], busy: int, plan: ComersPlan
+) -> tuple[int, int, float, float, dict[str, int]]:
+    """Return ticks, those lost, the greatest lateness and CPU of a tick [µs], and the comers."""
+    with ExitStack() as stack:
+        run = stack.enter_context
+        listener = run(graph.run('bench.listener'))
+        node = run(
+            graph.run(
+                'linkage_ros.ros.linkage_node', ('--ros-args', '-p', f'scene:={scene}'), more
+            )
+        )
+        before = _health(listener, node, time.monotonic() + _APPEARING)
+        for _ in range(busy):
+            run(graph.run('bench.busy'))
+        ran, _ = cpu_time(node.pid)
+        comers = run(graph.run('bench.comers', (str(plan.comers), f'{plan.listens:g}')))
+        came = comers.read(60.0 + plan.comers * (plan.listens + 2.0))
+        ran_then, _ = cpu_time(node.pid)
+        time.sleep(_TELLING)
+        listener.ask('forget')
+        after = _health(listener, node, time.monotonic() + _APPEARING)
+    ticks, lost = (
+        int(after[key]) - int(before[key]) for key in ('Events since startup', 'Lost ticks')
+    )
+    longest = float(after['Lateness max (us)'])
+    return ticks, lost, longest, (ran_then - ran) / max(ticks, 1) / 1e3, came
+
+
+def _health(listener: Process, node: Process, until: float) -> dict[str, str]:
+    """Return the next diagnostics of the node."""
+    while not (health := listener.ask('?')['health']):
+        node.check()
+        if time.monotonic() > until:
+            node.end()
+            raise BenchError(f'{node.name}: no diagnostics in {_APPEARING:g} s')
+        time.sleep(0.1)
+    return dict(health)
