@@ -16,10 +16,10 @@
 ``python on_own_network.py SCENE PROGRAM…``: a node and a client on defaults, on a network alone.
 
 Run within `unshare --map-root-user --net`, so that the discovery range may be SUBNET, as on a
-robot, and no packet leaves the machine. It prints a line of JSON: whether the node, and whether the
-client, has shared memory of Fast DDS; the numbers that the publisher gave the messages which the
-client heard; and the node's `tick` diagnostics. Variables of the environment that begin with
-`NODE_` are the node's, without it.
+robot, and no packet leaves the machine. It prints a line of JSON: whether the node and the client
+have shared memory of Fast DDS; the numbers that the publisher gave the messages which the client
+heard; and the node's `tick` diagnostics. Variables of the environment that begin with `NODE_` are
+the node's, without it.
 """
 
 from __future__ import annotations
