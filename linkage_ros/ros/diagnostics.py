@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from operator import itemgetter
 from typing import TYPE_CHECKING
@@ -111,8 +111,8 @@ class Health:
         For each attribute of the nearness to trouble below what it is warned of; 0 for never.
     snapshots
         The memory of the last seconds; nothing where a bag is written as the run goes.
-    standstill
-        Why ticks may stand still when a subscriber comes; '' where they do not.
+    system
+        What of middleware and operating system bears on the ticks.
 
     """
 
@@ -128,7 +128,7 @@ class Health:
     recording_failure: str
     limits: Mapping[str, float]
     snapshots: RunSnapshots | None = None
-    standstill: str = ''
+    system: Mapping[str, str] = field(default_factory=dict)
 
     def statuses(self) -> list[DiagnosticStatus]:
         """Return the statuses, one for each task."""
@@ -173,8 +173,7 @@ class Health:
             'Clock jumps back': self.loop.counts.clock_jumps,
             'Resets': self.loop.counts.resets,
         }
-        if self.standstill:
-            values['Middleware'] = self.standstill
+        values |= self.system
         return self._status('tick', level, message, values)
 
     def _lost_time(self) -> dict[str, object]:

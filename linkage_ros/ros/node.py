@@ -39,6 +39,7 @@ from linkage_ros.ros.bag_topics import bag_topic
 from linkage_ros.ros.diagnostics import Health, Snapshot
 from linkage_ros.ros.late_answers import LateAnswers
 from linkage_ros.ros.parameters import declare_parameters, nearness_limits
+from linkage_ros.ros.real_time import RealTime
 from linkage_ros.ros.run_recording import RunRecording
 from linkage_ros.ros.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
 from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
@@ -120,9 +121,15 @@ class LinkageNode(LifecycleNode):
         change.callback = partial(self._on_change_state, change.callback)
         self._warnings = Warnings(self.get_logger())
         self._before = Snapshot()
-        self._standstill = standstill()
-        if self._standstill:
-            self.get_logger().info(self._standstill)
+        self._real_time = RealTime(
+            self.get_parameter('thread_priority').value,
+            self.get_parameter_or('cpu_affinity').value or (),
+            self.get_parameter('lock_memory').value,
+        )
+        self._middleware: dict[str, str] = {}
+        if why := standstill():
+            self._middleware['Middleware'] = why
+            self.get_logger().info(why)
 
     @property
     def crank_topic(self) -> str:
@@ -169,7 +176,8 @@ class LinkageNode(LifecycleNode):
         self._before = Snapshot.of(self.loop.counts, time.monotonic_ns())
         if self.scene.record is not None:
             self._start_recording()
-        self.loop.start(self._pace(self.scene.rate))
+        self._real_time.lock_memory()
+        self.loop.start(self._real_time.paced(self._pace(self.scene.rate)))
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
         cranks = ', '.join(joint for member in self.scene.members for joint in member.inputs)
         drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))
@@ -328,6 +336,8 @@ class LinkageNode(LifecycleNode):
             return
         period = self.get_parameter('warning_period').value
         self._warnings.look(loop.counts, loop.pipeline.closures, self.crank_topic, period)
+        while self._real_time.refused:
+            self.get_logger().warning(self._real_time.refused.pop())
         if loop.failure:
             self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
         if loop.recorder is not None and loop.recorder.failure is not None:
@@ -363,7 +373,7 @@ class LinkageNode(LifecycleNode):
             recording_failure=self.recording.failure,
             snapshots=self.recording.snapshots,
             limits=nearness_limits(self),
-            standstill=self._standstill,
+            system=self._real_time.in_force | self._middleware,
         )
         self._before = now
         message = DiagnosticArray(status=health.statuses())
