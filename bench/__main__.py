@@ -32,7 +32,7 @@ from bench.latency import LatencyPlan, measure_latency
 from bench.processes import BenchError, Graph
 from bench.report import say, show, Table
 from bench.tick_tables import cost_table, lateness_table
-from bench.ticks import bare, idiomatic, many, measure_ticks, ours, TickPlan
+from bench.ticks import asking, bare, idiomatic, many, measure_ticks, ours, TickPlan
 from linkage_ros.accuracy.machine import describe_machine
 
 SLOW, FAST = 1000.0, 10_000.0
@@ -45,7 +45,7 @@ _EMPTY = EmptyPlan(rounds=31, ticks=5000)
 _EMPTY_QUICK = EmptyPlan(rounds=3, ticks=1000)
 _SPEED = SpeedPlan(rounds=11, states=5000, batch=1_000_000)
 _COMERS = ComersPlan(comers=200, listens=0.05, busy=2)
-_COMERS_QUICK = ComersPlan(comers=2, listens=0.05, busy=1)
+_COMERS_QUICK = ComersPlan(comers=2, listens=0.05, busy=0)
 _SPEED_QUICK = SpeedPlan(rounds=3, states=1000, batch=100_000)
 
 
@@ -55,14 +55,14 @@ def main() -> int:
     parser.add_argument('--quick', action='store_true', help='less than half a minute, rougher')
     parser.add_argument(
         '--only',
-        choices=('a', 'b', 'c', 'many', 'empty', 'kinematics', 'comers'),
+        choices=('a', 'b', 'c', 'many', 'empty', 'kinematics', 'real_time', 'comers'),
         help='only one of the comparisons',
     )
     parser.add_argument(
         '--runs', type=Path, default=Path('runs'), help='where the tables are kept'
     )
     arguments = parser.parse_args()
-    parts = {'kinematics': '', 'empty': '', 'many': '', 'comers': ''}
+    parts = dict.fromkeys(('kinematics', 'empty', 'many', 'real_time', 'comers'), '')
     wanted = parts.get(arguments.only, arguments.only or 'abc')
     started = time.monotonic()
     begin = datetime.now().astimezone()
@@ -79,6 +79,8 @@ def main() -> int:
                 tables += _ticks(graph, folder, wanted, arguments.quick)
             if arguments.only in (None, 'many'):
                 tables.append(_many(graph, folder, arguments.quick))
+            if arguments.only in (None, 'real_time'):
+                tables += [_real_time(graph, folder, r, arguments.quick) for r in (SLOW, FAST)]
             if arguments.only == 'comers':
                 say('subscribers that come and go')
                 rates = (SLOW,) if arguments.quick else (SLOW, FAST)
@@ -138,6 +140,17 @@ def _ticks(graph: Graph, folder: Path, wanted: str, quick: bool) -> list[Table]:
         ]
     late = [c for c in (slow, fast, slow_recording, fast_recording) if c in found]
     return [*tables, lateness_table(late, found)]
+
+
+def _real_time(graph: Graph, folder: Path, rate: float, quick: bool) -> Table:
+    """Under load, what the system gives the ticks on request; where it refuses, that is told."""
+    busy = os.cpu_count() or 1
+    say(f'{busy} busy processes, {rate:g} Hz')
+    asked = ('thread_priority:=80', f'cpu_affinity:=[{busy - 1}]', 'lock_memory:=true')
+    contenders = [asking(folder, rate, *asked[:count]) for count in range(len(asked) + 1)]
+    plan = _TICKS_QUICK if quick else _TICKS
+    found = measure_ticks(graph, contenders, plan, busy)
+    return lateness_table(contenders, found, f' beside {busy} busy processes')
 
 
 def _many(graph: Graph, folder: Path, quick: bool) -> Table:

@@ -22,11 +22,12 @@ publishes. The check of a port that nobody has written to for long waits a third
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 import time
+from typing import Any
 
 from bench.cpu_time import cpu_time
 from bench.processes import BenchError, Graph, Process
@@ -93,21 +94,17 @@ def measure_comers(
     """
     table = Table(
         f'{plan.comers} subscribers on defaults come and go',
-        ('', 'ticks', 'lost', 'longest µs', 'CPU µs a tick', 'comers that heard nothing',
-         'messages missed'),
+        ('', 'stood still for 0.33 s', 'ticks lost', 'of', 'longest µs', 'CPU µs a tick',
+         'waited for CPU', 'comers that heard nothing', 'messages missed'),
     )  # fmt: skip
     for rate in rates:
         scene = write_turning(folder, rate)
-        for busy in (0, plan.busy):
+        for busy in dict.fromkeys((0, plan.busy)):
             for name, more in _ways(folder).items():
-                ticks, lost, longest, cpu, came = _measure(graph, scene, more, busy, plan)
                 load = f', {busy} busy processes' if busy else ''
-                title = f'{name}, {rate / 1e3:g} kHz{load}'
-                table.rows.append(
-                    (title, str(ticks), str(lost), f'{longest:.0f}', f'{cpu:.1f}',
-                     str(came['deaf']), f'{came["missed"]} of {came["heard"]}')
-                )  # fmt: skip
-                say(f'  {title}: {lost} ticks lost, longest {longest:.0f} µs, {cpu:.1f} µs')
+                cells = _measure(graph, scene, more, busy, plan)
+                table.rows.append((f'{name}, {rate / 1e3:g} kHz{load}', *cells))
+                say('  ' + ', '.join(table.rows[-1]))
     return table
 
 
@@ -136,39 +133,46 @@ def _ways(folder: Path) -> Mapping[str, Mapping[str, str]]:
 
 def _measure(
     graph: Graph, scene: Path, more: Mapping[str, str], busy: int, plan: ComersPlan
-) -> tuple[int, int, float, float, dict[str, int]]:
-    """Return ticks, those lost, the greatest lateness and CPU of a tick [µs], and the comers."""
+) -> Sequence[str]:
+    """Return what one row of the table tells."""
     with ExitStack() as stack:
         run = stack.enter_context
         listener = run(graph.run('bench.listener'))
-        node = run(
-            graph.run(
-                'linkage_ros.ros.linkage_node', ('--ros-args', '-p', f'scene:={scene}'), more
-            )
-        )
-        before = _health(listener, node, time.monotonic() + _APPEARING)
+        ours = ('--ros-args', '-p', f'scene:={scene}')
+        node = run(graph.run('linkage_ros.ros.linkage_node', ours, more))
+        before = _heard(listener, node)
         for _ in range(busy):
             run(graph.run('bench.busy'))
-        ran, _ = cpu_time(node.pid)
+        ran, waited = cpu_time(node.pid)
         comers = run(graph.run('bench.comers', (str(plan.comers), f'{plan.listens:g}')))
         came = comers.read(60.0 + plan.comers * (plan.listens + 2.0))
-        ran_then, _ = cpu_time(node.pid)
+        ran_then, waited_then = cpu_time(node.pid)
         time.sleep(_TELLING)
         listener.ask('forget')
-        after = _health(listener, node, time.monotonic() + _APPEARING)
+        after = _heard(listener, node)
     ticks, lost = (
-        int(after[key]) - int(before[key]) for key in ('Events since startup', 'Lost ticks')
+        int(after['health'][key]) - int(before['health'][key])
+        for key in ('Events since startup', 'Lost ticks')
     )
-    longest = float(after['Lateness max (us)'])
-    return ticks, lost, longest, (ran_then - ran) / max(ticks, 1) / 1e3, came
+    wait = (waited_then - waited) / (after['time'] - before['time'])
+    return (
+        str(after['stood'] - before['stood']),
+        str(lost),
+        str(ticks + lost),
+        f'{float(after["health"]["Lateness max (us)"]):.0f}',
+        f'{(ran_then - ran) / max(ticks, 1) / 1e3:.1f}',
+        f'{wait:.0%}',
+        str(came['deaf']),
+        f'{came["missed"]} of {came["heard"]}',
+    )
 
 
-def _health(listener: Process, node: Process, until: float) -> dict[str, str]:
-    """Return the next diagnostics of the node."""
-    while not (health := listener.ask('?')['health']):
+def _heard(listener: Process, node: Process) -> dict[str, Any]:
+    """Return what the listener has heard, as soon as there are diagnostics of the node."""
+    until = time.monotonic() + _APPEARING
+    while not (heard := listener.ask('?'))['health']:
         node.check()
         if time.monotonic() > until:
-            node.end()
             raise BenchError(f'{node.name}: no diagnostics in {_APPEARING:g} s')
         time.sleep(0.1)
-    return dict(health)
+    return dict(heard)

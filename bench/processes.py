@@ -37,7 +37,7 @@ _PATIENCE = 15.0
 _LONGEST = 600
 """How long a process may live where nothing else is said, in [s]."""
 
-_MOST = 6
+_MOST = 5 + (os.cpu_count() or 1)
 """How many processes may live at once."""
 
 
