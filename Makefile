@@ -1,6 +1,9 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
+INSTALL := pip --quiet --disable-pip-version-check install
+LOCK := uv pip compile --quiet --upgrade --universal --python-version 3.10 --generate-hashes \
+  --no-header --no-annotate setup.py
 
 # Another ROS may be sourced in this shell. Its libraries, packages and settings stay out.
 unexport PYTHONPATH PYTHONHOME PYTHONUSERBASE PYTHONSAFEPATH PYTHONSTARTUP LD_LIBRARY_PATH
@@ -21,7 +24,7 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema cost effects docs lint format
-.PHONY: clean damage kills endurance disk accuracy_page report
+.PHONY: clean damage kills endurance disk accuracy_page report lock sbom
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
@@ -42,12 +45,14 @@ help:
 	@echo 'make effects   draw what drives, effects and faults do, for docs/effects.md'
 	@echo 'make report    record a run, and picture its page for docs/report.png'
 	@echo 'make docs      build the documentation site into build/docs'
+	@echo 'make lock      renew the versions and hashes that .venv is installed by'
+	@echo 'make sbom      build the wheel, and its bill of materials beside it, into dist'
 	@echo 'make lint      ruff and mypy'
 	@echo 'make format    let ruff put right what it can'
 	@echo 'make clean     remove what make and colcon have built; recorded runs stay'
 	@echo 'PYTHON=...     the Python to build .venv with, 3.10 or newer (now: $(PYTHON))'
 
-$(STAMP): setup.py
+$(STAMP): setup.py requirements/dev.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || { \
 	  echo '$(PYTHON): not Python 3.10 or newer; install one and name it: make PYTHON=python3.12' >&2; \
 	  exit 1; }
@@ -55,7 +60,8 @@ $(STAMP): setup.py
 	  echo '$(PYTHON): cannot make virtual environments; on Debian and Ubuntu: apt install python3-venv' >&2; \
 	  exit 1; }
 	@$(BIN)/python -c 'import pip' 2>/dev/null || $(PYTHON) -m venv --clear .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(BIN)/python -m $(INSTALL) --require-hashes --requirement requirements/dev.txt
+	$(BIN)/python -m $(INSTALL) --no-deps --no-build-isolation --editable .
 	@touch $@
 
 # One simple command: make starts it without a shell between, so that Ctrl-C reaches it and make
@@ -129,6 +135,20 @@ report: $(STAMP)
 docs: $(STAMP)
 	@$(BIN)/python -m sphinx -q -W --keep-going -d build/docs_read docs build/docs
 	@echo 'build/docs/index.html'
+
+lock: $(STAMP)
+	$(BIN)/$(LOCK) --extra dev --output-file requirements/dev.txt
+	$(BIN)/$(LOCK) --constraint requirements/dev.txt --output-file requirements/run.txt
+
+# What the wheel needs in an environment of its own, since .venv has much more.
+sbom: $(STAMP)
+	rm -rf build/sbom dist
+	$(BIN)/python -m pip --quiet wheel --no-deps --no-build-isolation --wheel-dir dist .
+	$(BIN)/python -m venv --without-pip build/sbom
+	$(BIN)/python -m $(INSTALL:pip=pip --python build/sbom) --require-hashes --requirement requirements/run.txt
+	$(BIN)/python -m $(INSTALL:pip=pip --python build/sbom) --no-deps --no-index --find-links dist linkage_ros
+	$(BIN)/cyclonedx-py environment --output-reproducible --output-format JSON \
+	  --output-file "$$(ls dist/*.whl).cdx.json" build/sbom/bin/python
 
 lint: $(STAMP)
 	$(BIN)/ruff check
