@@ -24,12 +24,13 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema cost effects docs lint format
-.PHONY: clean damage kills endurance disk accuracy_page report lock sbom
+.PHONY: clean damage kills endurance disk accuracy_page report lock sbom timing
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
 	@echo 'make test      lint, then all tests'
 	@echo 'make bench     measure'
+	@echo 'make timing    measure clients that come and go, and ticks under load, into docs/timing (35 min)'
 	@echo 'make accuracy  prove the kinematics on 11 million cases, then as topologies (35 min)'
 	@echo 'make topologies  try random linkages of every topology, into docs/accuracy (8 min)'
 	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (9 min)'
@@ -82,6 +83,12 @@ test: $(STAMP)
 
 bench: $(STAMP)
 	@$(BIN)/python -m bench
+
+timing: $(STAMP)
+	@status=0; \
+	$(BIN)/python -m bench --only comers --write || status=$$?; \
+	$(BIN)/python -m bench --only real_time --write || status=$$?; \
+	exit $$status
 
 accuracy: $(STAMP)
 	@status=0; \

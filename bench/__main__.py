@@ -29,6 +29,7 @@ from bench.coming import ComersPlan, measure_comers
 from bench.empty_scene import EmptyPlan, measure_empty_scene
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
+from bench.pages import PAGES, write_page
 from bench.processes import BenchError, Graph
 from bench.report import say, show, Table
 from bench.tick_tables import cost_table, lateness_table
@@ -61,7 +62,12 @@ def main() -> int:
     parser.add_argument(
         '--runs', type=Path, default=Path('runs'), help='where the tables are kept'
     )
+    parser.add_argument(
+        '--write', action='store_true', help=f'keep them as a page too: {" or ".join(PAGES)}'
+    )
     arguments = parser.parse_args()
+    if arguments.write and arguments.only not in PAGES:
+        parser.error(f'--write needs --only {" or ".join(PAGES)}')
     parts = dict.fromkeys(('kinematics', 'empty', 'many', 'real_time', 'comers'), '')
     wanted = parts.get(arguments.only, arguments.only or 'abc')
     started = time.monotonic()
@@ -100,6 +106,8 @@ def main() -> int:
         return 130
     for table in tables:
         show(table)
+    if arguments.write:
+        write_page(arguments.only, tables)
     arguments.runs.mkdir(parents=True, exist_ok=True)
     file = arguments.runs / f'bench_{begin:%Y-%m-%d_%H-%M-%S}.md'
     file.write_text('\n'.join(table.markdown() for table in tables), encoding='utf-8')

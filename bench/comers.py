@@ -17,7 +17,7 @@ Subscribers of ``joint_states`` that come and go, each a DDS participant of its 
 
 Arguments: how many come, and for how long each listens, in [s]. At the end it prints a line of
 JSON: how many came, how many of them heard nothing, the messages that they heard, and those missed
-between the first and the last of each.
+between the first and the last number of each.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ def main() -> None:
     del sys.argv[1:]
     found = {'came': 0, 'deaf': 0, 'heard': 0, 'missed': 0}
     while found['came'] < count and not stop.is_set():
-        numbers = list(_listen(listens))
+        numbers = set(_listen(listens))
         found['came'] += 1
         found['deaf'] += not numbers
         found['heard'] += len(numbers)
         if numbers:
-            found['missed'] += numbers[-1] - numbers[0] + 1 - len(numbers)
+            found['missed'] += max(numbers) - min(numbers) + 1 - len(numbers)
     print(json.dumps(found), flush=True)
 
 

@@ -126,10 +126,8 @@ class LinkageNode(LifecycleNode):
             self.get_parameter_or('cpu_affinity').value or (),
             self.get_parameter('lock_memory').value,
         )
-        self._middleware: dict[str, str] = {}
-        if why := standstill():
-            self._middleware['Middleware'] = why
-            self.get_logger().info(why)
+        why = standstill()
+        self._middleware = {'Middleware': why} if why else {}
 
     @property
     def crank_topic(self) -> str:
@@ -178,6 +176,8 @@ class LinkageNode(LifecycleNode):
             self._start_recording()
         self._real_time.lock_memory()
         self.loop.start(self._real_time.paced(self._pace(self.scene.rate)))
+        for line in self._middleware.values():
+            self.get_logger().info(line)
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
         cranks = ', '.join(joint for member in self.scene.members for joint in member.inputs)
         drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))
