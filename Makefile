@@ -1,6 +1,9 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
+INSTALL := pip --quiet --disable-pip-version-check install
+LOCK := uv pip compile --quiet --upgrade --universal --python-version 3.10 --generate-hashes \
+  --no-header --no-annotate setup.py
 
 # Another ROS may be sourced in this shell. Its libraries, packages and settings stay out.
 unexport PYTHONPATH PYTHONHOME PYTHONUSERBASE PYTHONSAFEPATH PYTHONSTARTUP LD_LIBRARY_PATH
@@ -9,6 +12,7 @@ unexport COLCON_CURRENT_PREFIX COLCON_DEFAULTS_FILE COLCON_HOME COLCON_PYTHON_EX
 unexport ROS_DISTRO ROS_VERSION ROS_PYTHON_VERSION ROS_PACKAGE_PATH ROS_ETC_DIR ROS_ROOT
 unexport RMW_IMPLEMENTATION CYCLONEDDS_URI FASTRTPS_DEFAULT_PROFILES_FILE
 unexport FASTDDS_DEFAULT_PROFILES_FILE RMW_FASTRTPS_USE_QOS_FROM_XML RMW_FASTRTPS_PUBLICATION_MODE
+unexport FASTDDS_BUILTIN_TRANSPORTS
 unexport ROS_DISCOVERY_SERVER ROS_SUPER_CLIENT ROS_LOCALHOST_ONLY ROS_STATIC_PEERS
 unexport ROS_SECURITY_ENABLE ROS_SECURITY_STRATEGY ROS_SECURITY_KEYSTORE
 unexport ROS_SECURITY_ENCLAVE_OVERRIDE
@@ -20,12 +24,13 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema cost effects docs lint format
-.PHONY: clean damage kills endurance disk accuracy_page report
+.PHONY: clean damage kills endurance disk accuracy_page report lock sbom timing
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
 	@echo 'make test      lint, then all tests'
 	@echo 'make bench     measure'
+	@echo 'make timing    measure clients that come and go, and ticks under load, into docs/timing (35 min)'
 	@echo 'make accuracy  prove the kinematics on 11 million cases, then as topologies (35 min)'
 	@echo 'make topologies  try random linkages of every topology, into docs/accuracy (8 min)'
 	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (9 min)'
@@ -41,12 +46,14 @@ help:
 	@echo 'make effects   draw what drives, effects and faults do, for docs/effects.md'
 	@echo 'make report    record a run, and picture its page for docs/report.png'
 	@echo 'make docs      build the documentation site into build/docs'
+	@echo 'make lock      renew the versions and hashes that .venv is installed by'
+	@echo 'make sbom      build the wheel, and its bill of materials beside it, into dist'
 	@echo 'make lint      ruff and mypy'
 	@echo 'make format    let ruff put right what it can'
 	@echo 'make clean     remove what make and colcon have built; recorded runs stay'
 	@echo 'PYTHON=...     the Python to build .venv with, 3.10 or newer (now: $(PYTHON))'
 
-$(STAMP): setup.py
+$(STAMP): setup.py requirements/dev.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || { \
 	  echo '$(PYTHON): not Python 3.10 or newer; install one and name it: make PYTHON=python3.12' >&2; \
 	  exit 1; }
@@ -54,7 +61,8 @@ $(STAMP): setup.py
 	  echo '$(PYTHON): cannot make virtual environments; on Debian and Ubuntu: apt install python3-venv' >&2; \
 	  exit 1; }
 	@$(BIN)/python -c 'import pip' 2>/dev/null || $(PYTHON) -m venv --clear .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(BIN)/python -m $(INSTALL) --require-hashes --requirement requirements/dev.txt
+	$(BIN)/python -m $(INSTALL) --no-deps --no-build-isolation --editable .
 	@touch $@
 
 # One simple command: make starts it without a shell between, so that Ctrl-C reaches it and make
@@ -75,6 +83,12 @@ test: $(STAMP)
 
 bench: $(STAMP)
 	@$(BIN)/python -m bench
+
+timing: $(STAMP)
+	@status=0; \
+	$(BIN)/python -m bench --only comers --write || status=$$?; \
+	$(BIN)/python -m bench --only real_time --write || status=$$?; \
+	exit $$status
 
 accuracy: $(STAMP)
 	@status=0; \
@@ -128,6 +142,20 @@ report: $(STAMP)
 docs: $(STAMP)
 	@$(BIN)/python -m sphinx -q -W --keep-going -d build/docs_read docs build/docs
 	@echo 'build/docs/index.html'
+
+lock: $(STAMP)
+	$(BIN)/$(LOCK) --extra dev --output-file requirements/dev.txt
+	$(BIN)/$(LOCK) --constraint requirements/dev.txt --output-file requirements/run.txt
+
+# What the wheel needs in an environment of its own, since .venv has much more.
+sbom: $(STAMP)
+	rm -rf build/sbom dist
+	$(BIN)/python -m pip --quiet wheel --no-deps --no-build-isolation --wheel-dir dist .
+	$(BIN)/python -m venv --without-pip build/sbom
+	$(BIN)/python -m $(INSTALL:pip=pip --python build/sbom) --require-hashes --requirement requirements/run.txt
+	$(BIN)/python -m $(INSTALL:pip=pip --python build/sbom) --no-deps --no-index --find-links dist linkage_ros
+	$(BIN)/cyclonedx-py environment --output-reproducible --output-format JSON \
+	  --output-file "$$(ls dist/*.whl).cdx.json" build/sbom/bin/python
 
 lint: $(STAMP)
 	$(BIN)/ruff check

@@ -51,16 +51,22 @@ def shared(folder):
 
 
 # ROS is an extra: on a robot rclpy comes from apt and pip must leave it alone.
-ROS = ['ros-jazzy-rclpy[fastrtps]', 'ros-jazzy-common-interfaces']
+ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1,<7.2', 'ros-jazzy-common-interfaces>=5.3,<5.4']
 # What is measured and told: pictures, tables, pages, and the reference of fifty digits.
-REPORT = ['matplotlib', 'mpmath', 'plotly>=6', 'python-flint>=0.6', 'rich']
+REPORT = [
+    'matplotlib>=3.6,<4',
+    'mpmath>=1.2,<2',
+    'plotly>=6,<8',
+    'python-flint>=0.6,<1',
+    'rich>=13,<16',
+]
 # Where a linkage is fitted or searched for; exact synthesis needs numpy only.
-DESIGN = ['scipy']
+DESIGN = ['scipy>=1.11,<2']
 # Bags as Parquet; as CSV they need nothing. From 26 on pyarrow refuses numpy 1.x, which Ubuntu
 # 24.04 has, but does not say so to pip.
-EXPORT = ['pyarrow<26']
+EXPORT = ['pyarrow>=14,<26']
 # For studies that outgrow one machine.
-DASK = ['distributed']
+DASK = ['distributed>=2023.12,<2027']
 # The documentation site, in the theme Furo.
 DOCS = ['sphinx>=8', 'myst-parser>=4', 'furo', *REPORT]
 # The name `test` matters: colcon runs pytest only when it finds it in this extra.
@@ -88,7 +94,9 @@ TEST = [
     *EXPORT,
 ]
 # What the speed of the kinematics is measured against. Pinocchio (pin) walks robot models too.
-BENCH = ['pylinkage[numba]>=1.3,<1.4', 'casadi', 'pin']
+BENCH = ['pylinkage[numba]>=1.3,<1.4; python_version >= "3.11"', 'casadi', 'pin']
+# What makes the lock file, and the bill of materials of a release.
+RELEASE = ['uv', 'cyclonedx-bom>=7']
 STYLE = [
     'mypy',
     'ruff',
@@ -140,7 +148,8 @@ setup(
         *shared('launch'),
     ],
     python_requires='>=3.10',
-    install_requires=['numpy>=1.26', 'mcap>=1.2', 'PyYAML'],
+    # Bounded above too: another major version may do something else under the same names.
+    install_requires=['numpy>=1.26,<3', 'mcap>=1.2,<2', 'PyYAML>=6,<7'],
     extras_require={
         'ros': ROS,
         'report': REPORT,
@@ -149,7 +158,10 @@ setup(
         'docs': DOCS,
         'export': EXPORT,
         'test': TEST,
-        'dev': [*ROS, *REPORT, *DESIGN, *DASK, *DOCS, *EXPORT, *TEST, *BENCH, *STYLE, *COLCON],
+        'dev': [
+            *(*ROS, *REPORT, *DESIGN, *DASK, *DOCS, *EXPORT, *TEST, *BENCH, *STYLE, *COLCON),
+            *RELEASE,
+        ],
     },
     zip_safe=True,
     entry_points={

@@ -25,13 +25,15 @@ import sys
 from tempfile import TemporaryDirectory
 import time
 
+from bench.coming import ComersPlan, measure_comers
 from bench.empty_scene import EmptyPlan, measure_empty_scene
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
+from bench.pages import PAGES, write_page
 from bench.processes import BenchError, Graph
 from bench.report import say, show, Table
 from bench.tick_tables import cost_table, lateness_table
-from bench.ticks import bare, idiomatic, many, measure_ticks, ours, TickPlan
+from bench.ticks import asking, bare, idiomatic, many, measure_ticks, ours, TickPlan
 from linkage_ros.accuracy.machine import describe_machine
 
 SLOW, FAST = 1000.0, 10_000.0
@@ -43,6 +45,8 @@ _LATENCY_QUICK = LatencyPlan(rate=1000.0, size=200, parts=3)
 _EMPTY = EmptyPlan(rounds=31, ticks=5000)
 _EMPTY_QUICK = EmptyPlan(rounds=3, ticks=1000)
 _SPEED = SpeedPlan(rounds=11, states=5000, batch=1_000_000)
+_COMERS = ComersPlan(comers=200, listens=0.05, busy=2)
+_COMERS_QUICK = ComersPlan(comers=2, listens=0.05, busy=0)
 _SPEED_QUICK = SpeedPlan(rounds=3, states=1000, batch=100_000)
 
 
@@ -52,14 +56,19 @@ def main() -> int:
     parser.add_argument('--quick', action='store_true', help='less than half a minute, rougher')
     parser.add_argument(
         '--only',
-        choices=('a', 'b', 'c', 'many', 'empty', 'kinematics'),
+        choices=('a', 'b', 'c', 'many', 'empty', 'kinematics', 'real_time', 'comers'),
         help='only one of the comparisons',
     )
     parser.add_argument(
         '--runs', type=Path, default=Path('runs'), help='where the tables are kept'
     )
+    parser.add_argument(
+        '--write', action='store_true', help=f'keep them as a page too: {" or ".join(PAGES)}'
+    )
     arguments = parser.parse_args()
-    parts = {'kinematics': '', 'empty': '', 'many': ''}
+    if arguments.write and arguments.only not in PAGES:
+        parser.error(f'--write needs --only {" or ".join(PAGES)}')
+    parts = dict.fromkeys(('kinematics', 'empty', 'many', 'real_time', 'comers'), '')
     wanted = parts.get(arguments.only, arguments.only or 'abc')
     started = time.monotonic()
     begin = datetime.now().astimezone()
@@ -76,6 +85,13 @@ def main() -> int:
                 tables += _ticks(graph, folder, wanted, arguments.quick)
             if arguments.only in (None, 'many'):
                 tables.append(_many(graph, folder, arguments.quick))
+            if arguments.only in (None, 'real_time'):
+                tables += [_real_time(graph, folder, r, arguments.quick) for r in (SLOW, FAST)]
+            if arguments.only == 'comers':
+                say('subscribers that come and go')
+                rates = (SLOW,) if arguments.quick else (SLOW, FAST)
+                plan_of_comers = _COMERS_QUICK if arguments.quick else _COMERS
+                tables.append(measure_comers(graph, folder, rates, plan_of_comers))
             if arguments.only in (None, 'empty'):
                 say('a tick of the empty scene')
                 tables.append(measure_empty_scene(_EMPTY_QUICK if arguments.quick else _EMPTY))
@@ -90,6 +106,8 @@ def main() -> int:
         return 130
     for table in tables:
         show(table)
+    if arguments.write:
+        write_page(arguments.only, tables)
     arguments.runs.mkdir(parents=True, exist_ok=True)
     file = arguments.runs / f'bench_{begin:%Y-%m-%d_%H-%M-%S}.md'
     file.write_text('\n'.join(table.markdown() for table in tables), encoding='utf-8')
@@ -130,6 +148,17 @@ def _ticks(graph: Graph, folder: Path, wanted: str, quick: bool) -> list[Table]:
         ]
     late = [c for c in (slow, fast, slow_recording, fast_recording) if c in found]
     return [*tables, lateness_table(late, found)]
+
+
+def _real_time(graph: Graph, folder: Path, rate: float, quick: bool) -> Table:
+    """Under load, what the system gives the ticks on request; where it refuses, that is told."""
+    busy = os.cpu_count() or 1
+    say(f'{busy} busy processes, {rate:g} Hz')
+    asked = ('thread_priority:=80', f'cpu_affinity:=[{busy - 1}]', 'lock_memory:=true')
+    contenders = [asking(folder, rate, *asked[:count]) for count in range(len(asked) + 1)]
+    plan = _TICKS_QUICK if quick else _TICKS
+    found = measure_ticks(graph, contenders, plan, busy)
+    return lateness_table(contenders, found, f' beside {busy} busy processes')
 
 
 def _many(graph: Graph, folder: Path, quick: bool) -> Table:

@@ -18,24 +18,29 @@ Listens to ``joint_states`` and ``/diagnostics`` and says on request what it has
 
 For every line on its standard input it answers a line of JSON: the steady time, the number that
 the publisher gave its last message (so that none is missed by counting), how many arrived, and
-the last diagnostics; where the line is ``forget``, it forgets those first. It polls, so that its
-own wake-ups take little of the processor.
+the last diagnostics; where the line is ``forget``, it forgets those first. ``stood`` is how many
+times the stamps of the joint states stood still as long as Fast DDS checks shared memory. It
+polls, so that its own wake-ups take little of the processor.
 """
 
 from __future__ import annotations
 
 import json
 import select
+from struct import unpack_from
 import sys
 from time import monotonic_ns
 from typing import Any
 
 from bench.raw_node import keep_last, node, subscription, taker
 from diagnostic_msgs.msg import DiagnosticArray
+from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.stop import stop_on_signals
 
 _POLL = 0.005
 _DEPTH = 2000
+_CHECK = 325_000_000, 355_000_000
+"""A third of the ``healthy_check_timeout_ms`` of 1000, and a bit, in [ns]."""
 
 
 def main() -> None:
@@ -46,13 +51,15 @@ def main() -> None:
         diagnostics = listener.create_subscription(
             DiagnosticArray, '/diagnostics', lambda _: None, keep_last(10)
         )
-        published = received = 0
+        published = received = stood = stamp = 0
         health: dict[str, str] = {}
         while not stop.is_set():
             asked = bool(select.select([sys.stdin], [], [], _POLL)[0])
             while (taken := take()) is not None:
                 published = taken[1]['publication_sequence_number']
                 received += 1
+                before, stamp = stamp, _stamp(taken[0])
+                stood += _CHECK[0] < stamp - before < _CHECK[1]
             now = monotonic_ns()
             while (heard := diagnostics.handle.take_message(DiagnosticArray, False)) is not None:
                 health = _values(heard[0])
@@ -63,7 +70,12 @@ def main() -> None:
                 if question == 'forget':
                     health = {}
                 answer = {'time': now, 'published': published, 'received': received}
-                print(json.dumps({**answer, 'health': health}), flush=True)
+                print(json.dumps({**answer, 'stood': stood, 'health': health}), flush=True)
+
+
+def _stamp(message: bytes) -> int:
+    seconds, nanoseconds = unpack_from('<iI', message, 4)
+    return int(seconds * NANOSECONDS + nanoseconds)
 
 
 def _values(message: DiagnosticArray) -> dict[str, Any]:

@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import json
 import os
@@ -37,7 +37,7 @@ _PATIENCE = 15.0
 _LONGEST = 600
 """How long a process may live where nothing else is said, in [s]."""
 
-_MOST = 6
+_MOST = 5 + (os.cpu_count() or 1)
 """How many processes may live at once."""
 
 
@@ -150,7 +150,9 @@ class Graph:
         self._environment.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
 
     @contextmanager
-    def run(self, module: str, arguments: Sequence[str] = ()) -> Iterator[Process]:
+    def run(
+        self, module: str, arguments: Sequence[str] = (), more: Mapping[str, str] | None = None
+    ) -> Iterator[Process]:
         """
         Run ``python -m module`` for the length of a with statement.
 
@@ -160,6 +162,8 @@ class Graph:
             The module.
         arguments
             Its command line.
+        more
+            Variables of its environment beside those of the graph, or in their place.
 
         """
         if len(self._alive) >= _MOST:
@@ -171,7 +175,7 @@ class Graph:
             popen = subprocess.Popen(
                 [sys.executable, *command],
                 cwd=ROOT,
-                env=self._environment,
+                env={**self._environment, **(more or {})},
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,

@@ -49,6 +49,19 @@ def write_scene(folder: Path, rate: float, record: bool = False) -> Path:
     return file
 
 
+def write_turning(folder: Path, rate: float) -> Path:
+    """Write a scene of a four-bar that turns by itself, at a rate in [Hz]; return its file."""
+    file = folder / f'turning_{rate:g}.yaml'
+    lines = [
+        f'linkage: {ROOT / "config" / "linkages" / "four_bar.yaml"}',
+        f'rate: {rate:g}',
+        'drive: {constant_rate: {rate: 1.0}}',
+        'effects: {velocity: {}}',
+    ]
+    file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    return file
+
+
 def write_many(folder: Path, rate: float, count: int) -> Path:
     """
     Write a scene of several four-bars that turn by themselves, each at a speed of its own.

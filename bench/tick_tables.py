@@ -58,7 +58,7 @@ def cost_table(title: str, ours: Contender, other: Contender, target: str, found
     return table
 
 
-def lateness_table(contenders: Sequence[Contender], found: Found) -> Table:
+def lateness_table(contenders: Sequence[Contender], found: Found, load: str = '') -> Table:
     """
     Return how late ticks were and how many were lost, from start to end of every run.
 
@@ -68,10 +68,12 @@ def lateness_table(contenders: Sequence[Contender], found: Found) -> Table:
         Whom to show: nodes that tell in their diagnostics.
     found
         What was measured.
+    load
+        What else ran.
 
     """
     table = Table(
-        'lateness from start to end of each run; target: no tick lost on a quiet core',
+        f'lateness{load} from start to end of each run; target: no tick lost on a quiet core',
         ('', 'p50 µs', 'p99 µs', 'longest µs', '> period', 'lost', 'of ticks', 'CPU µs',
          'bag dropped', 'waited for CPU'),
     )  # fmt: skip

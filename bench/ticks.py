@@ -18,7 +18,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 import time
 
@@ -112,6 +113,17 @@ def ours(folder: Path, rate: float, record: bool = False) -> Contender:
     )
 
 
+def asking(folder: Path, rate: float, *parameters: str) -> Contender:
+    """Return our node with parameters, at a rate, in [Hz]."""
+    node = ours(folder, rate)
+    given = [word for parameter in parameters for word in ('-p', parameter)]
+    return replace(
+        node,
+        name=' + '.join([node.name, *(name.partition(':=')[0] for name in parameters)]),
+        arguments=(*node.arguments, *given),
+    )
+
+
 def many(folder: Path, rate: float, count: int) -> Contender:
     """Return our node with many linkages in one scene, at a rate, in [Hz]."""
     scene = write_many(folder, rate, count)
@@ -135,7 +147,7 @@ def bare(rate: float) -> Contender:
 
 
 def measure_ticks(
-    graph: Graph, contenders: Sequence[Contender], plan: TickPlan
+    graph: Graph, contenders: Sequence[Contender], plan: TickPlan, busy: int = 0
 ) -> dict[Contender, list[Measurement]]:
     """
     Measure every contender in turn, as many rounds as planned, and return what came.
@@ -148,13 +160,16 @@ def measure_ticks(
         Whom to measure.
     plan
         How much is measured.
+    busy
+        How many processes beside them take all that they get of a processor.
 
     """
     found: dict[Contender, list[Measurement]] = {contender: [] for contender in contenders}
-    with (
-        graph.run('linkage_ros.ros.crank_source'),
-        graph.run('bench.listener') as listener,
-    ):
+    with ExitStack() as stack:
+        stack.enter_context(graph.run('linkage_ros.ros.crank_source'))
+        listener = stack.enter_context(graph.run('bench.listener'))
+        for _ in range(busy):
+            stack.enter_context(graph.run('bench.busy'))
         for number in range(plan.rounds):
             # There and back again, so that a drift of the machine favours no one.
             for contender in contenders if number % 2 == 0 else reversed(contenders):

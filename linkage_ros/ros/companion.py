@@ -22,6 +22,7 @@ import sys
 from threading import Event
 from typing import TypeVar
 
+from linkage_ros.ros.transports import leave_out_shared_memory
 from linkage_ros.stop import bounded_end
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 import rclpy
@@ -69,6 +70,7 @@ def run_companion(
         Ends the run.
 
     """
+    leave_out_shared_memory()
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = make()

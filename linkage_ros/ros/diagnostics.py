@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from operator import itemgetter
 from typing import TYPE_CHECKING
@@ -120,6 +120,8 @@ class Health:
         How many of its messages held no time.
     crank_shared
         Whether the crank's topic is for other joints, too: then it may have several publishers.
+    system
+        What of middleware and operating system bears on the ticks.
 
     """
 
@@ -138,6 +140,7 @@ class Health:
     clock_silence: float = 0.0
     clock_refused: int = 0
     crank_shared: bool = False
+    system: Mapping[str, str] = field(default_factory=dict)
 
     def statuses(self) -> list[DiagnosticStatus]:
         """Return the statuses, one for each task."""
@@ -185,6 +188,7 @@ class Health:
             **({'Clock messages refused': self.clock_refused} if self.clock_refused else {}),
             'Resets': self.loop.counts.resets,
         }
+        values |= self.system
         return self._status('tick', level, message, values)
 
     def _lost_time(self) -> dict[str, object]:

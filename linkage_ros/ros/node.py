@@ -41,10 +41,12 @@ from linkage_ros.ros.bag_topics import bag_topic
 from linkage_ros.ros.diagnostics import CLOCK_PATIENCE, Health, no_clock, Snapshot
 from linkage_ros.ros.late_answers import LateAnswers
 from linkage_ros.ros.parameters import declare_parameters, nearness_limits
+from linkage_ros.ros.real_time import RealTime
 from linkage_ros.ros.run_recording import RunRecording
 from linkage_ros.ros.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
 from linkage_ros.ros.simulated_time import ClockGuard
 from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
+from linkage_ros.ros.transports import standstill
 from linkage_ros.ros.warnings import Warnings
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
@@ -127,6 +129,13 @@ class LinkageNode(LifecycleNode):
         self.add_on_set_parameters_callback(self._on_parameters)
         self._warnings = Warnings(self.get_logger())
         self._before = Snapshot()
+        self._real_time = RealTime(
+            self.get_parameter('thread_priority').value,
+            self.get_parameter_or('cpu_affinity').value or (),
+            self.get_parameter('lock_memory').value,
+        )
+        why = standstill()
+        self._middleware = {'Middleware': why} if why else {}
 
     @property
     def crank_topic(self) -> str:
@@ -179,7 +188,10 @@ class LinkageNode(LifecycleNode):
         self._before = Snapshot.of(self.loop.counts, self._activated)
         if self.scene.record is not None:
             self._start_recording()
-        self.loop.start(self._pace(self.scene.rate))
+        self._real_time.lock_memory()
+        self.loop.start(self._real_time.paced(self._pace(self.scene.rate)))
+        for line in self._middleware.values():
+            self.get_logger().info(line)
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
         drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))
         source = f'from {self.crank_topic}' if self.crank_topic else f'driven by {drives}'
@@ -367,6 +379,8 @@ class LinkageNode(LifecycleNode):
         if min(silence, (time.monotonic_ns() - self._activated) / NANOSECONDS) > CLOCK_PATIENCE:
             remedy = 'start the simulation, or set use_sim_time: false'
             self._warnings.say('clock', f'{no_clock(silence)}: {remedy}', period)
+        while self._real_time.refused:
+            self.get_logger().warning(self._real_time.refused.pop())
         if loop.failure:
             self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
         if loop.recorder is not None and loop.recorder.failure is not None:
@@ -409,6 +423,7 @@ class LinkageNode(LifecycleNode):
             recording_failure=self.recording.failure,
             snapshots=self.recording.snapshots,
             limits=nearness_limits(self),
+            system=self._real_time.in_force | self._middleware,
         )
         self._before = now
         message = DiagnosticArray(status=health.statuses())

@@ -21,10 +21,12 @@ from math import pi
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
+    IntegerRange,
     ParameterDescriptor,
     ParameterType,
 )
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 _PERIOD = FloatingPointRange(from_value=0.1, to_value=3600.0)
 
@@ -58,6 +60,7 @@ def declare_parameters(node: Node) -> None:
             read_only=True,
         ),
     )
+    _declare_real_time(node)
     for name, default_period, description in (
         ('diagnostics_period', 1.0, 'Time between two diagnostics [s]'),
         ('warning_period', 5.0, 'Least time between two warnings of one kind [s]'),
@@ -83,6 +86,37 @@ def declare_parameters(node: Node) -> None:
                 additional_constraints='may be changed at any time',
             ),
         )
+
+
+def _declare_real_time(node: Node) -> None:
+    node.declare_parameter(
+        'thread_priority',
+        0,
+        ParameterDescriptor(
+            type=ParameterType.PARAMETER_INTEGER,
+            description='Priority of the tick under SCHED_FIFO; 0: none',
+            integer_range=[IntegerRange(from_value=0, to_value=99, step=1)],
+            read_only=True,
+        ),
+    )
+    node.declare_parameter(
+        'cpu_affinity',
+        Parameter.Type.INTEGER_ARRAY,  # of an empty list rclpy would not know of what
+        ParameterDescriptor(
+            type=ParameterType.PARAMETER_INTEGER_ARRAY,
+            description='Numbers of the processors that may run the tick; not set: all',
+            read_only=True,
+        ),
+    )
+    node.declare_parameter(
+        'lock_memory',
+        False,
+        ParameterDescriptor(
+            type=ParameterType.PARAMETER_BOOL,
+            description='Whether the memory of the process stays in that of the machine',
+            read_only=True,
+        ),
+    )
 
 
 def nearness_limits(node: Node) -> dict[str, float]:

@@ -30,6 +30,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.ros.cues import cues, Part, read_ahead
 from linkage_ros.ros.playback import Playback, SteadyClock, Ticks
+from linkage_ros.ros.transports import leave_out_shared_memory
 from linkage_ros.stop import bounded_end
 import rclpy
 from rclpy.duration import Duration
@@ -88,6 +89,7 @@ def player_node(arguments: Sequence[str]) -> Iterator[Node]:
     """
     # As for the tick: a message would wait for the thread that reads ahead.
     sys.setswitchinterval(_SWITCH_INTERVAL)
+    leave_out_shared_memory()
     try:
         rclpy.init(
             args=['linkage_player', *arguments], signal_handler_options=SignalHandlerOptions.NO

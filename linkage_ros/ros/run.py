@@ -27,6 +27,7 @@ from time import monotonic
 from typing import Protocol
 
 from linkage_ros.ros.node import LinkageNode
+from linkage_ros.ros.transports import leave_out_shared_memory
 from linkage_ros.stop import bounded_end
 import rclpy
 from rclpy.executors import (
@@ -93,6 +94,7 @@ def run_linkage_node(
     # The tick shares the interpreter with executor and recorder: at the default of 5 ms it would
     # wait for them that long.
     sys.setswitchinterval(_SWITCH_INTERVAL)
+    leave_out_shared_memory()
     try:
         rclpy.init(
             args=['linkage_node', *arguments], signal_handler_options=SignalHandlerOptions.NO

@@ -87,6 +87,34 @@ def test_a_hundred_linkages_are_measured(tmp_path):
     assert all(isfinite(value) for value in _numbers(cells[1:4]))
 
 
+@pytest.mark.ros
+@pytest.mark.timeout(90)
+def test_ticks_under_load_are_measured_with_and_without_what_the_system_gives(tmp_path):
+    kept = _bench(tmp_path, '--only', 'real_time')
+    for rate in (1, 10):
+        for more in ('', ' + thread_priority', ' + thread_priority + cpu_affinity'):
+            cells = _row(kept, f'linkage_node{more}, {rate} kHz')
+            assert all(isfinite(value) for value in _numbers(cells[1:4]))
+
+
+@pytest.mark.ros
+@pytest.mark.timeout(90)
+def test_subscribers_that_come_and_go_are_measured_for_each_way_to_carry_messages(tmp_path):
+    kept = _bench(tmp_path, '--only', 'comers')
+    for way in (
+        'shared memory',
+        'UDP only',
+        'shared memory, timeout 30 ms',
+        'shared memory, asynchronous',
+    ):
+        cells = _row(kept, f'{way}, 1 kHz')
+        stood, lost, ticks, *_, deaf, missed = cells[1:]
+        assert 0 <= int(lost) < int(ticks)
+        assert int(stood) >= 0
+        assert deaf == '0'
+        assert int(missed.partition(' of ')[2]) > 0
+
+
 @pytest.mark.timeout(90)
 def test_the_empty_scene_is_measured_against_its_bare_closure(tmp_path):
     kept = _bench(tmp_path, '--only', 'empty')

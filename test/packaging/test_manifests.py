@@ -113,6 +113,8 @@ def test_parameter_file_has_the_shape_that_rcl_reads(root):
         'warning_period': 5.0,
         'warn': {'transmission_angle': 0.0, 'conditioning': 1e-6, 'toggle_distance': 1e-3},
         'runs_directory': '',
+        'thread_priority': 0,
+        'lock_memory': False,
     }
 
 

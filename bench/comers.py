@@ -1,0 +1,71 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Subscribers of ``joint_states`` that come and go, each a DDS participant of its own, in turn.
+
+Arguments: how many come, and for how long each listens, in [s]. At the end it prints a line of
+JSON: how many came, how many of them heard nothing, the messages that they heard, and those missed
+between the first and the last number of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import json
+import sys
+from time import monotonic, sleep
+
+from bench.raw_node import keep_last, node, subscription, taker
+from linkage_ros.stop import stop_on_signals
+
+_PATIENCE = 5.0
+"""How long one waits for its first message, in [s]."""
+
+_POLL = 0.005
+_DEPTH = 2000
+
+
+def main() -> None:
+    """Come and go until all have been there, or a signal."""
+    stop = stop_on_signals()
+    count, listens = int(sys.argv[1]), float(sys.argv[2])
+    del sys.argv[1:]
+    found = {'came': 0, 'deaf': 0, 'heard': 0, 'missed': 0}
+    while found['came'] < count and not stop.is_set():
+        numbers = set(_listen(listens))
+        found['came'] += 1
+        found['deaf'] += not numbers
+        found['heard'] += len(numbers)
+        if numbers:
+            found['missed'] += max(numbers) - min(numbers) + 1 - len(numbers)
+    print(json.dumps(found), flush=True)
+
+
+def _listen(listens: float) -> Iterator[int]:
+    """Yield the numbers that the publisher gave the messages of so many seconds."""
+    with node('comer') as comer:
+        take = taker(subscription(comer, 'joint_states', keep_last(_DEPTH)))
+        until = monotonic() + _PATIENCE
+        first = True
+        while monotonic() < until:
+            while (taken := take()) is not None:
+                if first:
+                    first, until = False, monotonic() + listens
+                yield taken[1]['publication_sequence_number']
+            sleep(_POLL)
+
+
+if __name__ == '__main__':
+    main()

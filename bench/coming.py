@@ -1,0 +1,178 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What subscribers that come and go cost the ticks, by how Fast DDS carries the messages.
+
+A publisher opens the shared-memory port of every subscriber that comes, on the thread that
+publishes. The check of a port that nobody has written to for long waits a third of the
+``healthy_check_timeout_ms`` of whoever made the port: 0.33 s (Fast-DDS issue 6535).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+import time
+from typing import Any
+
+from bench.cpu_time import cpu_time
+from bench.processes import BenchError, Graph, Process
+from bench.report import say, Table
+from bench.scenes import write_turning
+from linkage_ros.shipped import shipped
+
+_APPEARING = 15.0
+"""How long the node may take to tick, in [s]."""
+
+_TELLING = 1.3
+"""After so many [s] the node has published its diagnostics anew."""
+
+_TIMEOUT = 30
+"""Of the profile that has a shorter one, in [ms]."""
+
+_SHARED = f"""\
+    <transport_descriptor>
+      <transport_id>shm</transport_id>
+      <type>SHM</type>
+      <healthy_check_timeout_ms>{_TIMEOUT}</healthy_check_timeout_ms>
+    </transport_descriptor>
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class ComersPlan:
+    """
+    How much is measured.
+
+    Attributes
+    ----------
+    comers
+        Subscribers that come and go, one after the other.
+    listens
+        How long each hears messages, in [s].
+    busy
+        Processes that take a processor each where there is load.
+
+    """
+
+    comers: int
+    listens: float
+    busy: int
+
+
+def measure_comers(
+    graph: Graph, folder: Path, rates: tuple[float, ...], plan: ComersPlan
+) -> Table:
+    """
+    Have subscribers come and go for each way, rate and load, and return the table.
+
+    Parameters
+    ----------
+    graph
+        Where they run.
+    folder
+        For scenes and profiles.
+    rates
+        Ticks a second.
+    plan
+        How much is measured.
+
+    """
+    table = Table(
+        f'{plan.comers} subscribers on defaults come and go',
+        ('', 'stood still for 0.33 s', 'ticks lost', 'of', 'longest µs', 'CPU µs a tick',
+         'waited for CPU', 'comers that heard nothing', 'messages missed'),
+    )  # fmt: skip
+    for rate in rates:
+        scene = write_turning(folder, rate)
+        for busy in dict.fromkeys((0, plan.busy)):
+            for name, more in _ways(folder).items():
+                load = f', {busy} busy processes' if busy else ''
+                cells = _measure(graph, scene, more, busy, plan)
+                table.rows.append((f'{name}, {rate / 1e3:g} kHz{load}', *cells))
+                say('  ' + ', '.join(table.rows[-1]))
+    return table
+
+
+def _ways(folder: Path) -> Mapping[str, Mapping[str, str]]:
+    """Return for each way to carry messages the node's environment; all stay on the machine."""
+    local = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}
+    profile = shipped('fastdds/local.xml')
+    text = profile.read_text('utf-8')
+    for mark, more in (
+        ('  </transport_descriptors>', _SHARED),
+        ('        <transport_id>udp<', '        <transport_id>shm</transport_id>\n'),
+    ):
+        text = text.replace(mark, more + mark)
+    short = folder / 'short.xml'
+    short.write_text(text, encoding='utf-8')
+    return {
+        'shared memory': {},
+        'UDP only': {**local, 'FASTRTPS_DEFAULT_PROFILES_FILE': str(profile)},
+        f'shared memory, timeout {_TIMEOUT} ms': {
+            **local,
+            'FASTRTPS_DEFAULT_PROFILES_FILE': str(short),
+        },
+        'shared memory, asynchronous': {'RMW_FASTRTPS_PUBLICATION_MODE': 'ASYNCHRONOUS'},
+    }
+
+
+def _measure(
+    graph: Graph, scene: Path, more: Mapping[str, str], busy: int, plan: ComersPlan
+) -> Sequence[str]:
+    """Return what one row of the table tells."""
+    with ExitStack() as stack:
+        run = stack.enter_context
+        listener = run(graph.run('bench.listener'))
+        ours = ('--ros-args', '-p', f'scene:={scene}')
+        node = run(graph.run('linkage_ros.ros.linkage_node', ours, more))
+        before = _heard(listener, node)
+        for _ in range(busy):
+            run(graph.run('bench.busy'))
+        ran, waited = cpu_time(node.pid)
+        comers = run(graph.run('bench.comers', (str(plan.comers), f'{plan.listens:g}')))
+        came = comers.read(60.0 + plan.comers * (plan.listens + 2.0))
+        ran_then, waited_then = cpu_time(node.pid)
+        time.sleep(_TELLING)
+        listener.ask('forget')
+        after = _heard(listener, node)
+    ticks, lost = (
+        int(after['health'][key]) - int(before['health'][key])
+        for key in ('Events since startup', 'Lost ticks')
+    )
+    wait = (waited_then - waited) / (after['time'] - before['time'])
+    return (
+        str(after['stood'] - before['stood']),
+        str(lost),
+        str(ticks + lost),
+        f'{float(after["health"]["Lateness max (us)"]):.0f}',
+        f'{(ran_then - ran) / max(ticks, 1) / 1e3:.1f}',
+        f'{wait:.0%}',
+        str(came['deaf']),
+        f'{came["missed"]} of {came["heard"]}',
+    )
+
+
+def _heard(listener: Process, node: Process) -> dict[str, Any]:
+    """Return what the listener has heard, as soon as there are diagnostics of the node."""
+    until = time.monotonic() + _APPEARING
+    while not (heard := listener.ask('?'))['health']:
+        node.check()
+        if time.monotonic() > until:
+            raise BenchError(f'{node.name}: no diagnostics in {_APPEARING:g} s')
+        time.sleep(0.1)
+    return dict(heard)

@@ -1,0 +1,77 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How Fast DDS carries messages: without shared memory, unless the user has said otherwise.
+
+A publisher opens the shared-memory port of every subscriber that comes, on the thread that
+publishes, and checks it: that may wait a third of the ``healthy_check_timeout_ms`` of whoever made
+the port, 0.33 s by default (Fast-DDS issue 6535, `SharedMemGlobal.hpp` of 2.14.5). Ticks stand
+still for it. UDP within a machine costs as much, and clients on defaults hear it.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import re
+
+from rclpy.utilities import get_rmw_implementation_identifier
+
+BUILTIN_TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
+_SAID = (
+    BUILTIN_TRANSPORTS,
+    'FASTRTPS_DEFAULT_PROFILES_FILE',
+    'FASTDDS_DEFAULT_PROFILES_FILE',
+    'RMW_FASTRTPS_PUBLICATION_MODE',
+)
+"""With one of these the user says how messages are carried."""
+
+_PROFILES = 'DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml'
+"""With one of these in the working folder, too."""
+
+_SHARED = re.compile(r'/(?:fastrtps|fastdds)_port\d+$', re.MULTILINE)
+_MAPPED = Path('/proc/self/maps')
+
+
+def leave_out_shared_memory() -> None:
+    """
+    Have Fast DDS use UDP alone; nothing, where the user has said how messages are carried.
+
+    It has to be called before `rclpy.init`, and holds for this process and those that it starts.
+    """
+    if not (any(map(os.environ.get, _SAID)) or any(Path(name).is_file() for name in _PROFILES)):
+        os.environ[BUILTIN_TRANSPORTS] = 'UDPv4'
+
+
+def standstill() -> str:
+    """
+    Return why ticks may stand still when a subscriber comes, and what helps; '' where they do not.
+
+    What is mapped tells: with the discovery range LOCALHOST rmw_fastrtps brings shared memory
+    whatever the environment says, and where another has made the context it was chosen before.
+    """
+    if not get_rmw_implementation_identifier().startswith('rmw_fastrtps'):
+        return ''
+    try:
+        shared = _SHARED.search(_MAPPED.read_text())
+    except OSError:  # not Linux
+        return ''
+    if shared is None:
+        return ''
+    return (
+        'Fast DDS uses shared memory: ticks may stand still for 0.33 s when a subscriber comes; '
+        'start the process with FASTDDS_BUILTIN_TRANSPORTS=UDPv4, or, in the place of '
+        'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST, with the profile config/fastdds/local.xml'
+    )
