@@ -156,6 +156,7 @@ def _linkage(member: Member) -> dict[str, Any]:
         'joints': list(member.joints),
         'drive': member.drive[0],
         'effects': list(member.effects),
+        'effects_not_imported': list(member.not_imported),
     }
 
 
