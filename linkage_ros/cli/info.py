@@ -245,6 +245,8 @@ def _versions(versions: dict[str, Any]) -> Iterator[str]:
 
 def _qos(topic: dict[str, Any]) -> str:
     """Return a quality of service in a word, or in two where who comes late gets the last."""
+    if not topic['qos_understood']:
+        return 'not understood, taken as reliable'
     latched = ', transient local' if topic['durability'] == 'transient_local' else ''
     return clean(topic['reliability']).replace('_', ' ') + latched
 
