@@ -32,8 +32,7 @@ from linkage_ros.bag.reading.reader import Bag, BagMessage, read_bag
 from linkage_ros.bag.reading.run_events import run_account, run_said, RunAccount
 from linkage_ros.bag.recovering.recovery import NOTHING_LOST, RECOVERED
 from linkage_ros.cli.progress import progress
-from linkage_ros.cli.tables import clean
-from linkage_ros.errors import BagError
+from linkage_ros.errors import BagError, clean
 from linkage_ros.replay import recorded_scene
 from linkage_ros.scene.scene import Scene
 from linkage_ros.stop import StoppedError

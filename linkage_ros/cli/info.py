@@ -45,9 +45,9 @@ from linkage_ros.cli.bag_account import (
 from linkage_ros.cli.bag_reading import add_trust, opened, scene_of
 from linkage_ros.cli.linkage_file import value_text, wrapped
 from linkage_ros.cli.progress import progress
-from linkage_ros.cli.tables import clean, show, Table
+from linkage_ros.cli.tables import show, Table
 from linkage_ros.cli.worst_states import examine
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import clean, LinkageError
 
 _MIB = 2**20
 

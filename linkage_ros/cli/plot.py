@@ -26,7 +26,7 @@ from typing import Any
 
 from linkage_ros.cli.bag_reading import add_trust, beside, opened, scene_of
 from linkage_ros.effects.turns import wrapped
-from linkage_ros.errors import BagError, LinkageError
+from linkage_ros.errors import BagError, LinkageError, shortened
 from linkage_ros.joint_state import JointStateReader, Rejection
 from linkage_ros.kinematics.linkage import Input, RevoluteJoint
 from linkage_ros.replay import replay
@@ -144,13 +144,13 @@ def _figure(
     for (label, curves), axis in zip(panels, axes[:, 0], strict=True):
         _panel(axis, label, curves)
     if driven.slider:
-        axes[-1, 0].set_xlabel(f'{driven.joint} [m]')
+        axes[-1, 0].set_xlabel(f'{_plain(driven.joint, 80)} [m]')
     else:
         axes[-1, 0].set_xlabel('crank angle [rad]')
         axes[-1, 0].set_xlim(0.0, tau)
         ticks = [0.0, pi / 2, pi, 3 * pi / 2, tau]
         axes[-1, 0].set_xticks(ticks, ['0', 'π/2', 'π', '3π/2', '2π'])
-    figure.suptitle(title, fontsize=11)
+    figure.suptitle(_plain(title, 160), fontsize=11)
     figure.tight_layout()
     try:
         figure.savefig(picture)
@@ -160,12 +160,17 @@ def _figure(
         plt.close(figure)
 
 
+def _plain(text: str, most: int) -> str:
+    """Return a text that is drawn as it is: between two dollars matplotlib sees mathematics."""
+    return shortened(text, most).replace('$', r'\$')
+
+
 def _panel(axis: Any, label: str, curves: Curves) -> None:
     for number, (name, (xs, ys)) in enumerate(curves.items()):
         axis.plot(
             xs,
             ys,
-            label=name,
+            label=_plain(name, 80),
             color=_COLOURS[number % len(_COLOURS)],
             linewidth=1.6,
         )

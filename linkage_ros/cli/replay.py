@@ -49,8 +49,8 @@ from linkage_ros.cli.replay_account import (
     versions_text,
 )
 from linkage_ros.cli.replay_other import replayed_with
-from linkage_ros.cli.tables import clean, show
-from linkage_ros.errors import BagError, LinkageError
+from linkage_ros.cli.tables import show
+from linkage_ros.errors import BagError, clean, LinkageError
 from linkage_ros.replay import own_effects_here, ReplayedTick, versions_here
 from linkage_ros.scene.load import load_scene
 
@@ -169,7 +169,7 @@ def _show_proof(account: dict[str, Any]) -> None:
 def _show_what_if(account: dict[str, Any]) -> None:
     print(
         f'{account["bag"]}, as {account["scene"]}: {account["joint_states"]} joint states, '
-        f'from {account["crank_topic"]}'
+        f'from {clean(account["crank_topic"])}'
     )
     for key, when in (('joints_only_recorded', 'recorded'), ('joints_only_now', 'now')):
         if account[key] and account['topics']:
