@@ -16,7 +16,7 @@
 Every error that a user can meet: one root, and one line of text each.
 
 ``str(error)`` is exactly what the user reads: where (file, key or topic), what is wrong with the
-value, and the remedy.
+value, and the remedy. It is printable, on one line, and not without end, whatever it is about.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from os import PathLike
 from typing import Any
 
 _LONGEST_VALUE = 80
+_LONGEST_PART = 2000
 
 
 class LinkageError(Exception):
@@ -45,10 +46,11 @@ class LinkageError(Exception):
     """
 
     def __init__(self, where: str | PathLike[str], reason: str, remedy: str) -> None:
-        self.where = str(where)
-        self.reason = reason
-        self.remedy = remedy
-        super().__init__(' '.join(f'{self.where}: {reason}; {remedy}'.split()))
+        self.where, self.reason, self.remedy = (
+            shortened(clean(' '.join(text.split())), _LONGEST_PART)
+            for text in (str(where), reason, remedy)
+        )
+        super().__init__(f'{self.where}: {self.reason}; {self.remedy}')
 
 
 class DefinitionError(LinkageError):
@@ -106,6 +108,25 @@ def quoted(value: Any) -> str:
 
     What is too long loses its middle: a path ends with the name that matters.
     """
-    text = repr(value)
-    half = (_LONGEST_VALUE - 1) // 2
-    return text if len(text) <= _LONGEST_VALUE else f'{text[:half]}…{text[-half:]}'
+    return shortened(repr(value), _LONGEST_VALUE)
+
+
+def shortened(text: str, most: int) -> str:
+    """Return a text of no more than so many letters, without its middle where it is longer."""
+    half = (most - 1) // 2
+    return text if len(text) <= most else f'{text[:half]}…{text[-half:]}'
+
+
+def clean(text: str) -> str:
+    r"""
+    Return a text without what a terminal would obey: names come from anywhere.
+
+    Whatever is not printable, line breaks and letters that turn the direction of writing among it,
+    is written as Python writes it in a text: ``\x1b``, ``\u202e``.
+    """
+    if text.isprintable():
+        return text
+    return ''.join(
+        letter if letter.isprintable() else letter.encode('unicode_escape').decode()
+        for letter in text
+    )

@@ -123,6 +123,7 @@ class Line:
 
     def _build(self, scene: Scene, closure: Closure | None, injection: Injection | None) -> None:
         member = self.member
+        _refuse_not_imported(member)
         drive, drive_parameters = member.drive
         drive_module = import_module(DRIVES[drive])
         named = set(member.effects)
@@ -254,6 +255,19 @@ def _extra(name: str, module: ModuleType, write: Writer, member: str) -> Extra:
     topic: str = f'~/{member}/{module.TOPIC[2:]}' if member else module.TOPIC
     of_reading = getattr(module, 'OF_READING', False)
     return Extra(name, topic, module.MESSAGE, write, getattr(write, 'no_pose', None), of_reading)
+
+
+def _refuse_not_imported(member: Member) -> None:
+    if member.not_imported:
+        from linkage_ros.effects.own import found_in  # local import: only where a scene has one
+
+        name = member.not_imported[0]
+        raise DefinitionError(
+            f'effects.{name}',
+            f'names a module, and what a bag names is not imported unasked; the name leads to '
+            f'{found_in(name)} here',
+            '--trust-effects imports it',
+        )
 
 
 def _refuse_idle(member: Member, forced: bool) -> None:

@@ -74,9 +74,16 @@ class ReplayedTick(NamedTuple):
     tick: Tick
 
 
-def recorded_scene(bag: Bag) -> Scene:
+def recorded_scene(bag: Bag, *, trust_effects: bool = False) -> Scene:
     """
     Return the scene that a bag carries.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+    trust_effects
+        As for `parse_scene`: a bag may come from anybody.
 
     Raises
     ------
@@ -99,7 +106,15 @@ def recorded_scene(bag: Bag) -> Scene:
         raise BagError(
             bag.path, f'carries no {LINKAGE_FILE}', 'name a bag that linkage_ros has recorded'
         )
-    return parse_scene(run.scene, str(bag.path), files, run.scene_folder, run.solvers, run.seed)
+    return parse_scene(
+        run.scene,
+        str(bag.path),
+        files,
+        run.scene_folder,
+        run.solvers,
+        run.seed,
+        trust_effects=trust_effects,
+    )
 
 
 def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:

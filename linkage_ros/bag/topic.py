@@ -56,7 +56,8 @@ class QosProfile:
 
     The words are rmw's: history 'keep_last' or 'keep_all', reliability 'reliable' or
     'best_effort', durability 'volatile' or 'transient_local', liveliness 'automatic' or
-    'manual_by_topic'. Durations are in [ns].
+    'manual_by_topic'. Durations are in [ns]. `understood` says whether a bag that was read has
+    said it so that it could be; else these are the values that stand here.
     """
 
     history: str = 'keep_last'
@@ -68,6 +69,7 @@ class QosProfile:
     liveliness: str = 'automatic'
     liveliness_lease_duration: int = INFINITE
     avoid_ros_namespace_conventions: bool = False
+    understood: bool = True
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the profile as rosbag2 writes it since metadata version 9, keys in its order."""
@@ -86,7 +88,7 @@ class QosProfile:
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> QosProfile:
         """Return the profile that rosbag2, of any metadata version, wrote as this mapping."""
-        words = {
+        words: dict[str, Any] = {
             key: names[mapping[key]] if isinstance(mapping[key], int) else str(mapping[key])
             for key, names in _NUMBERED.items()
         }

@@ -25,7 +25,7 @@ from typing import Any
 from linkage_ros.bag.account import counts_in, FAILURE
 from linkage_ros.bag.reading.beginning import lost_beginning
 from linkage_ros.bag.reading.contents import Contents
-from linkage_ros.bag.reading.folder import information_of
+from linkage_ros.bag.reading.folder import information_of, serialized_metadata
 from linkage_ros.bag.reading.layout import Layout
 from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.bag.reading.run_events import run_said
@@ -39,7 +39,9 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
     """Return what any bag says of itself, ours or not."""
     begin, end = contents.begin, contents.end
     said: Mapping[str, Any] = information_of(bag.path) if bag.path.is_dir() else {}
-    said = said or next((layout.rosbag2 for layout in layouts if layout.rosbag2), {})
+    within = next((layout.rosbag2 for layout in layouts if layout.rosbag2), None)
+    if not said and within is not None:
+        said = serialized_metadata(within)
     run = run_said(bag)
     # What is let go of is only told where there is some.
     let_go = counts_in(bag.custom, 'let_go')
@@ -70,6 +72,7 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
                 'size_bytes': size,
                 'reliability': topic.qos.reliability,
                 'durability': topic.qos.durability,
+                'qos_understood': topic.qos.understood,
                 'received': counted['received'].get(topic.name),
                 'dropped': counted['dropped'].get(topic.name),
                 'let_go': let_go.get(topic.name, 0) if let_go or counted['received'] else None,
@@ -156,6 +159,7 @@ def _linkage(member: Member) -> dict[str, Any]:
         'joints': list(member.joints),
         'drive': member.drive[0],
         'effects': list(member.effects),
+        'effects_not_imported': list(member.not_imported),
     }
 
 

@@ -17,10 +17,12 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
+import sys
 from threading import Event
 
 from linkage_ros.bag.account import counts_in
@@ -30,7 +32,9 @@ from linkage_ros.bag.reading.reader import Bag, BagMessage, read_bag
 from linkage_ros.bag.reading.run_events import run_account, run_said, RunAccount
 from linkage_ros.bag.recovering.recovery import NOTHING_LOST, RECOVERED
 from linkage_ros.cli.progress import progress
-from linkage_ros.errors import BagError
+from linkage_ros.errors import BagError, clean
+from linkage_ros.replay import recorded_scene
+from linkage_ros.scene.scene import Scene
 from linkage_ros.stop import StoppedError
 
 _MIB = 2**20
@@ -55,6 +59,38 @@ def opened(path: Path, stop: Event) -> Bag:
             raise StoppedError
 
     return read_bag(path, allow_truncated=True, told=look)
+
+
+def add_trust(parser: argparse.ArgumentParser) -> None:
+    """Declare the option by which a user trusts a bag."""
+    parser.add_argument(
+        '--trust-effects',
+        action='store_true',
+        help='import the modules that the scene of the bag names as effects, which runs their '
+        'code; it is said which',
+    )
+
+
+def scene_of(bag: Bag, *, trust_effects: bool) -> Scene:
+    """
+    Return the scene that a bag carries; what it imports, if that is wished, is said before.
+
+    Raises
+    ------
+    LinkageError
+        As `recorded_scene`.
+
+    """
+    scene = recorded_scene(bag)
+    if not trust_effects or not scene.not_imported:
+        return scene
+    from linkage_ros.effects.own import found_in
+
+    for name in scene.not_imported:
+        where = found_in(name)
+        line = f'linkage: {bag.path} is trusted: imports {name}, and the name leads to {where}'
+        print(clean(line), file=sys.stderr, flush=True)
+    return recorded_scene(bag, trust_effects=True)
 
 
 def beside(bag: Path, suffix: str) -> Path:

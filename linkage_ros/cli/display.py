@@ -28,7 +28,7 @@ from linkage_ros.ros.tick_loop import TickLoop
 
 _RICH = find_spec('rich') is not None
 if _RICH:
-    from rich.console import Group
+    from rich.console import Console, Group
     from rich.live import Live
     from rich.table import Table
     from rich.text import Text
@@ -53,7 +53,10 @@ class Display:
 
     def __init__(self, *, plain: bool) -> None:
         live = not plain and _RICH and sys.stdout.isatty()
-        self._live: Any = Live(transient=True, auto_refresh=False) if live else None
+        self._live: Any = None
+        if live:
+            console = Console(file=sys.__stdout__)
+            self._live = Live(console=console, transient=True, auto_refresh=False)
         self._period = _LIVE_PERIOD if live else _PLAIN_PERIOD
         self._shown = monotonic()
         self._before = (0, self._shown)

@@ -49,7 +49,7 @@ from linkage_ros.cli.tick_rows import (
     survey,
     TIME,
 )
-from linkage_ros.errors import BagError, did_you_mean, LinkageError
+from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
 from linkage_ros.replay import recorded_scene
 from linkage_ros.scene.scene import Scene
 from linkage_ros.stop import StoppedError
@@ -74,8 +74,9 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         print('linkage export: stopped; nothing was written', file=sys.stderr)
         return 1
     for (topic, reason), count in found.left_out.items():
-        print(f'linkage export: {topic}: {count} messages left out: {reason}', file=sys.stderr)
-    of = ', '.join(f'{count} of {topic}' for topic, count in found.counts.items())
+        line = f'linkage export: {topic}: {count} messages left out: {reason}'
+        print(clean(line), file=sys.stderr)
+    of = ', '.join(f'{count} of {clean(topic)}' for topic, count in found.counts.items())
     print(f'{arguments.output}: {found.rows} rows, {4 + len(found.keys)} columns ({of})')
     return 0
 

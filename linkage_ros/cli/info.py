@@ -42,13 +42,12 @@ from linkage_ros.cli.bag_account import (
     scene_account,
     worst_account,
 )
-from linkage_ros.cli.bag_reading import opened
+from linkage_ros.cli.bag_reading import add_trust, opened, scene_of
 from linkage_ros.cli.linkage_file import value_text, wrapped
 from linkage_ros.cli.progress import progress
-from linkage_ros.cli.tables import clean, show, Table
+from linkage_ros.cli.tables import show, Table
 from linkage_ros.cli.worst_states import examine
-from linkage_ros.errors import LinkageError
-from linkage_ros.replay import recorded_scene
+from linkage_ros.errors import clean, LinkageError
 
 _MIB = 2**20
 
@@ -57,12 +56,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
     parser.add_argument('--json', action='store_true', help='the same as JSON')
+    add_trust(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Look at the bag; return 1 where it was stopped."""
     bag = opened(arguments.bag, stop)
-    account = info(bag, stop)
+    account = info(bag, stop, trust_effects=arguments.trust_effects)
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
     else:
@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     return int(account['stopped'])
 
 
-def info(bag: Bag, stop: Event) -> dict[str, Any]:
+def info(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any]:
     """
     Return what there is to say of a bag, as JSON has it.
 
@@ -92,7 +92,7 @@ def info(bag: Bag, stop: Event) -> dict[str, Any]:
     account = account_of(bag, layouts, contents)
     account |= {'scene': None, 'scene_missing': None, 'replay': None}
     try:
-        scene = recorded_scene(bag)
+        scene = scene_of(bag, trust_effects=trust_effects)
         account['scene'] = scene_account(scene)
         states = max((topic['messages'] for topic in account['topics']), default=0)
         with progress('states looked at') as told:
@@ -189,8 +189,9 @@ def _linkage(linkage: dict[str, Any], begin: int | None) -> Iterator[tuple[str, 
         for bar in linkage.get('four_bars', ())
     ]
     yield 'links', '; '.join([str(linkage['links']), *bars])
-    for what in ('joints', 'effects'):
-        yield what, ', '.join(linkage[what]) or 'none'
+    yield 'joints', ', '.join(linkage['joints']) or 'none'
+    own = [f'{name} (not imported)' for name in linkage['effects_not_imported']]
+    yield 'effects', ', '.join([*linkage['effects'], *own]) or 'none'
     inputs = linkage['inputs']
     yield 'drive', f'{linkage["drive"]}, of {", ".join(given["joint"] for given in inputs)}'
     if 'states' not in linkage:
@@ -244,6 +245,8 @@ def _versions(versions: dict[str, Any]) -> Iterator[str]:
 
 def _qos(topic: dict[str, Any]) -> str:
     """Return a quality of service in a word, or in two where who comes late gets the last."""
+    if not topic['qos_understood']:
+        return 'not understood, taken as reliable'
     latched = ', transient local' if topic['durability'] == 'transient_local' else ''
     return clean(topic['reliability']).replace('_', ' ') + latched
 

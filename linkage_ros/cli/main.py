@@ -22,6 +22,7 @@ from importlib import import_module
 import sys
 
 from linkage_ros import __version__
+from linkage_ros.cli.outlet import clean_output
 from linkage_ros.errors import LinkageError
 from linkage_ros.stop import stop_on_signals, StoppedError
 
@@ -61,6 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run ``linkage``; return 0, 1 for a run that went wrong, 2 for wrong input, 3 for a loss."""
     # First of all: from here on Ctrl-C ends a run by closing its bag.
     stop = stop_on_signals()
+    clean_output()
     arguments = sys.argv[1:] if arguments is None else arguments
     commands = '\n'.join(f'  {name:<10} {text}' for name, text in COMMANDS.items())
     parser = argparse.ArgumentParser(

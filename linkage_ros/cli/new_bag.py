@@ -96,7 +96,7 @@ def names_for(source: Source, scene: Scene, what_if: WhatIf) -> Names:
     """Return the names of what a scene publishes."""
     run = source.run
     known: dict[str, str] = {}
-    if source.recorded is not None:
+    if source.recorded is not None and not source.recorded.not_imported:
         private = [extra.topic for extra in Pipeline(source.recorded).extras]
         known = dict(zip(private, run.extras, strict=False))
     pairs = {

@@ -36,8 +36,7 @@ from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.bag.topic import Topic
 from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.progress import progress, Told
-from linkage_ros.cli.tables import clean
-from linkage_ros.errors import BagError, did_you_mean, LinkageError
+from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
 from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.ros.bag_publishers import offer
 from linkage_ros.ros.cues import Part
@@ -183,7 +182,7 @@ def _summary(playback: Playback, rate: float) -> str:
     late = f'{playback.late} of {sent} messages by more than {LATE / 1e6:g} ms'
     rows = [
         ('played', f'{of} in {took}, at a rate of {rate:g}'),
-        *(('', f'{name}: {count}') for name, count in playback.counts.items()),
+        *(('', f'{clean(name)}: {count}') for name, count in playback.counts.items()),
         ('late', f'{late}; at most {playback.latest / 1e6:.1f} ms'),
     ]
     return '\n'.join(f'{head:<8}{text}' for head, text in rows)

@@ -24,12 +24,12 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.cli.bag_reading import beside, opened
+from linkage_ros.cli.bag_reading import add_trust, beside, opened, scene_of
 from linkage_ros.effects.turns import wrapped
-from linkage_ros.errors import BagError, LinkageError
+from linkage_ros.errors import BagError, LinkageError, shortened
 from linkage_ros.joint_state import JointStateReader, Rejection
 from linkage_ros.kinematics.linkage import Input, RevoluteJoint
-from linkage_ros.replay import recorded_scene, replay
+from linkage_ros.replay import replay
 from linkage_ros.stop import StoppedError
 
 _COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
@@ -42,17 +42,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
     parser.add_argument('-o', '--output', type=Path, help='PNG, SVG or PDF; without it BAG.png')
+    add_trust(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Draw the bag."""
     picture = arguments.output or beside(arguments.bag, '.png')
-    draw(arguments.bag, picture, stop)
+    draw(arguments.bag, picture, stop, trust_effects=arguments.trust_effects)
     print(picture)
     return 0
 
 
-def draw(bag_path: Path, picture: Path, stop: Event) -> None:
+def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = False) -> None:
     """
     Draw a bag: each published joint, and its rate where there is one, over one turn of the crank.
 
@@ -71,7 +72,7 @@ def draw(bag_path: Path, picture: Path, stop: Event) -> None:
             'matplotlib', 'is not installed', 'pip install linkage_ros[report], or apt its package'
         )
     bag = opened(bag_path, stop)
-    scene = recorded_scene(bag)
+    scene = scene_of(bag, trust_effects=trust_effects)
     # Over the crank of the first linkage, with its joints.
     member = scene.members[0]
     linkage = member.linkage
@@ -143,13 +144,13 @@ def _figure(
     for (label, curves), axis in zip(panels, axes[:, 0], strict=True):
         _panel(axis, label, curves)
     if driven.slider:
-        axes[-1, 0].set_xlabel(f'{driven.joint} [m]')
+        axes[-1, 0].set_xlabel(f'{_plain(driven.joint, 80)} [m]')
     else:
         axes[-1, 0].set_xlabel('crank angle [rad]')
         axes[-1, 0].set_xlim(0.0, tau)
         ticks = [0.0, pi / 2, pi, 3 * pi / 2, tau]
         axes[-1, 0].set_xticks(ticks, ['0', 'π/2', 'π', '3π/2', '2π'])
-    figure.suptitle(title, fontsize=11)
+    figure.suptitle(_plain(title, 160), fontsize=11)
     figure.tight_layout()
     try:
         figure.savefig(picture)
@@ -159,12 +160,17 @@ def _figure(
         plt.close(figure)
 
 
+def _plain(text: str, most: int) -> str:
+    """Return a text that is drawn as it is: between two dollars matplotlib sees mathematics."""
+    return shortened(text, most).replace('$', r'\$')
+
+
 def _panel(axis: Any, label: str, curves: Curves) -> None:
     for number, (name, (xs, ys)) in enumerate(curves.items()):
         axis.plot(
             xs,
             ys,
-            label=name,
+            label=_plain(name, 80),
             color=_COLOURS[number % len(_COLOURS)],
             linewidth=1.6,
         )

@@ -44,7 +44,7 @@ def progress(what: str) -> Iterator[Told]:
         )
 
         columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        with Progress(*columns, console=Console(file=sys.__stderr__), transient=True) as bars:
             task = bars.add_task(what, total=None)
             yield lambda done, of: bars.update(task, completed=done, total=of)
         return

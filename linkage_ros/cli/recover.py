@@ -26,6 +26,7 @@ from linkage_ros.bag.recovering.recover import recover
 from linkage_ros.bag.recovering.recovery import Recovery
 from linkage_ros.cli.progress import progress
 from linkage_ros.cli.tables import show, Table
+from linkage_ros.errors import clean
 
 WHOLE, STOPPED, LOSS = 0, 1, 3
 
@@ -63,7 +64,7 @@ def _say(recovery: Recovery) -> None:
     if rows:
         show(Table('', ('topic', '>saved', '>of'), rows))
     if recovery.attachments:
-        print(f'attachments  {", ".join(recovery.attachments)}')
+        print(clean(f'attachments  {", ".join(recovery.attachments)}'))
     _lines('note', list(recovery.remarks))
     _lines('repaired', list(recovery.repaired))
     lost = []
@@ -81,7 +82,6 @@ def _say(recovery: Recovery) -> None:
 def _lines(word: str, lines: list[str]) -> None:
     for line in lines[:_MOST_SHOWN]:
         # What a damaged file says of itself may hold anything; a line stays a line.
-        text = ''.join(letter if letter.isprintable() else '�' for letter in line)
-        print(f'{word:<13}{text}')
+        print(f'{word:<13}{clean(line)}')
     if len(lines) > _MOST_SHOWN:
         print(f'{word:<13}and {len(lines) - _MOST_SHOWN:,} more')

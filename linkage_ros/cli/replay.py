@@ -37,7 +37,7 @@ from typing import Any
 
 from linkage_ros.bag.reading.reader import Bag, RUN_FILE
 from linkage_ros.bag.reading.run_events import run_account
-from linkage_ros.cli.bag_reading import BagReading, opened
+from linkage_ros.cli.bag_reading import add_trust, BagReading, opened, scene_of
 from linkage_ros.cli.proof import DIFFERENT, IDENTICAL, prove, turning_joints
 from linkage_ros.cli.replay_account import (
     bag_account,
@@ -49,9 +49,9 @@ from linkage_ros.cli.replay_account import (
     versions_text,
 )
 from linkage_ros.cli.replay_other import replayed_with
-from linkage_ros.cli.tables import clean, show
-from linkage_ros.errors import BagError, LinkageError
-from linkage_ros.replay import own_effects_here, recorded_scene, ReplayedTick, versions_here
+from linkage_ros.cli.tables import show
+from linkage_ros.errors import BagError, clean, LinkageError
+from linkage_ros.replay import own_effects_here, ReplayedTick, versions_here
 from linkage_ros.scene.load import load_scene
 
 EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
@@ -70,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'one that has the input joints',
     )
     parser.add_argument('--json', action='store_true', help='the same as JSON')
+    add_trust(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
@@ -80,7 +81,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     bag = opened(arguments.bag, stop)
     reading = BagReading(bag, stop)
     if arguments.scene is None:
-        account = replayed(bag, reading)
+        account = replayed(bag, reading, trust_effects=arguments.trust_effects)
         code = {IDENTICAL: 0, DIFFERENT: EXIT_DIFFERENT}.get(account['verdict'], EXIT_INCOMPLETE)
     else:
         scene = load_scene(arguments.scene)
@@ -100,7 +101,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     return code or (EXIT_INCOMPLETE if reading.damage or reading.stopped else 0)
 
 
-def replayed(bag: Bag, reading: BagReading) -> dict[str, Any]:
+def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> dict[str, Any]:
     """
     Run a bag's own scene once more; return what came of it.
 
@@ -111,7 +112,7 @@ def replayed(bag: Bag, reading: BagReading) -> dict[str, Any]:
 
     """
     try:
-        scene = recorded_scene(bag)
+        scene = scene_of(bag, trust_effects=trust_effects)
     except BagError as error:
         raise BagError(error.where, error.reason, 'name a scene to run with --scene') from None
     begin: list[int] = []
@@ -168,7 +169,7 @@ def _show_proof(account: dict[str, Any]) -> None:
 def _show_what_if(account: dict[str, Any]) -> None:
     print(
         f'{account["bag"]}, as {account["scene"]}: {account["joint_states"]} joint states, '
-        f'from {account["crank_topic"]}'
+        f'from {clean(account["crank_topic"])}'
     )
     for key, when in (('joints_only_recorded', 'recorded'), ('joints_only_now', 'now')):
         if account[key] and account['topics']:

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from functools import partial
 from importlib.util import find_spec
 from math import isfinite
 import os
@@ -35,7 +36,7 @@ from typing import Any
 from linkage_ros.bag.reading.layout import layout_of
 from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.cli.bag_account import account_of, scene_account
-from linkage_ros.cli.bag_reading import beside, gaps, opened
+from linkage_ros.cli.bag_reading import add_trust, beside, gaps, opened, scene_of
 from linkage_ros.cli.info import tables
 from linkage_ros.cli.progress import progress
 from linkage_ros.errors import LinkageError
@@ -63,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f'--{name}', type=float, metavar='S', help=f'{what} of a part, in seconds of the run'
         )
+    add_trust(parser)
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
@@ -71,13 +73,14 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     _check(file)
     window = _window(arguments.since, arguments.until)
     # What is no text, of a name of a file, say, comes as its bytes' numbers.
-    page = report(arguments.bag, window, stop).encode('utf-8', 'backslashreplace')
-    _write(file, page)
-    print(f'{file}: {len(page) / 1e6:.1f} MB')
+    page = report(arguments.bag, window, stop, trust_effects=arguments.trust_effects)
+    data = page.encode('utf-8', 'backslashreplace')
+    _write(file, data)
+    print(f'{file}: {len(data) / 1e6:.1f} MB')
     return 0
 
 
-def report(bag_path: Path, window: Window, stop: Event) -> str:
+def report(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool = False) -> str:
     """
     Return the page of a bag; memory does not grow with the bag.
 
@@ -106,6 +109,7 @@ def report(bag_path: Path, window: Window, stop: Event) -> str:
             bag,
             window,
             Progress(lambda read: told(read // _MIB, max(size, read // _MIB)), stop.is_set),
+            partial(scene_of, trust_effects=trust_effects),
         )
     _heed(stop)
     account = account_of(bag, layouts, found.contents)
@@ -122,7 +126,7 @@ def report(bag_path: Path, window: Window, stop: Event) -> str:
         Told(
             title=f'Run of {name}',
             facts=list(_facts(account, found, scene)),
-            warnings=list(_warnings(bag, account, found, missing)),
+            warnings=list(_warnings(bag, account, found, scene, missing)),
             tables=_tables(account),
             wrapped=scene is not None and scene.wrapped,
         ),
@@ -157,10 +161,14 @@ def _facts(account: dict[str, Any], found: Run, scene: Scene | None) -> Iterator
         yield 'recorded by', f'linkage_ros {version}'
 
 
-def _warnings(bag: Bag, account: dict[str, Any], found: Run, missing: str) -> Iterator[str]:
+def _warnings(
+    bag: Bag, account: dict[str, Any], found: Run, scene: Scene | None, missing: str
+) -> Iterator[str]:
     """Yield what is missing of a run, or damaged."""
-    if missing:
+    if missing and scene is None:
         yield f'No scene of linkage_ros, so no linkage: {missing}.'
+    elif missing:
+        yield f'The scene was not run again, so no linkage: {missing}.'
     if not account['messages']:
         yield 'The bag holds no messages.'
     if account['damage']:

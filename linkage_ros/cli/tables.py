@@ -22,10 +22,9 @@ from importlib.util import find_spec
 import sys
 from typing import NamedTuple
 
+from linkage_ros.errors import clean, shortened
 
-def clean(text: str) -> str:
-    """Return a text without what a terminal would obey: files come from anywhere."""
-    return text if text.isprintable() else repr(text)[1:-1]
+_LONGEST_CELL = 4000
 
 
 class Table(NamedTuple):
@@ -55,10 +54,12 @@ def show(table: Table) -> None:
     What goes into a file or through a pipe, or is wider than the terminal, comes without frames:
     it can be searched, and no name is broken in two.
     """
+    rows = [[shortened(clean(cell), _LONGEST_CELL) for cell in row] for row in table.rows]
+    table = Table(clean(table.title), table.columns, rows)
     if sys.stdout.isatty() and find_spec('rich') is not None:
         from rich.console import Console
 
-        console = Console()
+        console = Console(file=sys.__stdout__)
         if _width(table) <= console.width:
             console.print(_drawn(table))
             return

@@ -33,6 +33,7 @@ from collections.abc import Iterable
 from functools import cache
 from hashlib import sha256
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 import sys
 from types import ModuleType
@@ -85,6 +86,19 @@ def own_module(name: str) -> ModuleType:
         raise _failed(name, error) from None
     _check(name, module)
     return module
+
+
+def found_in(name: str) -> str:
+    """Return where Python would look for an effect of one's own; nothing of it is run for that."""
+    package = name.partition('.')[0]
+    try:
+        # Of the package alone: to look for a module within it would run the package.
+        spec = find_spec(package)
+    except (ImportError, ValueError):
+        spec = None
+    if spec is None:
+        return 'no module'
+    return quoted(spec.origin or next(iter(spec.submodule_search_locations or ()), package))
 
 
 def own_needs(name: str) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ from importlib.util import find_spec
 import json
 from typing import Any
 
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import clean, LinkageError
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
@@ -74,11 +74,11 @@ def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts:
             '<meta name="color-scheme" content="light dark">',
             # Without it a browser asks the server for one.
             '<link rel="icon" href="data:,">',
-            f'<title>{escape(title)}</title>',
+            f'<title>{escape(clean(title))}</title>',
             f'<style>\n{_joined("page.css", styles)}</style>',
             '</head>',
             '<body>',
-            *body,
+            _clean_lines('\n'.join(body)),
             f'<script type="application/json" id="data">{_json(data)}</script>',
             f'<script>{_within_script(plotting_library())}</script>',
             f'<script>\n{_joined("page.js", scripts)}</script>',
@@ -120,7 +120,19 @@ def _joined(name: str, parts: Parts) -> str:
 def _json(data: Any) -> str:
     # No text within can end the element, or open a comment.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
-    return text.replace('<', r'\u003c')
+    text = text.replace('<', r'\u003c')
+    # What the script shows is to be read as it is here, too; json itself has escaped the rest.
+    return _without({letter for letter in set(text) if not letter.isprintable()}, text, '\\')
+
+
+def _clean_lines(text: str) -> str:
+    return _without({letter for letter in set(text) - {'\n'} if not letter.isprintable()}, text)
+
+
+def _without(letters: set[str], text: str, before: str = '') -> str:
+    for letter in letters:
+        text = text.replace(letter, before + clean(letter))
+    return text
 
 
 def _within_script(text: str) -> str:

@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from linkage_ros.bag.reading.reader import Bag
@@ -30,7 +31,12 @@ from linkage_ros.report.run import Run, Window
 from linkage_ros.scene.scene import Scene
 
 
-def read_run(bag: Bag, window: Window, progress: Progress) -> tuple[Run, Scene | None, str]:
+def read_run(
+    bag: Bag,
+    window: Window,
+    progress: Progress,
+    scene_of: Callable[[Bag], Scene] = recorded_scene,
+) -> tuple[Run, Scene | None, str]:
     """
     Read a bag for its page.
 
@@ -42,6 +48,8 @@ def read_run(bag: Bag, window: Window, progress: Progress) -> tuple[Run, Scene |
         Which part of the run is told.
     progress
         Whom to tell how far it is, and whether to stop.
+    scene_of
+        Gives the scene that a bag carries.
 
     Returns
     -------
@@ -56,7 +64,7 @@ def read_run(bag: Bag, window: Window, progress: Progress) -> tuple[Run, Scene |
     scene, missing = None, ''
     reader: OwnRun | ForeignRun
     try:
-        scene = recorded_scene(bag)
+        scene = scene_of(bag)
         reader = OwnRun(bag, run_account(bag), scene, window)
     except LinkageError as error:
         # A page is handed on, and does not say where its bag lay.

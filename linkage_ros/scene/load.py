@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from importlib import import_module
 from os.path import isfile
@@ -137,6 +137,8 @@ def parse_scene(
     folder: str = '',
     solvers: Mapping[str, Any] | None = None,
     seed: int | None = None,
+    *,
+    trust_effects: bool = False,
 ) -> Scene:
     """
     Read a scene out of the files that a bag carries.
@@ -154,6 +156,9 @@ def parse_scene(
         the scene could have said it.
     seed
         The seed where the scene names none; None for one that follows from its name.
+    trust_effects
+        Whether the effects of one's own that the scene names are imported, which runs them. Where
+        they are not, `Member.not_imported` names them.
 
     Raises
     ------
@@ -171,7 +176,9 @@ def parse_scene(
             raise within.error('linkage', 'is not among the files', 'name another bag')
         return parse_yaml(files[part], f'{where}: {part}'), files[part]
 
-    scene = _scene(name, content, open_linkage, files[SCENE_FILE], folder, seed)
+    scene = _scene(
+        name, content, open_linkage, files[SCENE_FILE], folder, seed, trust_effects=trust_effects
+    )
     if not solvers:
         return scene
     return replace(scene, members=tuple(_as_chosen(one, solvers) for one in scene.members))
@@ -197,6 +204,8 @@ def _scene(
     scene_bytes: bytes,
     folder: str,
     seed: int | None = None,
+    *,
+    trust_effects: bool = True,
 ) -> Scene:
     files = {SCENE_FILE: scene_bytes}
     members: list[Member] = []
@@ -209,11 +218,11 @@ def _scene(
             own = entry.ros_name(entry.text('name'))
             if own in [member.name for member in members]:
                 raise entry.error('name', f'{quoted(own)} is taken', 'give each its own')
-            members.append(_member(own, linkage_content, entry, content, folder))
+            members.append(_member(own, linkage_content, entry, content, folder, trust_effects))
             entry.finish(_OF_A_MEMBER)
     else:
         linkage_content, files[LINKAGE_FILE] = open_linkage(content)
-        members.append(_member('', linkage_content, content, content, folder))
+        members.append(_member('', linkage_content, content, content, folder, trust_effects))
     scene = Scene(
         name=name,
         members=tuple(members),
@@ -257,7 +266,12 @@ _OF_A_SCENE = ('rate', 'angles', 'seed', 'faults', 'record', 'robot_description'
 
 
 def _member(
-    name: str, linkage_content: Section, own: Section, scene: Section, folder: str
+    name: str,
+    linkage_content: Section,
+    own: Section,
+    scene: Section,
+    folder: str,
+    trust_effects: bool,
 ) -> Member:
     linkage = read_linkage(linkage_content)
 
@@ -290,7 +304,10 @@ def _member(
             'leave backlash out, or name another drive than torque',
         )
     parts = parts_of(linkage)
-    types = _effects(effects)
+    not_imported = () if trust_effects else tuple(name for name in effects if '.' in name)
+    for effect in not_imported:
+        effects.section(effect)
+    types = _effects(effects, not_imported)
     member = Member(
         name=name,
         linkage=linkage,
@@ -308,16 +325,18 @@ def _member(
         content=own,
         linkage_content=linkage_content,
         silent_beyond_limits=_silent(where('beyond_limits'), linkage),
+        not_imported=not_imported,
         **read_solving(own, scene, parts),
     )
     effects.finish(tuple(EFFECTS))
     return member
 
 
-def _effects(effects: Section) -> dict[str, Any]:
+def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
     """Return the types of parameters of the effects that are named, in the order of physics."""
+    known = [name for name in effects if name in EFFECTS or '.' in name]
     try:
-        named = in_order([name for name in effects if name in EFFECTS or '.' in name])
+        named = in_order([name for name in known if name not in left_out])
         return {name: module_of(name).PARAMETERS for name in named}
     except DefinitionError as error:
         raise effects.error(error.where, error.reason, error.remedy) from None

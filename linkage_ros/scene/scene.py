@@ -78,6 +78,9 @@ class Member:
         What acts on it; nothing where the scene does not say.
     silent_beyond_limits
         Whether nothing is published while a joint is beyond its limits.
+    not_imported
+        Effects of one's own that it names too, where these were not to be imported. It cannot be
+        run then.
     content, linkage_content
         Where all this stands, for messages: in the scene, and in the linkage file.
 
@@ -93,6 +96,7 @@ class Member:
     solver: tuple[str, Any] | None = None
     accuracy: float | None = None
     silent_beyond_limits: bool = False
+    not_imported: tuple[str, ...] = ()
 
     @property
     def prefix(self) -> str:
@@ -155,3 +159,9 @@ class Scene:
     def joints(self) -> tuple[str, ...]:
         """Return the names of all published joints, in their order."""
         return tuple(joint for member in self.members for joint in member.joints)
+
+    @property
+    def not_imported(self) -> tuple[str, ...]:
+        """Return the effects of one's own that it names and that were not imported."""
+        named = (effect for member in self.members for effect in member.not_imported)
+        return tuple(dict.fromkeys(named))

@@ -287,10 +287,12 @@ class Section:
     def _line_of(self, key: str) -> int:
         """Return the line of a key, or of as much of a dotted one as there is."""
         line, content = self._line, self._content
-        for part in (key,) if key in content else key.split('.'):
-            if not isinstance(content, LinedDict) or part not in content:
+        while isinstance(content, LinedDict):
+            # The name of an effect of one's own has dots within it.
+            part = key if key in content else key.partition('.')[0]
+            if part not in content:
                 break
-            line, content = content.lines[part], content[part]
+            line, content, key = content.lines[part], content[part], key[len(part) + 1 :]
         return line
 
     def _take(self, key: str, default: Any, expected: str) -> Any:

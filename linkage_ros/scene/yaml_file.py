@@ -17,23 +17,21 @@
 YAML files, read strictly.
 
 What PyYAML would let pass is refused here with file, line and key: a key that stands twice, a key
-that nobody reads, a value of the wrong type, a number that is none. Scalars follow YAML 1.2, so
-that ``1e-3`` is a number and ``off`` a name.
+that nobody reads, a value of the wrong type, a number that is none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from pathlib import Path
-import re
-from typing import Any, cast, ClassVar
+from typing import Any, cast
 
+from linkage_ros.bounded_yaml import BoundedLoader
 from linkage_ros.errors import FileError, quoted
 from linkage_ros.scene.section import LinedDict, Section
 import yaml
 
 _LARGEST_FILE = 1_000_000
-_LONGEST_INTEGER = 100
 
 
 def read_yaml(file: str | Path) -> tuple[Section, bytes]:
@@ -62,8 +60,6 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
         ) from None
     except ValueError as error:  # a NUL in the name
         raise FileError(repr(str(file)), '', str(error), 'name a file') from None
-    if len(data) > _LARGEST_FILE:
-        raise FileError(file, '', f'is larger than {_LARGEST_FILE} bytes', 'name a YAML file')
     return parse_yaml(data, str(file)), data
 
 
@@ -84,6 +80,8 @@ def parse_yaml(data: bytes, file: str) -> Section:
         As `read_yaml`.
 
     """
+    if len(data) > _LARGEST_FILE:
+        raise FileError(file, '', f'is larger than {_LARGEST_FILE} bytes', 'name a YAML file')
     try:
         text = data.decode('utf-8')
     except UnicodeDecodeError as error:
@@ -113,19 +111,10 @@ def parse_yaml(data: bytes, file: str) -> Section:
     return Section(file, '', content)
 
 
-class _StrictLoader(yaml.SafeLoader):
-    """PyYAML's safe loader with the scalars of YAML 1.2 and without repeated keys."""
+class _StrictLoader(BoundedLoader):
+    """The loader of all YAML, with a line for each key, and without repeated keys."""
 
-    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 (as in the base class)
-    yaml_constructors: ClassVar[dict[Any, Any]] = {None: yaml.SafeLoader.construct_undefined}
     file: str
-
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        """Refuse aliases: ten lines of them stand for gigabytes."""
-        if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.composer.ComposerError(None, None, 'aliases are not read', mark)
-        return super().compose_node(parent, index)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         """Build a mapping whose keys are texts, each once."""
@@ -155,34 +144,4 @@ class _StrictLoader(yaml.SafeLoader):
         yield self.construct_mapping(node)
 
 
-def _integer(text: str) -> float:
-    # Python refuses to convert integers without end, to and from text as well as to a float.
-    return int(text) if len(text) <= _LONGEST_INTEGER else float(text)
-
-
-_CONSTRUCTORS: dict[str, Callable[[Any, Any], Any]] = {
-    'map': _StrictLoader.construct_yaml_map,
-    'seq': _StrictLoader.construct_yaml_seq,
-    'str': _StrictLoader.construct_yaml_str,
-    'null': _StrictLoader.construct_yaml_null,
-    'bool': lambda self, node: self.construct_scalar(node).lower() == 'true',
-    'int': lambda self, node: _integer(self.construct_scalar(node)),
-    'float': lambda self, node: float(
-        self.construct_scalar(node).replace('.inf', 'inf').replace('.nan', 'nan')
-    ),
-}
-for _tag, _construct in _CONSTRUCTORS.items():
-    _StrictLoader.add_constructor(f'tag:yaml.org,2002:{_tag}', _construct)
-for _tag, _pattern, _first in (
-    ('bool', r'true|True|TRUE|false|False|FALSE', 'tTfF'),
-    ('int', r'[-+]?[0-9]+', '-+0123456789'),
-    (
-        'float',
-        r'[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.inf|\.nan',
-        '-+.0123456789',
-    ),
-    ('null', r'~|null|Null|NULL|', '~nN'),
-):
-    _StrictLoader.add_implicit_resolver(
-        f'tag:yaml.org,2002:{_tag}', re.compile(f'(?:{_pattern})$'), [*_first, '']
-    )
+_StrictLoader.add_constructor('tag:yaml.org,2002:map', _StrictLoader.construct_yaml_map)

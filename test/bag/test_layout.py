@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from linkage_ros.bag.reading.folder import serialized_metadata
 from linkage_ros.bag.reading.layout import layout_of
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import BagError
@@ -68,7 +69,7 @@ def test_compression_is_as_mcaps_own_index_has_it(
     assert found.compressions == {name: (stored, made)}
     assert found.content > 200 * len(PAYLOAD)
     assert found.library.startswith('somebody else')
-    assert found.rosbag2 == {}
+    assert found.rosbag2 is None
 
 
 def test_without_chunks_nothing_is_compressed(tmp_path: Path) -> None:
@@ -80,7 +81,9 @@ def test_without_chunks_nothing_is_compressed(tmp_path: Path) -> None:
 
 def test_what_rosbag2_says_is_found(tmp_path: Path) -> None:
     BagWriter(tmp_path / 'bag', []).close({'seed': '7'})
-    found = layout_of(tmp_path / 'bag' / 'bag_0.mcap').rosbag2
+    record = layout_of(tmp_path / 'bag' / 'bag_0.mcap').rosbag2
+    assert record is not None
+    found = serialized_metadata(record)
     assert (found['version'], found['custom_data']) == (9, {'seed': '7'})
 
 
@@ -116,7 +119,7 @@ def test_no_record_is_too_odd(tmp_path: Path, record: tuple[int, bytes]) -> None
     file.write_bytes(MCAP0_MAGIC + head + content + b'\x05' + b'\xff' * 8)
     found = layout_of(file)
     assert found.library == ''
-    assert found.rosbag2 == {}
+    assert found.rosbag2 is None or serialized_metadata(found.rosbag2) == {}
     assert all(len(name) < 200 for name in found.compressions)
 
 

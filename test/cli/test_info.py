@@ -361,7 +361,7 @@ def test_drops_that_are_not_told_are_not_made_up(tmp_path: Path, tell: Any, said
     assert account['recording_failure'] == 'the disk is full'
 
 
-@pytest.mark.parametrize('version', ['new', '9.5', '[9]', 'null', '&a [9], ros_distro: [*a, *a]'])
+@pytest.mark.parametrize('version', ['new', '9.5', '[9]', 'null', '[9], ros_distro: [9]'])
 def test_a_version_that_is_no_number_is_not_told(
     bag: Path, tmp_path: Path, tell: Any, version: str
 ) -> None:

@@ -48,6 +48,12 @@ Found = Message | Attachment | Metadata
 _INDEX = Struct('<HI')
 _CRC = Struct('<I')
 _WINDOW = 2**20
+
+MOST_UNPACKED, MOST_TIMES = 2**30, 1000
+"""
+What the chunks of a file may make together when unpacked: so many bytes, or so many times the
+file's. A megabyte of zstd can hold fifty gigabytes of zeros.
+"""
 _ELSEWHERE = {
     0,
     Opcode.FOOTER,
@@ -91,6 +97,7 @@ class DataSection:
         self.compression = ''
         self._crc_seen = False
         self._end = max(index_start - HEAD.size - _CRC.size, 0)
+        self._unpacked = 0
         self._covered: bool | None = None
         self._misfit: DamagedError | None = None
 
@@ -156,7 +163,13 @@ class DataSection:
 
     def chunk(self, chunk: Chunk, *, fits: bool = True) -> Iterable[Message]:
         """Return a chunk's messages; it begins and ends where its record does, if it fits."""
+        if self._unpacked > max(MOST_UNPACKED, MOST_TIMES * self.source.size):
+            raise DamagedError(
+                f'would make more than {self._unpacked:,} bytes of a file of '
+                f'{self.source.size:,}: no recording packs so well'
+            )
         content = content_of(chunk)
+        self._unpacked += len(content)
         if not chunk.crc and content:
             if not fits:
                 raise DamagedError('is not as long as it says')

@@ -24,10 +24,9 @@ from typing import NamedTuple
 from linkage_ros.bag.account import ACCOUNT
 from linkage_ros.bag.reading.compression import DamagedError
 from linkage_ros.bag.reading.file_index import index_of
-from linkage_ros.bag.reading.folder import custom_of, MOST_METADATA
+from linkage_ros.bag.reading.folder import custom_of, serialized_metadata
 from linkage_ros.bag.reading.records import HEAD, Source, strict
 from mcap.records import Metadata
-import yaml
 
 
 class Ending(NamedTuple):
@@ -54,22 +53,16 @@ def ending_of(file: Path) -> Ending:
     try:
         with file.open('rb') as stream:
             source = Source(stream)
-            for each in index_of(source).metadata:
-                accounted |= each.name == ACCOUNT
-                if each.name == 'rosbag2' and each.length <= MOST_METADATA:
-                    content = source.read(each.offset, each.length)
-                    # What others say there may take seconds to understand, and tells us nothing.
-                    if b'linkage_ros.' in content:
-                        head = HEAD.size
-                        custom = _custom_in(strict(Metadata, content[head:]))
+            records = index_of(source).metadata
+            accounted = any(each.name == ACCOUNT for each in records)
+            # Where there are several, the last says what came of it in the end.
+            said = [each for each in records if each.name == 'rosbag2'][-1:]
+            for each in said:
+                content = source.read(each.offset, each.length)
+                # What others say there may take seconds to understand, and tells us nothing.
+                if b'linkage_ros.' in content:
+                    record = strict(Metadata, content[HEAD.size :])
+                    custom = custom_of(serialized_metadata(record))
     except (DamagedError, OSError):
         pass  # to be met, and told, when the messages are read
     return Ending(custom, accounted)
-
-
-def _custom_in(record: Metadata) -> dict[str, str]:
-    try:
-        said = yaml.safe_load(record.metadata['serialized_metadata'])
-    except Exception:  # noqa: BLE001 (whatever yaml makes of it, RecursionError too)
-        return {}
-    return custom_of(said) if isinstance(said, dict) else {}

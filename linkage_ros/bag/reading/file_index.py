@@ -37,6 +37,15 @@ _KINDS: dict[int, Any] = {
     Opcode.STATISTICS: Statistics,
 }
 
+_PLACES = {
+    Opcode.CHUNK_INDEX: 'chunk_start_offset',
+    Opcode.ATTACHMENT_INDEX: 'offset',
+    Opcode.METADATA_INDEX: 'offset',
+}
+
+MOST_RECORDS = 1_000_000
+"""How many an index may hold: of a terabyte in rosbag2's chunks it has that many."""
+
 
 class FileIndex(NamedTuple):
     """
@@ -81,15 +90,25 @@ def index_of(source: Source) -> FileIndex:
         raise DamagedError("its index's checksum does not fit")
     definitions = Definitions()
     found: dict[Any, list[Any]] = {kind: [] for kind in _KINDS.values()}
-    at = 0
+    places = set()
+    at = number = 0
     while at < len(content):
+        number += 1
+        if number > MOST_RECORDS:
+            raise DamagedError(f'its index holds more than {MOST_RECORDS:,} records')
         if at + HEAD.size > len(content):
             raise DamagedError('its index ends in the middle of a record')
         opcode, length = HEAD.unpack_from(content, at)
         at += HEAD.size
         end = at + length
         if opcode in _KINDS:
-            found[_KINDS[opcode]].append(strict(_KINDS[opcode], content[at:end]))
+            record = strict(_KINDS[opcode], content[at:end])
+            if opcode in _PLACES:
+                place = getattr(record, _PLACES[opcode])
+                if place in places:
+                    raise DamagedError(f'its index names the record at byte {place:,} twice')
+                places.add(place)
+            found[_KINDS[opcode]].append(record)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             definitions.add(opcode, content[at:end])
         at = end

@@ -24,12 +24,13 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
+from linkage_ros.bounded_yaml import bounded_yaml
 from linkage_ros.errors import BagError, quoted
+from mcap.records import Metadata
 from mcap.writer import MCAP0_MAGIC
-import yaml
 
-MOST_METADATA = 16 * 2**20
-"""How long metadata may be; of a bag with thousands of topics rosbag2 writes about 10 MB."""
+MOST_METADATA = 8 * 2**20
+"""How long metadata may be; of a bag with thousands of topics rosbag2 writes some megabytes."""
 
 _WITHOUT = 'move metadata.yaml away to read the folder without it'
 
@@ -53,12 +54,27 @@ def information_of(folder: Path) -> dict[str, Any]:
     except OSError as error:
         raise unreadable(file, error) from None
     try:
-        information = yaml.safe_load(text.decode())[ROOT_KEY]
-    except Exception:  # noqa: BLE001 (yaml has its own errors, and RecursionError and others)
-        information = None
-    if not isinstance(information, dict) or len(text) > MOST_METADATA:
-        raise BagError(file, "is not a bag's metadata", 'read the MCAP file by itself')
+        if len(text) > MOST_METADATA:
+            raise ValueError(f'it is larger than {MOST_METADATA:,} bytes')
+        information = bounded_yaml(text.decode())
+        information = information.get(ROOT_KEY) if isinstance(information, dict) else None
+        if not isinstance(information, dict):
+            raise ValueError(f'no mapping {ROOT_KEY}')
+    except ValueError as error:
+        raise BagError(
+            file, f"is not a bag's metadata ({error})", 'read the MCAP file by itself'
+        ) from None
     return information
+
+
+def serialized_metadata(record: Metadata) -> dict[str, Any]:
+    """Return what rosbag2's record in an MCAP file says; nothing where it is damaged."""
+    text = record.metadata.get('serialized_metadata', '')
+    try:
+        said = bounded_yaml(text if len(text) <= MOST_METADATA else '')
+    except ValueError:
+        return {}
+    return said if isinstance(said, dict) else {}
 
 
 def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:

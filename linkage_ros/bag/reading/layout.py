@@ -26,14 +26,13 @@ from collections.abc import Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
 from struct import Struct
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from linkage_ros.bag.reading.folder import MOST_METADATA, unreadable
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Header, Metadata
 from mcap.writer import MCAP0_MAGIC
-import yaml
 
 _RECORD = Struct('<BQ')
 _CHUNK = Struct('<QQQII')
@@ -56,14 +55,15 @@ class Layout(NamedTuple):
     content
         Bytes of all its records when decompressed.
     rosbag2
-        What rosbag2 says of the bag in the file itself; empty where it does not.
+        What rosbag2 says of the bag in the file itself, the last that it says; nothing where it
+        does not.
 
     """
 
     library: str
     compressions: Mapping[str, tuple[int, int]]
     content: int
-    rosbag2: Mapping[str, Any]
+    rosbag2: Metadata | None
 
 
 def layout_of(file: Path) -> Layout:
@@ -79,7 +79,7 @@ def layout_of(file: Path) -> Layout:
     library = ''
     compressions: dict[str, tuple[int, int]] = {}
     content = 0
-    rosbag2: Mapping[str, Any] = {}
+    rosbag2: Metadata | None = None
     try:
         with file.open('rb') as stream:
             for opcode, length in _records(stream):
@@ -129,12 +129,9 @@ def _library(content: bytes) -> str:
         return ''
 
 
-def _rosbag2(content: bytes) -> Mapping[str, Any]:
+def _rosbag2(content: bytes) -> Metadata | None:
     try:
         record = Metadata.read(ReadDataStream(BytesIO(content)))
-        if record.name != 'rosbag2':
-            return {}
-        said = yaml.safe_load(record.metadata['serialized_metadata'])
     except Exception:  # noqa: BLE001 (as above)
-        return {}
-    return said if isinstance(said, dict) else {}
+        return None
+    return record if record.name == 'rosbag2' else None

@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -39,15 +39,20 @@ from linkage_ros.bag.reading.folder import (
 )
 from linkage_ros.bag.reading.records import attachment_at, Definitions, Message, Source
 from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
+from linkage_ros.bounded_yaml import bounded_yaml
 from linkage_ros.errors import BagError
 from mcap.records import Attachment, Channel, Schema
 from mcap.writer import MCAP0_MAGIC
-import yaml
 
 RUN_FILE = 'run.json'
 """Name of the attachment in which a run names its scene, topics and versions."""
 
 _RECOVER = 'linkage recover makes a whole bag of what is there'
+
+_MOST_ATTACHED = 64 * 2**20
+
+_LONGEST_QOS, _MOST_QOS = 1024, 64
+"""Of one profile: letters, and values; rosbag2 writes some 320 and 33."""
 
 Told = Callable[[int], None]
 """Takes how many bytes of a file have been read, now and then; what it raises ends the reading."""
@@ -76,7 +81,7 @@ class Bag:
     topics
         Its topics.
     attachments
-        Name to content.
+        Name to content, up to 64 MiB of them.
     custom
         ``custom_data`` of its metadata, or where these are missing of its last file.
     truncated
@@ -185,12 +190,22 @@ def _description(
             source = Source(stream)
             index = index_of(source)
             if index.definitions.channels:
-                return index.definitions, [
+                return index.definitions, _kept(
                     attachment_at(source, each.offset)[0] for each in index.attachments
-                ]
+                )
     definitions = Definitions()
     contents = _contents(file, definitions, told, until_damage=not finished)
-    return definitions, [found for found in contents if isinstance(found, Attachment)]
+    return definitions, _kept(found for found in contents if isinstance(found, Attachment))
+
+
+def _kept(attachments: Iterable[Attachment]) -> list[Attachment]:
+    """Return what is kept in memory; what does not fit is not of a run of ours."""
+    kept, left = [], _MOST_ATTACHED
+    for attachment in attachments:
+        if len(attachment.data) <= left:
+            left -= len(attachment.data)
+            kept.append(attachment)
+    return kept
 
 
 def _contents(
@@ -257,11 +272,15 @@ def topic_of(channel: Channel, schema: Schema | None) -> Topic:
 @lru_cache(maxsize=256)
 def _qos(text: str) -> QosProfile:
     """Return the first of the profiles; the default if there is none, or none to be understood."""
+    # One for each publisher: of /tf there may be hundreds.
+    first = text.partition('\n- ')[0]
     try:
-        return QosProfile.from_mapping(yaml.safe_load(text)[0])
+        if len(first) > _LONGEST_QOS:
+            raise ValueError
+        return QosProfile.from_mapping(bounded_yaml(first, _MOST_QOS)[0])
     except Exception:  # noqa: BLE001 (whatever yaml and the numbers in it raise)
         # A QoS nobody understands is no reason to withhold the messages.
-        return QosProfile()
+        return QosProfile(understood=not text)
 
 
 def _damaged(file: Path, reason: str) -> BagError:

@@ -45,6 +45,11 @@ _MESSAGE = Struct('<HIQQ')
 _LONG = Struct('<Q')
 _INT = Struct('<I')
 _LONGEST_NAME = 16
+_LONGEST_RECORD = 8 * 2**20
+"""Of those that are made of parts, each of which takes many times its bytes [bytes]."""
+
+MOST_CHANNELS = 10_000
+"""How many a file may describe, and how many schemas; MCAP has numbers for 65,535."""
 
 
 class Source:
@@ -128,6 +133,8 @@ class Definitions:
             channel = strict(Channel, content)
             if self.channels.setdefault(channel.id, channel) != channel:
                 raise DamagedError(f'makes channel {channel.id} another one')
+        if max(len(self.schemas), len(self.channels)) > MOST_CHANNELS:
+            raise DamagedError(f'describes more than {MOST_CHANNELS:,} channels or schemas')
 
     def complete(self, others: Definitions) -> None:
         """Take over what is not known yet."""
@@ -141,6 +148,11 @@ class Definitions:
 
 def strict(kind: Any, content: bytes) -> Any:
     """Return a record of this kind; what it means fills it to the byte."""
+    if len(content) > _LONGEST_RECORD:
+        raise DamagedError(
+            f'is a {kind.__name__} of {len(content):,} bytes; no more than {_LONGEST_RECORD:,} '
+            'are taken'
+        )
     try:
         record = kind.read(ReadDataStream(BytesIO(content)))
         builder = RecordBuilder()
@@ -232,6 +244,8 @@ def messages_in(content: bytes, definitions: Definitions) -> Iterator[Message]:
             yield message_of(content, at, end, definitions)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             definitions.add(opcode, content[at:end])
+        elif not opcode:  # millions of them fit into what was zeros
+            raise DamagedError('holds a record of no kind')
         at = end
 
 

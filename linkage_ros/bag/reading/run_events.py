@@ -36,6 +36,9 @@ OWN_EFFECTS = 'effects'
 SEED = 'seed'
 """The key under which it says from what everything random came."""
 
+_LONGEST_ACCOUNT = 4 * 2**20
+"""In bytes; a kilobyte, but for what a bag says of the one that it was made from."""
+
 VERSIONS = ('linkage_ros', 'python', 'machine')
 
 
@@ -193,7 +196,8 @@ def _are_names(values: Any) -> bool:
 def run_said(bag: Bag) -> dict[str, Any]:
     """Return what a run says of itself, as it stands in its bag; nothing if it is damaged."""
     try:
-        said = json.loads(bag.attachments[RUN_FILE])
+        text = bag.attachments[RUN_FILE]
+        said = json.loads(text) if len(text) <= _LONGEST_ACCOUNT else {}
     except (KeyError, ValueError, RecursionError):
         return {}
     return said if isinstance(said, dict) else {}

@@ -33,6 +33,7 @@ from linkage_ros.bag.metadata import (
     write_metadata,
 )
 from linkage_ros.bag.reading.data_section import Found
+from linkage_ros.bag.reading.folder import serialized_metadata
 from linkage_ros.bag.reading.reader import topic_of
 from linkage_ros.bag.reading.records import Definitions, Message
 from linkage_ros.bag.topic import Topic
@@ -40,7 +41,6 @@ from linkage_ros.bag.writing.disk import CHUNK_SIZE
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.records import Attachment, Channel
 from mcap.writer import CompressionType, Writer
-import yaml
 
 _COMPRESSIONS = {'lz4': CompressionType.LZ4, 'zstd': CompressionType.ZSTD}
 
@@ -126,7 +126,7 @@ class NewBag:
         elif found.name != 'rosbag2':
             self._mcap.add_metadata(found.name, found.metadata)
         else:
-            self.information = _information(found.metadata.get('serialized_metadata', ''))
+            self.information = serialized_metadata(found)
 
     def describe(self, definitions: Definitions) -> None:
         """Take over all channels, those without a message too."""
@@ -181,11 +181,3 @@ class NewBag:
             duration=max(0, self._end - self._start),
             size=self._file.tell(),
         )
-
-
-def _information(text: str) -> Mapping[str, Any]:
-    try:
-        content = yaml.safe_load(text)
-    except Exception:  # noqa: BLE001 (whatever yaml makes of what is damaged)
-        return {}
-    return content if isinstance(content, dict) else {}
