@@ -98,6 +98,33 @@ def test_a_stalled_disk_stalls_nobody_and_the_overflow_is_counted(
     readers.agree(tmp_path / 'run', topics, messages[:101])
 
 
+def test_a_message_in_hand_waits_and_is_not_lost(tmp_path, topics, messages):
+    writer = StalledWriter(tmp_path / 'run', topics)
+    recorder = Recorder(writer)
+    for message in messages[:4]:
+        recorder.offer(*message)
+    assert writer.reached.wait(10)
+    looks = [(c.received, c.recorded, c.dropped, c.waiting) for c in recorder.inspect()]
+    assert looks == [(2, 0, 0, 2), (2, 0, 0, 2)]
+    writer.answer.set()
+    assert _counts(recorder.stop()) == [(2, 2, 0), (2, 2, 0)]
+
+
+def test_at_every_look_the_counts_close_and_nothing_is_lost(tmp_path, topics, messages):
+    recorder = Recorder(BagWriter(tmp_path / 'run', topics))
+    looks = []
+    for message in messages:
+        recorder.offer(*message)
+        looks += recorder.inspect()
+    while any(counts.waiting for counts in recorder.inspect()):
+        looks += recorder.inspect()
+    recorder.stop()
+    assert not [counts for counts in looks if counts.dropped]
+    assert all(c.received == c.recorded + c.waiting for c in looks)
+    assert any(counts.waiting for counts in looks)
+    assert any(counts.recorded for counts in looks)
+
+
 def test_a_disk_that_never_answers_does_not_keep_the_process(tmp_path, topics, messages):
     writer = StalledWriter(tmp_path / 'run', topics, answered=4)
     recorder = Recorder(writer, flush_period=1000.0)

@@ -43,8 +43,9 @@ class TopicCounts:
     """
     What became of one topic's messages.
 
-    ``received == recorded + dropped + let_go + waiting``, at every instant. Let go is what was
-    recorded in a file that made way for a newer one.
+    ``received == recorded + dropped + let_go + waiting``, at every instant. Waiting is what is in
+    the queue or in the hands of the recorder's thread, let go what was recorded in a file that
+    made way for a newer one.
     """
 
     name: str
@@ -238,11 +239,14 @@ class Recorder:
         queue, write, (taken, lost) = self._queue, self._writer.write, self._done
         for _ in range(min(BATCH, len(queue))):
             message = queue.popleft()
-            # Lost until proven otherwise: a write that raises needs no case of its own.
-            lost[message[0]] += 1
-            if write(*message):
-                lost[message[0]] -= 1
-                taken[message[0]] += 1
+            topic = message[0]
+            # Until the writer has answered, the message is counted nowhere, and so it waits.
+            try:
+                kept = write(*message)
+            except BaseException:
+                lost[topic] += 1
+                raise
+            (taken if kept else lost)[topic] += 1
         return bool(queue)
 
     def _fail(self, error: Exception) -> None:
