@@ -24,6 +24,7 @@ import threading
 
 from linkage_ros.bag.account import UNFINISHED
 from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.writing.handover import PLACE
 from linkage_ros.bag.writing.recorder import Recorder
 from linkage_ros.bag.writing.writer import BagWriter
 import pytest
@@ -123,6 +124,26 @@ def test_at_every_look_the_counts_close_and_nothing_is_lost(tmp_path, topics, me
     assert all(c.received == c.recorded + c.waiting for c in looks)
     assert any(counts.waiting for counts in looks)
     assert any(counts.recorded for counts in looks)
+
+
+@pytest.mark.parametrize(
+    ('size', 'wait'),
+    [(400, 100), (PLACE - 1, 100), (PLACE, 50), (10 * PLACE, 10), (99 * PLACE, 1), (10**7, 1)],
+)
+def test_the_queue_is_bounded_in_bytes(tmp_path, topics, messages, size, wait):
+    writer = StalledWriter(tmp_path / 'run', topics)
+    recorder = Recorder(writer, capacity=100)
+    recorder.offer(*messages[0])
+    assert writer.reached.wait(10)
+    data = bytes(size)  # the same for all: what counts is what they would take
+    for message in messages[2:402:2]:
+        recorder.offer(*message._replace(data=data))
+    counts = recorder.inspect()[0]
+    in_hand = 1
+    assert (counts.dropped, counts.waiting) == (200 - wait, wait + in_hand)
+    assert wait * size <= 100 * PLACE + size
+    writer.answer.set()
+    assert _counts(recorder.stop())[0] == (201, wait + 1, 200 - wait)
 
 
 def test_a_disk_that_never_answers_does_not_keep_the_process(tmp_path, topics, messages):

@@ -16,7 +16,7 @@
 """
 Record from the hot path: hand over and forget.
 
-``offer`` is a length check and an append. A thread of the recorder's own does the rest, and a disk
+``offer`` is two length checks and an append. A thread of the recorder's own does the rest. A disk
 that stalls or fills stops that thread only: the queue fills, and further messages are counted.
 """
 
@@ -32,7 +32,15 @@ import time
 
 from linkage_ros.bag.account import Account
 from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.writing.handover import BATCH, NAP, POLL, Tally
+from linkage_ros.bag.writing.handover import (
+    BATCH,
+    in_places,
+    NAP,
+    Offered,
+    PLACE,
+    POLL,
+    Tally,
+)
 from linkage_ros.bag.writing.storage import FLUSH_AFTER
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
@@ -90,7 +98,8 @@ class Recorder:
     writer
         The open bag, the recorder's from here on.
     capacity
-        Messages that may wait. The default is 16 s of two topics at 2 kHz, about 25 MB.
+        Messages that may wait, each of up to 16 KiB; a larger one counts as so many more. The
+        default is 16 s of two topics at 2 kHz, about 25 MB, and 1 GiB at most.
     flush_period
         What a power cut may cost [s], as long as the disk answers within a tenth of it.
 
@@ -104,7 +113,7 @@ class Recorder:
         self._writer = writer
         self._capacity = capacity
         self._flush_after = FLUSH_AFTER * flush_period
-        self._queue: deque[tuple[int, int, int, bytes]] = deque()
+        self._queue: deque[Offered | None] = deque()
         self._open = True
         self._received = [Tally() for _ in writer.topics]
         self._add_received = [tally.add for tally in self._received]
@@ -138,10 +147,12 @@ class Recorder:
 
         """
         self._add_received[topic]()
-        if self._open and len(self._queue) < self._capacity:
+        if not self._open or len(self._queue) >= self._capacity:
+            self._add_overflowed[topic]()
+        elif len(data) < PLACE:
             self._queue.append((topic, log_time, publish_time, data))
         else:
-            self._add_overflowed[topic]()
+            self._queue.extend(in_places((topic, log_time, publish_time, data)))
 
     def inspect(self) -> tuple[TopicCounts, ...]:
         """Return the counts as they are now; after a failure, ``recorded`` is what was kept."""
@@ -239,6 +250,8 @@ class Recorder:
         queue, write, (taken, lost) = self._queue, self._writer.write, self._done
         for _ in range(min(BATCH, len(queue))):
             message = queue.popleft()
+            if message is None:
+                continue
             topic = message[0]
             # Until the writer has answered, the message is counted nowhere, and so it waits.
             try:
@@ -262,6 +275,7 @@ class Recorder:
         taken, lost = self._done
         lost = [gone + had - has for gone, had, has in zip(lost, taken, kept, strict=True)]
         while self._queue:
-            lost[self._queue.popleft()[0]] += 1
+            if message := self._queue.popleft():
+                lost[message[0]] += 1
         self._done = (list(kept), lost)
         self.failure = error
