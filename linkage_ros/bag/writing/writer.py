@@ -41,13 +41,14 @@ from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_me
 from linkage_ros.bag.topic import CHANNELS_FILE, Topic
 from linkage_ros.bag.writing.bag_file import BagFile
 from linkage_ros.bag.writing.channels import channels_file
-from linkage_ros.bag.writing.disk import NO_ROOM
+from linkage_ros.bag.writing.disk import LostError, NO_ROOM
 from linkage_ros.bag.writing.packing import compression_type
 from linkage_ros.bag.writing.storage import scarcity, Storage
 from linkage_ros.errors import RecordingError
 
 _MAKE_ROOM = 'make room there before the next recording'
 _CHECK_DISK = 'check the disk before the next recording'
+_KEEP_OUT = 'let no other process write to the folder of a bag while it is recorded'
 _TIME_END = 2**63  # rosbag2's times are signed
 _SEQUENCE_END = 2**32  # MCAP's sequence numbers; at 10 kHz they start again after five days
 _RENEWAL = 0.8  # [s]; less than is between two flushes of a second
@@ -264,6 +265,8 @@ class BagWriter:
         if not self._file.finished:
             summary = self._summarize()
             error = self._file.finish(last_records(custom, summary, self.account(summary)))
+        gone = self._lose_what_is_gone()
+        error = error or gone
         self._summary = summary = self._summarize()
         if error:
             custom = {FAILURE: str(self._ended_by(error)), **custom}
@@ -278,6 +281,18 @@ class BagWriter:
         except OSError as worse:
             error = error or worse
         return error
+
+    def _lose_what_is_gone(self) -> LostError | None:
+        """Count no more what is in files that another process has cut or removed; name these."""
+        parts = self._parts()
+        gone = [part for part in parts if not _is_there(self.folder / part.file, part.size)]
+        if not gone:
+            return None
+        self._ended = [part for part in self._ended if part not in gone]
+        if parts[-1] in gone:
+            self._file.forget()
+        names = ', '.join(part.file for part in gone)
+        return LostError(f'{names}: cut or removed by another process')
 
     def _try_to_renew(self, summary: BagSummary) -> bool:
         """Write the metadata anew, or leave the old ones: no message depends on them."""
@@ -313,10 +328,13 @@ class BagWriter:
 
     def _ended_by(self, error: OSError) -> RecordingError:
         kept = 'what was flushed before' if self._file.in_doubt else 'what is on the disk'
+        remedy = _MAKE_ROOM if error.errno in NO_ROOM else _CHECK_DISK
+        if isinstance(error, LostError):
+            kept, remedy = 'what is left of it', _KEEP_OUT
         return RecordingError(
             self.folder,
             f'the recording ended early: {error.strerror or error}',
-            f'{kept} stays readable; {_MAKE_ROOM if error.errno in NO_ROOM else _CHECK_DISK}',
+            f'{kept} stays readable; {remedy}',
         )
 
     def _give_up(self, error: OSError) -> NoReturn:
@@ -327,6 +345,8 @@ class BagWriter:
         ) from None
 
     def _parts(self) -> list[BagSummary]:
+        if self._file.forgotten and self._ended:
+            return self._ended
         return [*self._ended, self._file.summary(self.topics)]
 
     def _summarize(self) -> BagSummary:
@@ -338,6 +358,16 @@ def _remove(folder: Path) -> None:
     for leftover in folder.iterdir():
         leftover.unlink()
     folder.rmdir()
+
+
+def _is_there(file: Path, size: int) -> bool:
+    """Return whether a file is there, and as large as it was; a disk that fails says nothing."""
+    try:
+        return 0 < size <= file.stat().st_size
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
 
 
 def _is_removed(file: Path) -> bool:
