@@ -160,40 +160,60 @@ def test_a_disk_that_never_answers_does_not_keep_the_process(tmp_path, topics, m
     assert recorder.stop() is summary
 
 
-def test_a_failure_ends_the_recording_and_not_the_process(
-    tmp_path, topics, messages, readers, monkeypatch
+@pytest.mark.parametrize(
+    ('number', 'said'),
+    [
+        (errno.ENOSPC, 'was interrupted: No space left on device'),
+        (errno.EIO, 'ended early: Input/output error'),
+    ],
+)
+def test_a_failure_stops_no_process_and_all_that_was_offered_is_accounted_for(
+    tmp_path, topics, messages, readers, monkeypatch, number, said
 ):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.01)
     pwrite = os.pwrite
 
-    def filling(descriptor, data, offset):
+    def failing(descriptor, data, offset):
         if offset > 300_000:
-            raise OSError(errno.ENOSPC, 'No space left on device')
+            raise OSError(number, os.strerror(number))
         return pwrite(descriptor, data, offset)
 
-    monkeypatch.setattr('os.pwrite', filling)
+    def full(*_):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr('os.pwrite', failing)
+    monkeypatch.setattr('os.posix_fallocate', full)
     for message in messages[:6000]:
         recorder.offer(*message)
-    recorder._thread.join(20)
-    assert 'run: the recording ended early: No space left on device' in str(recorder.failure)
+    for _ in range(2000):
+        if recorder.failure:
+            break
+        threading.Event().wait(0.01)
+    assert f'run: the recording {said}' in str(recorder.failure)
+    assert not recorder.recording
     for message in messages[6000:]:
         recorder.offer(*message)
-    assert all(c.received == c.recorded + c.dropped and not c.waiting for c in recorder.inspect())
+    looks = recorder.inspect()
+    assert all(c.received == c.recorded + c.dropped + c.waiting for c in looks)
     summary = recorder.stop()
     assert summary.failure == str(recorder.failure)
     assert [counts.received for counts in summary.topics] == [6000, 6000]
     assert all(c.received == c.recorded + c.dropped for c in summary.topics)
+    assert [(c.dropped, c.waiting) for c in recorder.inspect()] == [
+        (c.dropped, 0) for c in summary.topics
+    ]
     kept = sum(counts.recorded for counts in summary.topics)
     assert 500 < kept < 6000
-    readers.agree(tmp_path / 'run', topics, messages[:kept])
+    if number == errno.ENOSPC:
+        readers.agree(tmp_path / 'run', topics, messages[:kept])
     text = yaml.safe_load((tmp_path / 'run' / 'metadata.yaml').read_text())
     custom = text['rosbag2_bagfile_information']['custom_data']
     assert custom['linkage_ros.failure'] == summary.failure
-    # The account in the bag is that of the moment at which it ended.
+    # What came after the failure counts too: the bag says what the summary says.
     received, dropped = (json.loads(custom[f'linkage_ros.{w}']) for w in ('received', 'dropped'))
-    for counts in summary.topics:
-        assert received[counts.name] == counts.recorded + dropped[counts.name]
-        assert counts.recorded < received[counts.name] <= counts.received
+    assert [(received[c.name], dropped[c.name]) for c in summary.topics] == [
+        (c.received, c.dropped) for c in summary.topics
+    ]
 
 
 def test_an_error_nobody_thought_of_is_a_failure_too(tmp_path, topics, messages, monkeypatch):

@@ -343,7 +343,7 @@ def test_a_full_disk_costs_a_part_of_the_bag_and_the_memory_nothing(
     kept = memory.take()
     outcome = written(kept, lambda: BagWriter(small_disk / 'run', topics))
     assert outcome.failure.startswith(
-        f'{small_disk}/run: the recording ended early: No space left on device; '
+        f'{small_disk}/run: the recording was interrupted: No space left on device; '
     )
     there = sum(c.recorded for c in outcome.topics)
     assert 2000 < there < len(messages)

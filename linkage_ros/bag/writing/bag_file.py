@@ -34,7 +34,6 @@ from linkage_ros.bag.writing.channels import register, start
 from linkage_ros.bag.writing.disk import (
     CHUNK_SIZE,
     FIRST_RESERVE,
-    LostError,
     RecordFile,
     Reserve,
 )
@@ -109,6 +108,11 @@ class BagFile:
         return self._file.in_doubt
 
     @property
+    def ended(self) -> bool:
+        """Return whether its end is on the disk, so that others find all that is counted."""
+        return self._file.ended
+
+    @property
     def size(self) -> int:
         """Return the size of the file by now [bytes]."""
         return self._file.size
@@ -169,7 +173,7 @@ class BagFile:
             self._mcap.add_metadata(name, dict(content))
         self._mcap.finish()  # type: ignore[no-untyped-call]
         self._reserve.release()
-        with suppress(LostError):
+        with suppress(OSError):
             self._file.look()
         error = self._file.error
         try:

@@ -74,6 +74,7 @@ class RecordFile:
         self.position = 0  # where the next record goes once the waiting ones are on the disk
         self.size = 0  # the end of the last record that the system took as a whole [bytes]
         self.error: OSError | None = None
+        self.ended = False  # whether its last record, and so its index, is with the system
         self.in_doubt = False  # whether the system has ever failed to bring it to the disk
         self._unsynced: list[tuple[int, bytes]] = []  # since the last sync, with the offsets
         self._unsynced_size = 0
@@ -158,6 +159,7 @@ class RecordFile:
             self._unsynced_size += len(self._unsynced[-1][1])
             if self._unsynced_size > _MOST_UNSYNCED:
                 self.sync()
+        self.ended = self._tail is not None
 
     def cut_back(self) -> Statistics:
         """
@@ -206,6 +208,7 @@ class RecordFile:
             self._put(ending[count:], start + count)
             self._unsynced.append((start, ending))
             self.size = start + len(ending)
+            self.ended = True
         return True
 
     def _put(self, data: bytes, offset: int) -> None:

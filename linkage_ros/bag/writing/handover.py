@@ -23,6 +23,9 @@ import threading
 POLL = 0.02
 """How often a thread looks for what was offered, in [s]."""
 
+ROOM_POLL = 1.0
+"""How often a recorder looks whether a disk that was full has room again, in [s]."""
+
 BATCH, NAP = 50, 50e-6
 """
 Messages between two naps of a thread, about 0.3 ms of work, and the nap [s].
