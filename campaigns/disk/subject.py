@@ -149,12 +149,16 @@ def offer_all(folder: Path, storage: Storage, count: int) -> Recorded:
                 recorder.offer(*message(number, time_of(number)))
             done.offered += _BURST
             # As fast as the recorder's thread can follow.
-            while sum(c.waiting for c in recorder.inspect()) > _MOST_WAITING:
+            while not recorder.failure and _waiting(recorder) > _MOST_WAITING:
                 sleep(0.001)
         _end(done, recorder)
     except Exception as error:  # noqa: BLE001
         done.escaped = f'{type(error).__name__}: {error}'
     return done
+
+
+def _waiting(recorder: Recorder) -> int:
+    return sum(counts.waiting for counts in recorder.inspect())
 
 
 def _end(done: Recorded, recorder: Recorder) -> None:

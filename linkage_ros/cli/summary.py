@@ -20,7 +20,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.cli.proof import beginning_text, prove
+from linkage_ros.cli.bag_reading import gaps
+from linkage_ros.cli.proof import beginning_text, DIFFERENT, prove, UNTOLD
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline
@@ -99,10 +100,15 @@ def _proof(folder: Path) -> str:
         proof = prove(bag, scene, bag.messages(), look)
     except LinkageError as error:
         return str(error)
+    if proof.verdict == UNTOLD:
+        return f'{UNTOLD}: {beginning_text(proof)}'
     names = ['joint states', *(extra.topic.removeprefix('~/') for extra in pipeline.extras)]
     same = ' and '.join(
         f'{topic.same} of {topic.recorded} {name}'
         for name, topic in zip(names, proof.comparison.topics, strict=True)
     )
-    untold = f'; {beginning_text(proof)}' if proof.beginning else ''
-    return f'{same} replay to the same bytes{untold}; worst loop residual {worst:.1e} m'
+    notes = [beginning_text(proof)] if proof.beginning else []
+    if proof.verdict == DIFFERENT:
+        notes += gaps(bag)
+    notes.append(f'worst loop residual {worst:.1e} m')
+    return f'{same} replay to the same bytes; {"; ".join(notes)}'

@@ -372,6 +372,8 @@ class Health:
                 level, message = WARN, 'The disk does not keep up: messages dropped'
             if recorder.failure is not None:
                 level, message = ERROR, str(recorder.failure)
+            if recorder.failure is not None and recorder.recording:
+                level, message = WARN, f'Recording again, in a new file: {recorder.failure}'
         elif self.recording_failure:
             level, message = ERROR, self.recording_failure
         return self._status('recording', level, message, values)

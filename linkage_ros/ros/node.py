@@ -320,6 +320,8 @@ class LinkageNode(LifecycleNode):
     ) -> Trigger.Response:
         if self.loop is None or not self.loop.running:
             return _answer(response, False, 'not active: nothing to record')
+        if self.recording.has_ended(self.loop):
+            self.recording.stop(self.loop)
         if self.loop.recorder is not None:
             return _answer(response, False, f'already {self.recording.describe(self.loop)}')
         line = self._start_recording()
@@ -383,10 +385,9 @@ class LinkageNode(LifecycleNode):
             self.get_logger().warning(self._real_time.refused.pop())
         if loop.failure:
             self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
-        if loop.recorder is not None and loop.recorder.failure is not None:
-            self.recording.stop(loop)
+        news = self.recording.look(loop)
         due = self._before.time + self.get_parameter('diagnostics_period').value * NANOSECONDS
-        if time.monotonic_ns() >= due - 0.5 * _WATCH_PERIOD * NANOSECONDS:
+        if news or time.monotonic_ns() >= due - 0.5 * _WATCH_PERIOD * NANOSECONDS:
             self._diagnose()
 
     def _diagnose(self) -> None:

@@ -44,7 +44,13 @@ from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
 from linkage_ros.line import Line
 from linkage_ros.replay import own_effects_here
-from linkage_ros.ros.run_snapshots import Answer, counts_text, MemorySummary, RunSnapshots
+from linkage_ros.ros.run_snapshots import (
+    Answer,
+    counts_text,
+    losses_text,
+    MemorySummary,
+    RunSnapshots,
+)
 from linkage_ros.ros.tick_loop import TickLoop
 from linkage_ros.scene.scene import RecordParameters, Scene
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -75,7 +81,8 @@ class RunRecording:
         self.memories: list[MemorySummary] = []
         """The memories that have ended."""
         self.failure = ''
-        """Why a recording could not be started or ended early; '' while none has."""
+        """Why a recording is not whole, or could not be started; '' while all are."""
+        self._seen: tuple[RecordingError, bool] | None = None
         self.snapshots: RunSnapshots | None = None
         """The memory; nothing where a bag is written as the run goes."""
 
@@ -136,7 +143,14 @@ class RunRecording:
         """Return what is being done, in words; '' for nothing."""
         if self.snapshots is not None:
             return str(self.snapshots)
-        return f'recording to {loop.recorder.folder}' if loop.recorder is not None else ''
+        if loop.recorder is None:
+            return ''
+        waits = '' if loop.recorder.recording else f'; {loop.recorder.failure}'
+        return f'recording to {loop.recorder.folder}{waits}'
+
+    def has_ended(self, loop: TickLoop) -> bool:
+        """Return whether a bag has failed for good and is still there to be accounted for."""
+        return self.snapshots is None and loop.recorder is not None and loop.recorder.ended
 
     def snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
         """Begin to write what is in memory; as `RunSnapshots.begin`."""
@@ -160,6 +174,25 @@ class RunRecording:
         else:
             self._logger.info(outcome.line)
 
+    def look(self, loop: TickLoop) -> bool:
+        """Say that the recording has failed, or goes on again; return whether there was news."""
+        recorder = loop.recorder
+        if recorder is None or recorder.failure is None:
+            return False
+        if self.snapshots is not None:
+            self.stop(loop)
+            return True
+        state = recorder.failure, recorder.recording
+        if state == self._seen:
+            return False
+        self._seen, self.failure = state, str(recorder.failure)
+        if recorder.recording:
+            line = f'recording to {recorder.folder} again, in a new file'
+            self._logger.info(line)
+        else:
+            self._logger.error(self.failure)
+        return True
+
     def stop(self, loop: TickLoop) -> tuple[bool, str]:
         """Close the bag or end the memory; return whether all went well, and a line."""
         if loop.recorder is None:
@@ -169,14 +202,15 @@ class RunRecording:
             return self._forget(self.snapshots)
         summary = recorder.stop()
         self.ended.append(summary)
-        if summary.failure:
-            self.failure = f'recording ended early: {summary.failure}'
-            line = f'{self.failure}: {counts_text(summary)}'
+        failure = summary.failure or losses_text(summary.folder, summary.topics)
+        if failure:
+            self.failure = failure
+            line = f'{failure}: {counts_text(summary)}'
             self._logger.error(line)
         else:
             line = f'recorded {summary.folder}: {counts_text(summary)}'
             self._logger.info(line)
-        return not summary.failure, line
+        return not failure, line
 
     def _remember(
         self,

@@ -17,11 +17,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from linkage_ros.bag.writing.recorder import RecordingSummary
+from linkage_ros.bag.writing.recorder import RecordingSummary, TopicCounts
 from linkage_ros.bag.writing.snapshot import KeptCounts, SnapshotMemory
 from linkage_ros.bag.writing.snapshot_bag import SnapshotWriting
 from linkage_ros.bag.writing.writer import BagWriter
@@ -64,7 +64,7 @@ class MemorySummary:
     snapshots
         How many there are, in words.
     failure
-        Why the memory has ended early; '' if it has not.
+        Why the memory has ended early, or lacks messages; '' if it is whole.
 
     """
 
@@ -178,7 +178,9 @@ class RunSnapshots:
     def end(self) -> MemorySummary:
         """Forget what is in memory, and say what became of it all."""
         topics, failure = self.memory.stop(), self.memory.failure
-        return MemorySummary(topics, self.count, str(failure) if failure else '')
+        where = 'the memory of the last seconds'
+        failure_text = str(failure) if failure else losses_text(where, topics)
+        return MemorySummary(topics, self.count, failure_text)
 
 
 def counts_text(summary: RecordingSummary) -> str:
@@ -187,6 +189,18 @@ def counts_text(summary: RecordingSummary) -> str:
         f'{t.name} {t.recorded} recorded {t.dropped} dropped'
         + (f' {t.let_go} let go' if t.let_go else '')
         for t in summary.topics
+    )
+
+
+def losses_text(where: object, topics: Sequence[TopicCounts] | Sequence[KeptCounts]) -> str:
+    """Return in a line how many messages were dropped there; '' for none."""
+    dropped = sum(topic.dropped for topic in topics)
+    if not dropped:
+        return ''
+    received = sum(topic.received for topic in topics)
+    return (
+        f'{where}: {dropped:,} of {received:,} messages were dropped: they came too fast, or with '
+        'times that no bag can hold; record less, or to a faster disk'
     )
 
 

@@ -42,7 +42,8 @@ class RecordParameters:
         Name of the bag's folder; '' for the scene's name and the time. Where it exists already, a
         number is added: NAME_2.
     queue
-        How many messages wait for the disk before further ones are dropped.
+        How many messages of up to 16 KiB wait for the disk before further ones are dropped; a
+        larger message counts as so many more.
     storage
         In which files, packed how, how soon on the disk.
 

@@ -274,7 +274,8 @@ def _record() -> Schema:
                 'default': '',
             },
             'queue': {
-                'description': 'how many messages wait for the disk before more are dropped',
+                'description': 'how many messages wait for the disk before more are dropped; one '
+                'of more than 16 KiB counts as one for each 16 KiB',
                 'type': 'integer',
                 'minimum': 100,
                 'maximum': 10_000_000,

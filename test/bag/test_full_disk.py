@@ -66,8 +66,8 @@ def test_a_full_disk_costs_no_message_that_was_taken(
     taken, error = _write_until_it_fails(writer, messages, flush_every=flush_every)
     assert 2000 < taken < len(messages), 'the disk was to fill in the middle'
     assert str(error) == (
-        f'{small_disk}/run: the recording ended early: No space left on device; what is on the '
-        'disk stays readable; make room there before the next recording'
+        f'{small_disk}/run: the recording was interrupted: No space left on device; what is on '
+        'the disk stays readable; make room there: a run then goes on in a new file'
     )
     summary = writer.close()
     # The message at which the disk was found full went into the room set aside.
@@ -142,7 +142,7 @@ def test_a_limit_on_the_files_size_leaves_a_bag_of_whole_chunks(
     script = [sys.executable, '-c', LIMITED, folder, str(limit), str(flush_every), pickled]
     done = subprocess.run(script, cwd=ROOT, capture_output=True, text=True, check=True)
     taken, counts, error = json.loads(done.stdout)
-    assert 'the recording ended early: File too large' in error
+    assert 'the recording was interrupted: File too large' in error
     assert 3000 < taken < len(messages)
     # Lost are the chunk in progress, and at the file's end as much as the index takes.
     assert taken - 1200 < sum(counts) <= taken
@@ -158,7 +158,7 @@ def test_a_disk_that_fills_among_files_keeps_them_all(small_disk, topics, messag
     storage = Storage(split_bytes=300_000)
     writer = BagWriter(small_disk / 'run', topics, ATTACHMENTS, storage)
     taken, error = _write_until_it_fails(writer, messages, flush_every=100)
-    assert 'ended early: No space left on device' in str(error)
+    assert 'interrupted: No space left on device' in str(error)
     summary = writer.close()
     assert len(summary.parts) >= 3
     assert taken <= sum(summary.counts) <= taken + 1
@@ -200,10 +200,10 @@ def test_a_recording_ends_where_less_stays_free_than_it_should(
     summary = recorder.stop()
     free = os.statvfs(small_disk)
     assert free.f_bavail * free.f_frsize >= 600_000
-    assert summary.failure.startswith(f'{small_disk}/run: the recording ended: ')
+    assert summary.failure.startswith(f'{small_disk}/run: the recording was interrupted: ')
     assert summary.failure.endswith(
         'bytes are free on its disk, fewer than min_free_bytes: 600,000 and 262,144 to go on; '
-        'make room there before the next recording'
+        'make room there: a run then goes on in a new file'
     )
     kept = sum(counts.recorded for counts in summary.topics)
     assert kept > 500

@@ -24,6 +24,7 @@ import threading
 
 from linkage_ros.bag.account import UNFINISHED
 from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.writing.handover import PLACE
 from linkage_ros.bag.writing.recorder import Recorder
 from linkage_ros.bag.writing.writer import BagWriter
 import pytest
@@ -98,6 +99,53 @@ def test_a_stalled_disk_stalls_nobody_and_the_overflow_is_counted(
     readers.agree(tmp_path / 'run', topics, messages[:101])
 
 
+def test_a_message_in_hand_waits_and_is_not_lost(tmp_path, topics, messages):
+    writer = StalledWriter(tmp_path / 'run', topics)
+    recorder = Recorder(writer)
+    for message in messages[:4]:
+        recorder.offer(*message)
+    assert writer.reached.wait(10)
+    looks = [(c.received, c.recorded, c.dropped, c.waiting) for c in recorder.inspect()]
+    assert looks == [(2, 0, 0, 2), (2, 0, 0, 2)]
+    writer.answer.set()
+    assert _counts(recorder.stop()) == [(2, 2, 0), (2, 2, 0)]
+
+
+def test_at_every_look_the_counts_close_and_nothing_is_lost(tmp_path, topics, messages):
+    recorder = Recorder(BagWriter(tmp_path / 'run', topics))
+    looks = []
+    for message in messages:
+        recorder.offer(*message)
+        looks += recorder.inspect()
+    while any(counts.waiting for counts in recorder.inspect()):
+        looks += recorder.inspect()
+    recorder.stop()
+    assert not [counts for counts in looks if counts.dropped]
+    assert all(c.received == c.recorded + c.waiting for c in looks)
+    assert any(counts.waiting for counts in looks)
+    assert any(counts.recorded for counts in looks)
+
+
+@pytest.mark.parametrize(
+    ('size', 'wait'),
+    [(400, 100), (PLACE - 1, 100), (PLACE, 50), (10 * PLACE, 10), (99 * PLACE, 1), (10**7, 1)],
+)
+def test_the_queue_is_bounded_in_bytes(tmp_path, topics, messages, size, wait):
+    writer = StalledWriter(tmp_path / 'run', topics)
+    recorder = Recorder(writer, capacity=100)
+    recorder.offer(*messages[0])
+    assert writer.reached.wait(10)
+    data = bytes(size)  # the same for all: what counts is what they would take
+    for message in messages[2:402:2]:
+        recorder.offer(*message._replace(data=data))
+    counts = recorder.inspect()[0]
+    in_hand = 1
+    assert (counts.dropped, counts.waiting) == (200 - wait, wait + in_hand)
+    assert wait * size <= 100 * PLACE + size
+    writer.answer.set()
+    assert _counts(recorder.stop())[0] == (201, wait + 1, 200 - wait)
+
+
 def test_a_disk_that_never_answers_does_not_keep_the_process(tmp_path, topics, messages):
     writer = StalledWriter(tmp_path / 'run', topics, answered=4)
     recorder = Recorder(writer, flush_period=1000.0)
@@ -112,40 +160,60 @@ def test_a_disk_that_never_answers_does_not_keep_the_process(tmp_path, topics, m
     assert recorder.stop() is summary
 
 
-def test_a_failure_ends_the_recording_and_not_the_process(
-    tmp_path, topics, messages, readers, monkeypatch
+@pytest.mark.parametrize(
+    ('number', 'said'),
+    [
+        (errno.ENOSPC, 'was interrupted: No space left on device'),
+        (errno.EIO, 'ended early: Input/output error'),
+    ],
+)
+def test_a_failure_stops_no_process_and_all_that_was_offered_is_accounted_for(
+    tmp_path, topics, messages, readers, monkeypatch, number, said
 ):
     recorder = Recorder(BagWriter(tmp_path / 'run', topics), flush_period=0.01)
     pwrite = os.pwrite
 
-    def filling(descriptor, data, offset):
+    def failing(descriptor, data, offset):
         if offset > 300_000:
-            raise OSError(errno.ENOSPC, 'No space left on device')
+            raise OSError(number, os.strerror(number))
         return pwrite(descriptor, data, offset)
 
-    monkeypatch.setattr('os.pwrite', filling)
+    def full(*_):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr('os.pwrite', failing)
+    monkeypatch.setattr('os.posix_fallocate', full)
     for message in messages[:6000]:
         recorder.offer(*message)
-    recorder._thread.join(20)
-    assert 'run: the recording ended early: No space left on device' in str(recorder.failure)
+    for _ in range(2000):
+        if recorder.failure:
+            break
+        threading.Event().wait(0.01)
+    assert f'run: the recording {said}' in str(recorder.failure)
+    assert not recorder.recording
     for message in messages[6000:]:
         recorder.offer(*message)
-    assert all(c.received == c.recorded + c.dropped and not c.waiting for c in recorder.inspect())
+    looks = recorder.inspect()
+    assert all(c.received == c.recorded + c.dropped + c.waiting for c in looks)
     summary = recorder.stop()
     assert summary.failure == str(recorder.failure)
     assert [counts.received for counts in summary.topics] == [6000, 6000]
     assert all(c.received == c.recorded + c.dropped for c in summary.topics)
+    assert [(c.dropped, c.waiting) for c in recorder.inspect()] == [
+        (c.dropped, 0) for c in summary.topics
+    ]
     kept = sum(counts.recorded for counts in summary.topics)
     assert 500 < kept < 6000
-    readers.agree(tmp_path / 'run', topics, messages[:kept])
+    if number == errno.ENOSPC:
+        readers.agree(tmp_path / 'run', topics, messages[:kept])
     text = yaml.safe_load((tmp_path / 'run' / 'metadata.yaml').read_text())
     custom = text['rosbag2_bagfile_information']['custom_data']
     assert custom['linkage_ros.failure'] == summary.failure
-    # The account in the bag is that of the moment at which it ended.
+    # What came after the failure counts too: the bag says what the summary says.
     received, dropped = (json.loads(custom[f'linkage_ros.{w}']) for w in ('received', 'dropped'))
-    for counts in summary.topics:
-        assert received[counts.name] == counts.recorded + dropped[counts.name]
-        assert counts.recorded < received[counts.name] <= counts.received
+    assert [(received[c.name], dropped[c.name]) for c in summary.topics] == [
+        (c.received, c.dropped) for c in summary.topics
+    ]
 
 
 def test_an_error_nobody_thought_of_is_a_failure_too(tmp_path, topics, messages, monkeypatch):

@@ -180,6 +180,32 @@ def test_without_an_index_the_metadata_tells_what_was_promised(run):
     assert recovery.folder == run / 'run_0_recovered'
 
 
+@pytest.mark.parametrize('finished', [True, False], ids=['finished', 'unfinished'])
+@pytest.mark.parametrize(
+    ('counted', 'told_if_finished', 'told_if_not'),
+    [
+        # What the metadata count of 200 that are there; what there were, if that is known.
+        (190, None, None),
+        (200, 200, None),
+        (300, 300, 300),
+    ],
+    ids=['fewer than there are', 'as many', 'more'],
+)
+def test_more_than_there_were_are_never_saved(
+    run, finished, counted, told_if_finished, told_if_not
+):
+    damaged(run, cut_at_chunk(3, 0))
+    metadata = yaml.safe_load((run / 'metadata.yaml').read_text())
+    information = metadata['rosbag2_bagfile_information']
+    for topic in information['topics_with_message_count']:
+        topic['message_count'] = counted
+    if not finished:
+        information['custom_data'] = dict(UNFINISHED_DATA)
+    (run / 'metadata.yaml').write_text(yaml.safe_dump(metadata))
+    told = told_if_finished if finished else told_if_not
+    assert [(t.saved, t.promised) for t in recover(run).topics] == 2 * [(200, told)]
+
+
 def test_a_damaged_copy_of_the_topics_is_no_loss(run, messages):
     recovery = recover(damaged(run, lambda c: flip(c.index(b'channels.mcap') + 500)(c)))
     assert recovery.whole

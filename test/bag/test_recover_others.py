@@ -23,12 +23,15 @@ import sys
 import tracemalloc
 
 from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.recovering.new_bag import MOST_CHANNELS
 from linkage_ros.bag.recovering.recover import recover
 from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.cli.main import main
 from linkage_ros.errors import BagError
-from mcap.records import Chunk
+from mcap.data_stream import RecordBuilder
+from mcap.records import Channel, Chunk, DataEnd, Footer, Header, Message, Schema
 from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import CompressionType, IndexType, MCAP0_MAGIC, Writer
 import pytest
 import yaml
 import zstandard
@@ -51,6 +54,47 @@ def written(file: Path, messages, *, count: int = 90, chunk_size: int = 5000, **
             writer.add_message(channel, number, message.data, number, number)
         writer.finish()
     return file
+
+
+def with_channels(file: Path, count: int) -> Path:
+    """Write a file in which each of so many channels comes right before its only message."""
+    builder = RecordBuilder()
+    Header('ros2', 'test').write(builder)
+    Schema(id=1, name='std_msgs/msg/String', encoding='ros2msg', data=b'string data').write(
+        builder
+    )
+    for number in range(count):
+        Channel(
+            id=number, topic=f'/topic_{number}', message_encoding='cdr', metadata={}, schema_id=1
+        ).write(builder)
+        Message(
+            channel_id=number, log_time=1, publish_time=1, sequence=1, data=b'\0\1\0\0\1\0\0\0\0'
+        ).write(builder)
+    DataEnd(0).write(builder)
+    Footer(0, 0, 0).write(builder)
+    file.parent.mkdir(exist_ok=True)
+    file.write_bytes(MCAP0_MAGIC + builder.end() + MCAP0_MAGIC)
+    return file
+
+
+@pytest.mark.parametrize('count', [MOST_CHANNELS + 1, 65_535, 65_536])
+def test_too_many_channels_are_refused_in_a_line(tmp_path, count, capsys):
+    file = with_channels(tmp_path / 'many' / 'many_0.mcap', count)
+    assert main(['recover', str(file)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert 'would hold more than 10,000 channels; no more are recovered; ' in line
+    assert [path.name for path in tmp_path.glob('*/*')] == ['many_0.mcap']
+
+
+def test_as_many_channels_as_may_be_are_saved_over_all_files(tmp_path, monkeypatch):
+    monkeypatch.setattr('linkage_ros.bag.recovering.new_bag.MOST_CHANNELS', 20)
+    for number, count in enumerate((15, 20)):
+        with_channels(tmp_path / 'bag' / f'bag_{number}.mcap', count)
+    recovery = recover(tmp_path / 'bag')
+    assert [topic.saved for topic in recovery.topics] == 15 * [2] + 5 * [1]
+    with_channels(tmp_path / 'bag' / 'bag_2.mcap', 21)
+    with pytest.raises(BagError, match='more than 20 channels'):
+        recover(tmp_path / 'bag', tmp_path / 'again')
 
 
 @pytest.mark.parametrize('compression', [CompressionType.LZ4, CompressionType.ZSTD])

@@ -28,6 +28,7 @@ import threading
 
 from hypothesis import given, strategies
 from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.writing.handover import PLACE
 from linkage_ros.bag.writing.last_seconds import LastSeconds
 from linkage_ros.bag.writing.snapshot import SnapshotMemory
 from linkage_ros.bag.writing.snapshot_bag import SnapshotWriting
@@ -237,6 +238,18 @@ def test_where_the_thread_does_not_keep_up_messages_are_dropped_and_counted(memo
     assert 100 <= sum(c.kept for c in counts) <= 150
 
 
+def test_what_waits_for_the_thread_is_bounded_in_bytes(memory, messages):
+    memory = memory(capacity=100)
+    with memory._lock:
+        for _ in range(200):
+            memory.offer(*messages[0]._replace(data=bytes(10 * PLACE)))
+        counts = memory.inspect()
+        # Ten of eleven places each; the thread may have been at one of the first 50 places.
+        assert closes(counts)
+        assert 10 <= counts[0].kept <= 15
+    assert closes(memory.stop())
+
+
 def test_an_error_nobody_thought_of_ends_the_memory_and_not_the_process(
     memory, messages, monkeypatch
 ):
@@ -330,7 +343,7 @@ def test_a_full_disk_costs_a_part_of_the_bag_and_the_memory_nothing(
     kept = memory.take()
     outcome = written(kept, lambda: BagWriter(small_disk / 'run', topics))
     assert outcome.failure.startswith(
-        f'{small_disk}/run: the recording ended early: No space left on device; '
+        f'{small_disk}/run: the recording was interrupted: No space left on device; '
     )
     there = sum(c.recorded for c in outcome.topics)
     assert 2000 < there < len(messages)

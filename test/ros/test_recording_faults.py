@@ -15,11 +15,15 @@
 
 """A recording that cannot be made or goes on no longer: said, and the node goes on publishing."""
 
+from collections import Counter
+import json
 import os
+import re
 import resource
 import subprocess
 import time
 
+from linkage_ros.cli.main import main
 import pytest
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
@@ -27,18 +31,20 @@ from std_srvs.srv import Trigger
 
 from .graph import crank, wait_for
 
-OK, ERROR = b'\0', b'\2'
+OK, WARN, ERROR = b'\0', b'\1', b'\2'
+COUNTS = ('Received', 'Recorded', 'Dropped', 'Waiting')
 INCOMPLETE = 1
 
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """Mount a disk of 1 MiB, where that is allowed."""
+    """Mount a disk of 4 MiB, of which 3 are taken, where that is allowed."""
     folder = tmp_path / 'disk'
     folder.mkdir()
-    mount = ['mount', '-t', 'tmpfs', '-o', 'size=1m', 'tmpfs', str(folder)]
+    mount = ['mount', '-t', 'tmpfs', '-o', 'size=4m', 'tmpfs', str(folder)]
     if os.geteuid() or subprocess.run(mount, capture_output=True, check=False).returncode:
         pytest.skip('only a root that may mount can make a small disk')
+    (folder / 'other').write_bytes(bytes(3 * 2**20))
     yield folder
     subprocess.run(['umount', '--lazy', str(folder)], check=True)
 
@@ -121,35 +127,89 @@ def limit_file_size():
     resource.setrlimit(resource.RLIMIT_FSIZE, (620_000, 620_000))
 
 
+def counts_in_line(line):
+    """Return by topic what the node says to have recorded and dropped."""
+    found = re.findall(r'(/[\w/]+) (\d+) recorded (\d+) dropped', line)
+    return {topic: (int(recorded), int(dropped)) for topic, recorded, dropped in found}
+
+
+def counts_in_info(bag, capsys):
+    """Return the same as `linkage info` says it, and why the recording was interrupted."""
+    main(['info', str(bag), '--json'])
+    account = json.loads(capsys.readouterr().out)
+    counts = {t['name']: (t['messages'], t['dropped']) for t in account['topics']}
+    assert all(t['received'] == t['messages'] + t['dropped'] for t in account['topics'])
+    return counts, account['recording_failure']
+
+
 @pytest.mark.parametrize('kind', ['a full disk', 'a limit on file sizes'])
-def test_a_recording_that_ends_early(
-    graph, request, tmp_path, write_scene, start, keeps_publishing, kind
+def test_a_full_disk_is_told_alike_by_node_diagnostics_and_bag(
+    graph, request, tmp_path, write_scene, start, keeps_publishing, capsys, kind
 ):
     disk = request.getfixturevalue('small_disk') if kind == 'a full disk' else tmp_path
     scene = write_scene('early', scene_text(disk, rate=2000))
     popen = {} if kind == 'a full disk' else {'preexec_fn': limit_file_size}
     node = start(scene, **popen)
     end = time.monotonic() + 30.0
-    while 'ended early' not in node.log:
+    while 'was interrupted' not in node.log:
         assert time.monotonic() < end
         keeps_publishing()
-    message = graph.wait_for_level('recording', ERROR).message
+    before = graph.wait_for_level('recording', ERROR)
     reason = 'No space left on device' if kind == 'a full disk' else 'File too large'
-    assert reason in message
-    (line,) = [line for line in node.log.splitlines() if 'ended early' in line]
-    assert reason in line
-    keeps_publishing()
+    assert reason in before.message
+    # What is published from here on is not recorded, and is counted as that.
+    keeps_publishing(3000)
+    after = graph.wait_for_level('recording', ERROR)
+    values = {value.key: value.value for value in after.values}
+    received, recorded, dropped, waiting = (
+        int(values[f'{what}: /joint_states']) for what in COUNTS
+    )
+    assert received == recorded + dropped + waiting
     assert node.end() == INCOMPLETE
     assert 'Traceback' not in node.log
+    said, line = [line for line in node.log.splitlines() if 'was interrupted' in line]
+    assert reason in said
 
     with AnyReader([disk / 'bag']) as reader:
-        kept = [
-            reader.deserialize(data, connection.msgtype)
-            for connection, _, data in reader.messages()
-            if connection.topic == '/joint_states'
-        ]
-    assert len(kept) > 500
-    assert f'/joint_states {len(kept)} recorded' in line
+        kept = Counter(connection.topic for connection, _, _ in reader.messages())
+    assert kept['/joint_states'] > 500
+    assert kept['/joint_states'] == recorded
+    told = counts_in_line(line)
+    assert told['/joint_states'][0] == recorded
+    assert sum(told['/joint_states']) >= received
+    assert sum(told['/joint_states']) > 3000
+    in_bag, reason_in_bag = counts_in_info(disk / 'bag', capsys)
+    assert in_bag == told
+    assert reason in reason_in_bag
+
+
+def test_where_there_is_room_again_the_recording_goes_on_in_a_new_file(
+    graph, small_disk, write_scene, start, keeps_publishing, capsys
+):
+    node = start(write_scene('again', scene_text(small_disk, rate=2000)))
+    end = time.monotonic() + 60.0
+    while 'was interrupted' not in node.log:
+        assert time.monotonic() < end
+        keeps_publishing()
+    graph.wait_for_level('recording', ERROR)
+    (small_disk / 'other').unlink()
+    while 'again, in a new file' not in node.log:
+        assert time.monotonic() < end
+        keeps_publishing()
+    assert 'No space left on device' in graph.wait_for_level('recording', WARN).message
+    keeps_publishing(1000)
+    assert node.end() == INCOMPLETE
+    bag = small_disk / 'bag'
+    assert sorted(file.name for file in bag.glob('*.mcap')) == ['bag_0.mcap', 'bag_1.mcap']
+    told = counts_in_line(node.log.splitlines()[-1])
+    with AnyReader([bag]) as reader:
+        kept = Counter(connection.topic for connection, _, _ in reader.messages())
+    assert kept == {topic: count for topic, (count, _) in told.items() if count}
+    in_bag, reason = counts_in_info(bag, capsys)
+    assert in_bag == told
+    assert 'No space left on device' in reason
+    with AnyReader([bag / 'bag_1.mcap']) as reader:
+        assert reader.message_count > 1000
 
 
 def test_a_later_bag_does_not_hide_the_first_failure(

@@ -38,9 +38,13 @@ from linkage_ros.bag.reading.reader import topic_of
 from linkage_ros.bag.reading.records import Definitions, Message
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.disk import CHUNK_SIZE
+from linkage_ros.errors import BagError
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.records import Attachment, Channel
 from mcap.writer import CompressionType, Writer
+
+MOST_CHANNELS = 10_000
+"""How many channels a new bag may have: its metadata, 700 bytes for each, must stay readable."""
 
 _COMPRESSIONS = {'lz4': CompressionType.LZ4, 'zstd': CompressionType.ZSTD}
 
@@ -71,6 +75,8 @@ class NewBag:
     ------
     OSError
         As the system gives it, here and from all that writes.
+    BagError
+        From `add` and `describe`: there are more than `MOST_CHANNELS`.
 
     """
 
@@ -106,10 +112,13 @@ class NewBag:
     def add(self, found: Found, definitions: Definitions) -> None:
         """Add what was found in a file, of which these schemas and channels are known."""
         if isinstance(found, Message):
+            if not self._numbers:
+                self.describe(definitions)
             number = self._numbers.get(found.channel.id)
             if number is None:
-                self.describe(definitions)
-                number = self._numbers[found.channel.id]
+                # Not all that are known by now: of thousands, each comes with its first message.
+                number = self._number_of(found.channel, definitions)
+                self._numbers[found.channel.id] = number
             self._mcap.add_message(
                 number, found.log_time, found.data, found.publish_time, found.sequence
             )
@@ -159,6 +168,12 @@ class NewBag:
         kind = (schema.name, schema.encoding, schema.data) if schema else None
         described = (channel.topic, channel.message_encoding, kind, *channel.metadata.items())
         if described not in self._channels:
+            if len(self._channels) == MOST_CHANNELS:
+                raise BagError(
+                    self._folder,
+                    f'would hold more than {MOST_CHANNELS:,} channels; no more are recovered',
+                    'no ROS graph has as many: ask who made the bag',
+                )
             number = 0
             if kind is not None:
                 if kind not in self._schemas:

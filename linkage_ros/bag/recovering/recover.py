@@ -85,7 +85,8 @@ def recover(
     Raises
     ------
     BagError
-        It is no bag, leads out of its folder, or nothing of it is whole. Nothing was written.
+        It is no bag, leads out of its folder, has too many channels, or nothing of it is whole.
+        Nothing was written.
     RecordingError
         The new folder exists or cannot be written to. Nothing is left behind.
 
@@ -239,20 +240,34 @@ def _recovery(
     target: Path, bag: NewBag, information: Mapping[str, Any], findings: _Findings
 ) -> Recovery:
     promised: Mapping[str, int] = findings.promised
-    if not findings.all_promised:
+    exact = findings.all_promised
+    if not exact:
         promised = promised_counts(information)
+        exact = UNFINISHED not in custom_of(information)
     names = dict.fromkeys([*bag.topics, *promised])
     return Recovery(
         folder=target,
         topics=tuple(
-            TopicRecovery(name, bag.counts[name], promised.get(name, 0) if promised else None)
-            for name in names
+            TopicRecovery(name, saved, _true_promise(promised, name, saved, exact))
+            for name, saved in ((name, bag.counts[name]) for name in names)
         ),
         attachments=tuple(bag.attachments),
         losses=tuple(findings.losses),
         repaired=tuple(findings.repaired),
         remarks=tuple(findings.remarks),
     )
+
+
+def _true_promise(promised: Mapping[str, int], name: str, saved: int, exact: bool) -> int | None:
+    """
+    Return how many messages there were; None where that is unknown.
+
+    What a bag counts that is not finished is what was on the disk by the last flush: there were as
+    many at least. Where more are there than it says, it does not know how many there were.
+    """
+    count = promised.get(name, 0)
+    known = saved < count or (exact and bool(promised) and saved == count)
+    return count if known else None
 
 
 @contextmanager

@@ -23,7 +23,7 @@ From the first error of the disk on, mcap's ``Writer`` goes on into memory (`dis
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 import time
 from typing import cast, IO
@@ -31,7 +31,12 @@ from typing import cast, IO
 from linkage_ros.bag.metadata import BagSummary, NO_START
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.channels import register, start
-from linkage_ros.bag.writing.disk import CHUNK_SIZE, FIRST_RESERVE, RecordFile, Reserve
+from linkage_ros.bag.writing.disk import (
+    CHUNK_SIZE,
+    FIRST_RESERVE,
+    RecordFile,
+    Reserve,
+)
 from mcap.records import Statistics
 from mcap.writer import CompressionType, Writer
 
@@ -59,6 +64,8 @@ class BagFile:
         Log time of the first message [ns]; None before it.
     finished
         Whether it has been ended.
+    forgotten
+        Whether another process has taken it away.
 
     Raises
     ------
@@ -77,7 +84,7 @@ class BagFile:
         self.path = path
         self.counts = [0] * len(topics)
         self.first: int | None = None
-        self.finished = False
+        self.finished = self.forgotten = False
         self._start, self._end = NO_START, 0
         self._flushes, self._flushed = 0, 0
         self._safe = (tuple(self.counts), self._start, self._end)
@@ -99,6 +106,11 @@ class BagFile:
     def in_doubt(self) -> bool:
         """Return whether the disk has ever failed to keep what it had taken."""
         return self._file.in_doubt
+
+    @property
+    def ended(self) -> bool:
+        """Return whether its end is on the disk, so that others find all that is counted."""
+        return self._file.ended
 
     @property
     def size(self) -> int:
@@ -126,6 +138,7 @@ class BagFile:
 
         mcap before 1.6 cannot close a chunk early: there, whole chunks only are safe.
         """
+        self._file.look()
         if hasattr(self._mcap, 'flush'):
             self._mcap.flush()  # type: ignore[no-untyped-call]
         if self._file.position == self._flushed:
@@ -160,6 +173,8 @@ class BagFile:
             self._mcap.add_metadata(name, dict(content))
         self._mcap.finish()  # type: ignore[no-untyped-call]
         self._reserve.release()
+        with suppress(OSError):
+            self._file.look()
         error = self._file.error
         try:
             try:
@@ -179,6 +194,12 @@ class BagFile:
         except OSError as worse:
             error = error or worse
         return error
+
+    def forget(self) -> None:
+        """Count none of its messages: another process has taken it away."""
+        self.forgotten = True
+        self.counts = [0] * len(self.counts)
+        self._start, self._end = NO_START, 0
 
     def abandon(self) -> None:
         """Let go of the file, of which nothing is wanted."""

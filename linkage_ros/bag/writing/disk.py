@@ -57,11 +57,16 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _MOST_UNSYNCED = 16 * 1024 * 1024
 
 
+class LostError(OSError):
+    """Another process has cut, moved or removed a file of the recording."""
+
+
 class RecordFile:
     """
     A file of whole records; writing to it never raises, and leaves what failed in `error`.
 
-    After the first error, records wait in memory for `drain`.
+    After the first error, records wait in memory for `drain`. Before each write the file is
+    looked at: what another process has cut off would else come back as a hole full of zeros.
     """
 
     def __init__(self, path: Path) -> None:
@@ -69,10 +74,12 @@ class RecordFile:
         self.position = 0  # where the next record goes once the waiting ones are on the disk
         self.size = 0  # the end of the last record that the system took as a whole [bytes]
         self.error: OSError | None = None
+        self.ended = False  # whether its last record, and so its index, is with the system
         self.in_doubt = False  # whether the system has ever failed to bring it to the disk
         self._unsynced: list[tuple[int, bytes]] = []  # since the last sync, with the offsets
         self._unsynced_size = 0
         self._waiting: list[bytes] = []
+        self._is_cut = False
         self._tail: list[bytes] | None = None
         self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
 
@@ -92,6 +99,28 @@ class RecordFile:
 
     def flush(self) -> None:
         """Do nothing: no buffer is between `write` and the system."""
+
+    def look(self) -> None:
+        """
+        Raise LostError where another process has cut, moved or removed the file.
+
+        What it was cut to, 0 where it was removed, is its `size` from then on. Once it is in
+        `error`, nothing more is looked for.
+        """
+        if self.error:
+            return
+        lost = ''
+        there = os.fstat(self._descriptor)
+        if there.st_size < self.size:
+            lost = f'was cut from {self.size:,} to {there.st_size:,} bytes'
+            self.size, self._is_cut = there.st_size, True
+        elif not _is_named(there, self.path):
+            lost = 'was moved or replaced'
+            if not there.st_nlink:
+                lost, self.size, self._is_cut = 'was removed', 0, True
+        if lost:
+            self.error = LostError(f'{self.path.name} {lost} by another process')
+            raise self.error
 
     def sync(self) -> None:
         """
@@ -120,21 +149,26 @@ class RecordFile:
 
     def drain(self) -> None:
         """Write the waiting records; raises OSError, and can be called again then."""
+        if self.error and self._is_cut:
+            raise self.error
         while self._waiting:
+            self.look()
             self._put(self._waiting[0], self.size)
             self._unsynced.append((self.size, self._waiting.pop(0)))
             self.size += len(self._unsynced[-1][1])
             self._unsynced_size += len(self._unsynced[-1][1])
             if self._unsynced_size > _MOST_UNSYNCED:
                 self.sync()
+        self.ended = self._tail is not None
 
     def cut_back(self) -> Statistics:
         """
         End the file with as many chunks as leave room for an index; return what is then in it.
 
-        The index overwrites the end of the file in place, which takes no new room on the disk.
-        Where not even that works the file stays without an end, but with whole records only; so it
-        does where there is no room for an index at all.
+        The index overwrites the end of the file in place, which takes no new room on the disk; in
+        a file that another process has cut there is no need for that. Where not even that works
+        the file stays without an end, but with whole records only; so it does where there is no
+        room for an index at all.
         """
         stream = BytesIO(b''.join(self._tail or []))
         records = list(StreamReader(stream, skip_magic=True, emit_chunks=True).records)
@@ -148,7 +182,7 @@ class RecordFile:
         while chunks:
             start = _end_of(chunks[-1])
             ending = _ending(records, chunks, start)
-            if start + len(ending) <= self.size:
+            if self._is_cut or start + len(ending) <= self.size:
                 if not self._end_with(ending, start):
                     chunks = whole
                 break
@@ -174,6 +208,7 @@ class RecordFile:
             self._put(ending[count:], start + count)
             self._unsynced.append((start, ending))
             self.size = start + len(ending)
+            self.ended = True
         return True
 
     def _put(self, data: bytes, offset: int) -> None:
@@ -210,6 +245,16 @@ class Reserve:
     def release(self) -> None:
         with suppress(OSError):  # nothing is in it
             self._file.close()
+
+
+def _is_named(file: os.stat_result, path: Path) -> bool:
+    """Return whether this is the file of that name; so it is where the disk does not answer."""
+    try:
+        return os.path.samestat(file, path.stat())
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
 
 
 def _end_of(chunk: ChunkIndex) -> int:

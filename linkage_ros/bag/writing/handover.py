@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What the threads have in common that take from a tick: how they nap, and how offers count."""
+"""What the threads have in common that take from a tick: naps, queues and how offers count."""
 
 from __future__ import annotations
 
@@ -23,6 +23,9 @@ import threading
 POLL = 0.02
 """How often a thread looks for what was offered, in [s]."""
 
+ROOM_POLL = 1.0
+"""How often a recorder looks whether a disk that was full has room again, in [s]."""
+
 BATCH, NAP = 50, 50e-6
 """
 Messages between two naps of a thread, about 0.3 ms of work, and the nap [s].
@@ -30,6 +33,23 @@ Messages between two naps of a thread, about 0.3 ms of work, and the nap [s].
 It is not 0: with a nap of 0 the thread often takes the interpreter back before a waiting tick
 wakes up.
 """
+
+
+PLACE = 16 * 1024
+"""
+How large a message may be that takes one place in a queue [bytes]; a larger one takes more.
+
+So a bound on the places is one on the bytes too, at most one message more for each thread that
+offers. To count bytes, these threads would need a lock, and a tick would wait for it.
+"""
+
+Offered = tuple[int, int, int, bytes]
+"""A message on its way: topic, log time, publish time [ns] and its CDR bytes."""
+
+
+def in_places(message: Offered) -> tuple[Offered | None, ...]:
+    """Return a message and, for each further `PLACE` that it fills, None; data is not copied."""
+    return message, *(None,) * (len(message[3]) // PLACE)
 
 
 class Tally:

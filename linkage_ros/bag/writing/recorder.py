@@ -16,15 +16,16 @@
 """
 Record from the hot path: hand over and forget.
 
-``offer`` is a length check and an append. A thread of the recorder's own does the rest, and a disk
+``offer`` is two length checks and an append. A thread of the recorder's own does the rest. A disk
 that stalls or fills stops that thread only: the queue fills, and further messages are counted.
+After a full disk the recording goes on in a new file of the bag as soon as there is room; whatever
+it ends by, the bag says what became of all that was offered until `Recorder.stop`.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 import threading
@@ -32,7 +33,16 @@ import time
 
 from linkage_ros.bag.account import Account
 from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.writing.handover import BATCH, NAP, POLL, Tally
+from linkage_ros.bag.writing.handover import (
+    BATCH,
+    in_places,
+    NAP,
+    Offered,
+    PLACE,
+    POLL,
+    ROOM_POLL,
+    Tally,
+)
 from linkage_ros.bag.writing.storage import FLUSH_AFTER
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
@@ -43,8 +53,9 @@ class TopicCounts:
     """
     What became of one topic's messages.
 
-    ``received == recorded + dropped + let_go + waiting``, at every instant. Let go is what was
-    recorded in a file that made way for a newer one.
+    ``received == recorded + dropped + let_go + waiting``, at every instant. Waiting is what is in
+    the queue or in the hands of the recorder's thread, let go what was recorded in a file that
+    made way for a newer one.
     """
 
     name: str
@@ -70,7 +81,7 @@ class RecordingSummary:
     size
         Size of the MCAP files [bytes].
     failure
-        Why it ended early, on one line; None if it did not.
+        Why messages are missing, on one line; None where no disk has failed.
 
     """
 
@@ -89,7 +100,8 @@ class Recorder:
     writer
         The open bag, the recorder's from here on.
     capacity
-        Messages that may wait. The default is 16 s of two topics at 2 kHz, about 25 MB.
+        Messages that may wait, each of up to 16 KiB; a larger one counts as so many more. The
+        default is 16 s of two topics at 2 kHz, about 25 MB, and 1 GiB at most.
     flush_period
         What a power cut may cost [s], as long as the disk answers within a tenth of it.
 
@@ -99,11 +111,13 @@ class Recorder:
         self, writer: BagWriter, *, capacity: int = 65536, flush_period: float = 1.0
     ) -> None:
         self.failure: RecordingError | None = None
+        """Why messages are lost, or were; a recording that went on again has one too."""
+        self._recording = True
         self.folder = writer.folder
         self._writer = writer
         self._capacity = capacity
         self._flush_after = FLUSH_AFTER * flush_period
-        self._queue: deque[tuple[int, int, int, bytes]] = deque()
+        self._queue: deque[Offered | None] = deque()
         self._open = True
         self._received = [Tally() for _ in writer.topics]
         self._add_received = [tally.add for tally in self._received]
@@ -137,10 +151,12 @@ class Recorder:
 
         """
         self._add_received[topic]()
-        if self._open and len(self._queue) < self._capacity:
+        if not self._open or len(self._queue) >= self._capacity:
+            self._add_overflowed[topic]()
+        elif len(data) < PLACE:
             self._queue.append((topic, log_time, publish_time, data))
         else:
-            self._add_overflowed[topic]()
+            self._queue.extend(in_places((topic, log_time, publish_time, data)))
 
     def inspect(self) -> tuple[TopicCounts, ...]:
         """Return the counts as they are now; after a failure, ``recorded`` is what was kept."""
@@ -201,28 +217,59 @@ class Recorder:
         )
         return self._summary
 
+    @property
+    def recording(self) -> bool:
+        """Return whether messages get into the bag; not after a failure, until there is room."""
+        return self._recording
+
+    @property
+    def ended(self) -> bool:
+        """Return whether it has failed for good, so that no more messages are taken."""
+        return self.failure is not None and not self._open
+
     def _run(self) -> None:
+        going = True
+        while going:
+            try:
+                if self._goes_on():
+                    self._record()
+                going = False
+            except Exception as error:  # noqa: BLE001, PERF203 (nothing ends it in silence)
+                self._fail(error)
         try:
-            due = time.monotonic() + self._flush_after
-            stopping = False
-            while not stopping:
-                # Asked before the queue is emptied: what was offered until then is written.
-                stopping = self._stopping.wait(max(0.0, min(POLL, due - time.monotonic())))
-                more = True
-                while more:
-                    more = self._write_batch()
-                    now = time.monotonic()
-                    # A backlog first, lest a slow disk leave time for nothing but flushes.
-                    if now >= due + self._flush_after * more:
-                        self._writer.flush()
-                        self._safe = tuple(self._done[0])
-                        # What came while it lasted is not with the system yet.
-                        due = max(now + self._flush_after, time.monotonic())
-                    if more:
-                        time.sleep(NAP)
             self._writer.close(self._custom)
-        except Exception as error:  # noqa: BLE001 (nothing may end the thread in silence)
+        except Exception as error:  # noqa: BLE001 (as above)
             self._fail(error)
+        self._lose_queue()
+
+    def _goes_on(self) -> bool:
+        """Wait after a failure until there is room again; return False where nobody waits."""
+        while not self._recording:
+            patience = ROOM_POLL if self._writer.out_of_room else None
+            if self._stopping.wait(patience):
+                return False
+            self._recording = self._writer.resume()
+        return True
+
+    def _record(self) -> None:
+        """Write what is offered until the recorder is to stop."""
+        due = time.monotonic() + self._flush_after
+        stopping = False
+        while not stopping:
+            # Asked before the queue is emptied: what was offered until then is written.
+            stopping = self._stopping.wait(max(0.0, min(POLL, due - time.monotonic())))
+            more = True
+            while more:
+                more = self._write_batch()
+                now = time.monotonic()
+                # A backlog first, lest a slow disk leave time for nothing but flushes.
+                if now >= due + self._flush_after * more:
+                    self._writer.flush()
+                    self._safe = tuple(self._done[0])
+                    # What came while it lasted is not with the system yet.
+                    due = max(now + self._flush_after, time.monotonic())
+                if more:
+                    time.sleep(NAP)
 
     def _account(self, summary: BagSummary) -> Account:
         """Return what became of all messages, once no more are taken; `dropped` is the rest."""
@@ -238,26 +285,37 @@ class Recorder:
         queue, write, (taken, lost) = self._queue, self._writer.write, self._done
         for _ in range(min(BATCH, len(queue))):
             message = queue.popleft()
-            # Lost until proven otherwise: a write that raises needs no case of its own.
-            lost[message[0]] += 1
-            if write(*message):
-                lost[message[0]] -= 1
-                taken[message[0]] += 1
+            if message is None:
+                continue
+            topic = message[0]
+            # Until the writer has answered, the message is counted nowhere, and so it waits.
+            try:
+                kept = write(*message)
+            except BaseException:
+                lost[topic] += 1
+                raise
+            (taken if kept else lost)[topic] += 1
         return bool(queue)
 
     def _fail(self, error: Exception) -> None:
         """Keep the failure, and count as recorded only what the writer could keep."""
-        self._open = False
+        self._recording = False
         if not isinstance(error, RecordingError):
             reason = f'the recording ended early: {type(error).__name__}: {error}'
             error = RecordingError(self._writer.folder, reason, 'please report this')
-        kept: Sequence[int] = self._safe
-        with suppress(Exception):
-            summary = self._writer.close()
-            kept = [sum(counts) for counts in zip(summary.counts, summary.let_go, strict=True)]
+        kept = self._writer.kept
         taken, lost = self._done
         lost = [gone + had - has for gone, had, has in zip(lost, taken, kept, strict=True)]
-        while self._queue:
-            lost[self._queue.popleft()[0]] += 1
         self._done = (list(kept), lost)
+        self._safe = kept
+        if not self._writer.out_of_room:
+            self._open = False
+            self._lose_queue()
         self.failure = error
+
+    def _lose_queue(self) -> None:
+        """Count what waits as lost."""
+        _, lost = self._done
+        while self._queue:
+            if message := self._queue.popleft():
+                lost[message[0]] += 1

@@ -29,7 +29,15 @@ import time
 from typing import NamedTuple
 
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.handover import BATCH, NAP, POLL, Tally
+from linkage_ros.bag.writing.handover import (
+    BATCH,
+    in_places,
+    NAP,
+    Offered,
+    PLACE,
+    POLL,
+    Tally,
+)
 from linkage_ros.bag.writing.last_seconds import Extent, Kept, LastSeconds
 from linkage_ros.errors import RecordingError
 
@@ -77,7 +85,7 @@ class SnapshotMemory:
     most
         How much memory they may take [bytes]; where that is too little, the oldest go.
     capacity
-        Messages that may wait for the memory's thread.
+        Messages that may wait for the memory's thread; as for `Recorder`.
 
     Attributes
     ----------
@@ -97,7 +105,7 @@ class SnapshotMemory:
         self.failure: RecordingError | None = None
         self._capacity = capacity
         self._open = True
-        self._queue: deque[tuple[int, int, int, bytes]] = deque()
+        self._queue: deque[Offered | None] = deque()
         self._received = [Tally() for _ in topics]
         self._add_received = [tally.add for tally in self._received]
         self._dropped = [Tally() for _ in topics]
@@ -112,10 +120,12 @@ class SnapshotMemory:
     def offer(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
         """Hand over one message, from any thread; as `Recorder.offer`."""
         self._add_received[topic]()
-        if self._open and len(self._queue) < self._capacity:
+        if not self._open or len(self._queue) >= self._capacity:
+            self._add_dropped[topic]()
+        elif len(data) < PLACE:
             self._queue.append((topic, log_time, publish_time, data))
         else:
-            self._add_dropped[topic]()
+            self._queue.extend(in_places((topic, log_time, publish_time, data)))
 
     def inspect(self) -> tuple[KeptCounts, ...]:
         """Return the counts as they are now; what waits for the thread counts as kept."""
@@ -180,6 +190,8 @@ class SnapshotMemory:
     def _put_away(self, count: int) -> None:
         for _ in range(count):
             message = self._queue.popleft()
+            if message is None:
+                continue
             topic, log_time, publish_time, _ = message
             if 0 <= log_time < _TIME_END and 0 <= publish_time < _TIME_END:
                 self._last.add(*message)

@@ -41,16 +41,19 @@ from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_me
 from linkage_ros.bag.topic import CHANNELS_FILE, Topic
 from linkage_ros.bag.writing.bag_file import BagFile
 from linkage_ros.bag.writing.channels import channels_file
-from linkage_ros.bag.writing.disk import NO_ROOM
+from linkage_ros.bag.writing.disk import FIRST_RESERVE, LostError, NO_ROOM, Reserve
 from linkage_ros.bag.writing.packing import compression_type
 from linkage_ros.bag.writing.storage import scarcity, Storage
 from linkage_ros.errors import RecordingError
 
-_MAKE_ROOM = 'make room there before the next recording'
+_MAKE_ROOM = 'make room there'
+_GO_ON = 'make room there: a run then goes on in a new file'
 _CHECK_DISK = 'check the disk before the next recording'
+_KEEP_OUT = 'let no other process write to the folder of a bag while it is recorded'
 _TIME_END = 2**63  # rosbag2's times are signed
 _SEQUENCE_END = 2**32  # MCAP's sequence numbers; at 10 kHz they start again after five days
 _RENEWAL = 0.8  # [s]; less than is between two flushes of a second
+_ROOM_TO_GO_ON = 4 * FIRST_RESERVE  # lest a disk that stays full get many small files [bytes]
 
 
 class BagWriter:
@@ -73,6 +76,8 @@ class BagWriter:
     ----------
     let_go
         Messages of each topic that were in files that made way for newer ones.
+    out_of_room
+        Whether it has failed for want of room, so that `resume` may go on.
     account
         Returns what became of all messages, given what the bag holds; none for a bag whose writer
         keeps no account.
@@ -108,7 +113,9 @@ class BagWriter:
         self._due = 0.0
         self._looked = 0  # size of the file when it was last looked how much is free [bytes]
         self._summary: BagSummary | None = None
+        self.out_of_room = False
         self._failure: RecordingError | None = None
+        self._said: dict[str, str] = {}  # of failures, in the metadata
         self._compression = compression_type(self.storage.compression, self.folder)
         try:
             self.folder.mkdir(parents=True)
@@ -123,7 +130,7 @@ class BagWriter:
                 undo.callback(_remove, self.folder)
                 self._file = self._next_file()
                 undo.callback(self._file.abandon)
-                self._refuse_if_scarce('cannot be recorded to')
+                self._refuse_if_scarce('cannot be recorded to', _MAKE_ROOM)
                 self._renew(self._summarize())
                 sync_folder(self.folder.absolute().parent)
                 undo.pop_all()
@@ -178,9 +185,33 @@ class BagWriter:
         try:
             if self._file.flush() and time.monotonic() >= self._due:
                 self._try_to_renew(self._summarize())
-            self._refuse_if_scarce('the recording ended')
+            self._refuse_if_scarce('the recording was interrupted')
         except (OSError, RecordingError) as error:
             self._end(error)
+
+    def resume(self) -> bool:
+        """
+        Go on in a new file where there was no room and is some again; return whether it does.
+
+        What the bag says of the failure stays in its metadata.
+        """
+        if not self.out_of_room or not self._file.ended:
+            return False
+        try:
+            reserve = Reserve(self.folder)
+            try:
+                # Quotas and blocks that are reserved are known to who allocates only.
+                reserve.grow(_ROOM_TO_GO_ON)
+                self._refuse_if_scarce('cannot go on')
+            finally:
+                reserve.release()
+            file = self._next_file()
+        except (OSError, RecordingError):
+            return False
+        self._ended, self._file = self._parts(), file
+        self._failure, self.out_of_room = None, False
+        self._renew_and_let_go()
+        return True
 
     def close(self, custom: Mapping[str, str] | None = None) -> BagSummary:
         """
@@ -194,17 +225,23 @@ class BagWriter:
         Raises
         ------
         RecordingError
-            As `write`, once; a second call returns the summary.
+            As `write`, once; after it a call returns the summary.
 
         """
         if self._summary:
             return self._summary
-        error = self._finish(custom or {})
-        if error:
+        failed, error = self._failure, self._finish(custom or {})
+        self._summary = self._summarize()
+        if error and not failed:
             self._failure = self._ended_by(error)
             raise self._failure
-        assert self._summary
         return self._summary
+
+    @property
+    def kept(self) -> tuple[int, ...]:
+        """Return how many messages of each topic were taken by now and did not get lost since."""
+        summary = self._summarize()
+        return tuple(map(sum, zip(summary.counts, summary.let_go, strict=True)))
 
     @property
     def size(self) -> int:
@@ -224,15 +261,15 @@ class BagWriter:
         """End the recording where too little is free."""
         self._looked = self._file.size
         try:
-            self._refuse_if_scarce('the recording ended')
+            self._refuse_if_scarce('the recording was interrupted')
         except (OSError, RecordingError) as error:
             self._end(error)
 
     def _split(self) -> None:
         """End the file and begin the next; where they are too many, let the oldest go."""
         try:
-            self._refuse_if_scarce('the recording ended')
-            error = self._file.finish(last_records(UNFINISHED_DATA, self._summarize(), None))
+            self._refuse_if_scarce('the recording was interrupted')
+            error = self._file.finish(last_records(self._unfinished, self._summarize(), None))
             if error:
                 raise error
             file = self._next_file()
@@ -258,17 +295,26 @@ class BagWriter:
         """Remove the files that made way; one that cannot be removed is tried again."""
         self._gone = [file for file in self._gone if not _is_removed(file)]
 
-    def _finish(self, custom: Mapping[str, str]) -> OSError | None:
-        """Close the bag as well as the disk allows; return what went wrong, now or before."""
+    def _finish(self, custom: Mapping[str, str], *, accounted: bool = True) -> OSError | None:
+        """
+        Close the bag as well as the disk allows; return what went wrong now.
+
+        Where it has failed before, only its metadata are written anew.
+        """
         error = None
         if not self._file.finished:
             summary = self._summarize()
-            error = self._file.finish(last_records(custom, summary, self.account(summary)))
-        self._summary = summary = self._summarize()
-        if error:
-            custom = {FAILURE: str(self._ended_by(error)), **custom}
+            account = self.account(summary) if accounted else None
+            said = {**custom, **self._said}
+            error = self._file.finish(last_records(said, summary, account))
+        gone = self._lose_what_is_gone()
+        error = error or gone
+        if error and not self._said:
+            self._said = {FAILURE: str(self._ended_by(error))}
+        summary = self._summarize()
         self._remove_gone()
-        last = custom_data(custom, summary, self.account(summary))
+        account = self.account(summary) if accounted else None
+        last = custom_data({**self._said, **custom}, summary, account)
         try:
             try:
                 write_metadata(summary, last)
@@ -278,6 +324,18 @@ class BagWriter:
         except OSError as worse:
             error = error or worse
         return error
+
+    def _lose_what_is_gone(self) -> LostError | None:
+        """Count no more what is in files that another process has cut or removed; name these."""
+        parts = self._parts()
+        gone = [part for part in parts if not _is_there(self.folder / part.file, part.size)]
+        if not gone:
+            return None
+        self._ended = [part for part in self._ended if part not in gone]
+        if parts[-1] in gone:
+            self._file.forget()
+        names = ', '.join(part.file for part in gone)
+        return LostError(f'{names}: cut or removed by another process')
 
     def _try_to_renew(self, summary: BagSummary) -> bool:
         """Write the metadata anew, or leave the old ones: no message depends on them."""
@@ -291,7 +349,7 @@ class BagWriter:
     def _renew(self, summary: BagSummary) -> None:
         """Write into the metadata what is on the disk by now."""
         begin = time.monotonic()
-        write_metadata(summary, custom_data(UNFINISHED_DATA, summary, None))
+        write_metadata(summary, custom_data(self._unfinished, summary, None))
         end = time.monotonic()
         # Of a bag in many files it is long, and a slow disk must not be kept busy with it.
         self._due = end + max(_RENEWAL, 20.0 * (end - begin))
@@ -299,24 +357,39 @@ class BagWriter:
     def _next_file(self) -> BagFile:
         return BagFile(next(self._paths), self.topics, self._attachments, self._compression)
 
-    def _refuse_if_scarce(self, what: str) -> None:
+    @property
+    def _unfinished(self) -> dict[str, str]:
+        """Return what the metadata say until the recording has ended."""
+        return {**UNFINISHED_DATA, **self._said}
+
+    def _refuse_if_scarce(self, what: str, remedy: str = _GO_ON) -> None:
         """Raise RecordingError where too little is free; what a file has set aside is not."""
         scarce = scarcity(self.folder, self.storage.min_free_bytes)
         if scarce:
-            raise RecordingError(self.folder, f'{what}: {scarce}', _MAKE_ROOM)
+            raise RecordingError(self.folder, f'{what}: {scarce}', remedy)
 
     def _end(self, error: OSError | RecordingError) -> NoReturn:
         self._failure = error if isinstance(error, RecordingError) else self._ended_by(error)
-        if not self._summary:
-            self._finish({FAILURE: str(self._failure)})
+        self._said = {FAILURE: str(self._failure)}
+        # A RecordingError comes from `_refuse_if_scarce` alone.
+        self.out_of_room = isinstance(error, RecordingError) or error.errno in NO_ROOM
+        if self.out_of_room:
+            self._finish(UNFINISHED_DATA, accounted=False)
+        else:
+            self._finish({})
         raise self._failure
 
     def _ended_by(self, error: OSError) -> RecordingError:
         kept = 'what was flushed before' if self._file.in_doubt else 'what is on the disk'
+        reason, remedy = 'the recording ended early', _CHECK_DISK
+        if error.errno in NO_ROOM:
+            reason, remedy = 'the recording was interrupted', _GO_ON
+        elif isinstance(error, LostError):
+            kept, remedy = 'what is left of it', _KEEP_OUT
         return RecordingError(
             self.folder,
-            f'the recording ended early: {error.strerror or error}',
-            f'{kept} stays readable; {_MAKE_ROOM if error.errno in NO_ROOM else _CHECK_DISK}',
+            f'{reason}: {error.strerror or error}',
+            f'{kept} stays readable; {remedy}',
         )
 
     def _give_up(self, error: OSError) -> NoReturn:
@@ -327,6 +400,8 @@ class BagWriter:
         ) from None
 
     def _parts(self) -> list[BagSummary]:
+        if self._file.forgotten and self._ended:
+            return self._ended
         return [*self._ended, self._file.summary(self.topics)]
 
     def _summarize(self) -> BagSummary:
@@ -338,6 +413,16 @@ def _remove(folder: Path) -> None:
     for leftover in folder.iterdir():
         leftover.unlink()
     folder.rmdir()
+
+
+def _is_there(file: Path, size: int) -> bool:
+    """Return whether a file is there, and as large as it was; a disk that fails says nothing."""
+    try:
+        return 0 < size <= file.stat().st_size
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
 
 
 def _is_removed(file: Path) -> bool:
