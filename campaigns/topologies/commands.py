@@ -25,7 +25,6 @@ from pathlib import Path
 import random
 import signal
 import tempfile
-from threading import Event
 import traceback
 from typing import Any
 from unittest import mock
@@ -34,6 +33,7 @@ from campaigns.topologies.judge import Findings
 from linkage_ros.cli import main as command_line
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.scene.linkage_text import linkage_text
+from linkage_ros.stop import Stop
 
 FILES = ('draw', 'urdf', 'mjcf')
 """Commands that write a file; beside these there are `check`, and `accuracy`, which is slow."""
@@ -116,7 +116,7 @@ def _bounded() -> Iterator[None]:
     signal.setitimer(signal.ITIMER_REAL, _SECONDS)
     try:
         # The signals stay the campaign's: a pool ends its processes by them.
-        with mock.patch.object(command_line, 'stop_on_signals', Event):
+        with mock.patch.object(command_line, 'stop_on_signals', Stop):
             yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)

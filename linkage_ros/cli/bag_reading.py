@@ -31,7 +31,7 @@ from linkage_ros.bag.reading.run_events import run_account, run_said, RunAccount
 from linkage_ros.bag.recovering.recovery import NOTHING_LOST, RECOVERED
 from linkage_ros.cli.progress import progress
 from linkage_ros.errors import BagError
-from linkage_ros.stop import StoppedError
+from linkage_ros.stop import heeded, StoppedError
 
 _MIB = 2**20
 _BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its own
@@ -126,7 +126,7 @@ class BagReading:
     @contextmanager
     def told(self) -> Iterator[Iterator[BagMessage]]:
         """Give the messages, and tell on the terminal how far they are."""
-        with progress('replayed [MiB]') as self._told:
+        with heeded(), progress('replayed [MiB]') as self._told:
             yield self._messages()
 
     def _messages(self) -> Iterator[BagMessage]:

@@ -49,6 +49,7 @@ from linkage_ros.cli.tables import clean, show, Table
 from linkage_ros.cli.worst_states import examine
 from linkage_ros.errors import LinkageError
 from linkage_ros.replay import recorded_scene
+from linkage_ros.stop import heeded
 
 _MIB = 2**20
 
@@ -62,7 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Look at the bag; return 1 where it was stopped."""
     bag = opened(arguments.bag, stop)
-    account = info(bag, stop)
+    with heeded():  # it tells what it has seen
+        account = info(bag, stop)
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
     else:

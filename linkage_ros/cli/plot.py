@@ -25,6 +25,7 @@ from threading import Event
 from typing import Any
 
 from linkage_ros.cli.bag_reading import beside, opened
+from linkage_ros.drawing.painting import save
 from linkage_ros.effects.turns import wrapped
 from linkage_ros.errors import BagError, LinkageError
 from linkage_ros.joint_state import JointStateReader, Rejection
@@ -152,9 +153,7 @@ def _figure(
     figure.suptitle(title, fontsize=11)
     figure.tight_layout()
     try:
-        figure.savefig(picture)
-    except (OSError, ValueError) as error:
-        raise LinkageError(str(picture), str(error), 'name another picture with -o') from None
+        save(figure, picture)
     finally:
         plt.close(figure)
 
