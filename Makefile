@@ -24,7 +24,7 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema cost effects docs lint format
-.PHONY: clean damage kills endurance disk accuracy_page report lock sbom timing
+.PHONY: clean damage kills endurance disk attacks accuracy_page report lock sbom
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
@@ -39,6 +39,7 @@ help:
 	@echo 'make damage    cut a bag at every byte, flip every bit of it, into docs/recordings (30 min)'
 	@echo 'make kills     kill recordings at 1,400 instants, into docs/recordings (10 min)'
 	@echo 'make disk      let every call of a recording fail, disks fill and stall (10 min)'
+	@echo 'make attacks   send what is hostile through everything, into docs/recordings (2 h)'
 	@echo 'make endurance run 24 h in minutes and 10 min over DDS, into docs/recordings (25 min)'
 	@echo 'make gallery   draw the linkages that come with the package'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'
@@ -116,6 +117,9 @@ kills: $(STAMP)
 
 disk: $(STAMP)
 	@$(BIN)/python -m campaigns.disk --write
+
+attacks: $(STAMP)
+	@$(BIN)/python -m campaigns.attacks --write
 
 endurance: $(STAMP)
 	@$(BIN)/python -m campaigns.endurance --write

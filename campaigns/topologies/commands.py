@@ -17,21 +17,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import replace
-import io
 from pathlib import Path
 import random
-import signal
 import tempfile
-from threading import Event
-import traceback
-from typing import Any
-from unittest import mock
 
+from campaigns.in_process import in_process
 from campaigns.topologies.judge import Findings
-from linkage_ros.cli import main as command_line
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.scene.linkage_text import linkage_text
 
@@ -40,10 +32,6 @@ FILES = ('draw', 'urdf', 'mjcf')
 
 _SECONDS = 600
 """A command that takes longer has not ended; on a free machine the slowest takes some 15 s."""
-
-
-class _TooLongError(BaseException):
-    """No `Exception`: nothing that a command catches."""
 
 
 def judge_command(command: str, linkage: Linkage, findings: Findings, closes: bool = True) -> None:
@@ -72,7 +60,7 @@ def judge_command(command: str, linkage: Linkage, findings: Findings, closes: bo
             arguments += ['-o', str(Path(folder) / 'page')]
         if output:
             arguments += ['-o', str(Path(folder) / f'out.{output}')]
-        code, said = _run(arguments)
+        code, said = in_process(arguments, _SECONDS)
     said = said.replace(folder, '')
     if code == 0:
         findings.counts[f'{command}: done'] += 1
@@ -83,44 +71,6 @@ def judge_command(command: str, linkage: Linkage, findings: Findings, closes: bo
     else:
         last = said.strip().splitlines()[-1:] or ['']
         findings.find(f'{command}: {code}', last[0])
-
-
-def _run(arguments: list[str]) -> tuple[Any, str]:
-    """Run ``linkage``; return its exit code, or how else it ended, and what it said of that."""
-    said, shown = io.StringIO(), io.StringIO()
-    try:
-        with redirect_stdout(shown), redirect_stderr(said), _bounded():
-            return command_line.main(arguments), said.getvalue()
-    except _TooLongError:
-        return 'no end', f'more than {_SECONDS} s'
-    except SystemExit as stopped:
-        return stopped.code, said.getvalue()
-    except Exception:  # noqa: BLE001 - whatever it is, a user would see it
-        return 'traceback', _place(traceback.format_exc())
-
-
-def _place(text: str) -> str:
-    """Return the last line of a traceback with the last place of ours in it."""
-    lines = text.strip().splitlines()
-    ours = [line.strip() for line in lines if 'linkage_ros/' in line and 'File' in line]
-    place = ours[-1].rpartition('linkage_ros/')[2] if ours else ''
-    return f'{lines[-1]} ({place.replace(chr(34), "")})'
-
-
-@contextmanager
-def _bounded() -> Iterator[None]:
-    def stop(_number: int, _frame: Any) -> None:
-        raise _TooLongError
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, _SECONDS)
-    try:
-        # The signals stay the campaign's: a pool ends its processes by them.
-        with mock.patch.object(command_line, 'stop_on_signals', Event):
-            yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def spoilt(linkage: Linkage, rng: random.Random) -> Linkage:

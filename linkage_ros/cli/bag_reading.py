@@ -35,7 +35,7 @@ from linkage_ros.cli.progress import progress
 from linkage_ros.errors import BagError, clean
 from linkage_ros.replay import recorded_scene
 from linkage_ros.scene.scene import Scene
-from linkage_ros.stop import StoppedError
+from linkage_ros.stop import heeded, StoppedError
 
 _MIB = 2**20
 _BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its own
@@ -162,7 +162,7 @@ class BagReading:
     @contextmanager
     def told(self) -> Iterator[Iterator[BagMessage]]:
         """Give the messages, and tell on the terminal how far they are."""
-        with progress('replayed [MiB]') as self._told:
+        with heeded(), progress('replayed [MiB]') as self._told:
             yield self._messages()
 
     def _messages(self) -> Iterator[BagMessage]:

@@ -39,6 +39,7 @@ from linkage_ros.errors import did_you_mean, LinkageError
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Member, Scene
 from linkage_ros.shipped import shipped
+from linkage_ros.stop import heeded
 
 _DOMAINS = 101
 """Domain ids up to this one are safe with the ports of every operating system."""
@@ -72,7 +73,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
         f'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]}',
         flush=True,  # it is of use while the run goes on, and to a pipe too
     )
-    with _beside(scene, arguments.seconds):
+    with heeded(), _beside(scene, arguments.seconds):
         code, bag = run_scene(str(file), arguments, stop)
     if bag is not None:
         picture = Path(f'{bag}.png')

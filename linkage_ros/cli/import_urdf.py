@@ -31,9 +31,12 @@ from linkage_ros.cli.model_file import add_output, put
 from linkage_ros.errors import LinkageError
 from linkage_ros.models.imported import imported
 from linkage_ros.models.urdf_file import read_urdf
+from linkage_ros.regular_file import read_regular
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.linkage_text import linkage_text
 from linkage_ros.scene.yaml_file import parse_yaml
+
+_LARGEST_FILE = 10_000_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,10 +71,12 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Write the linkage file; tell what is not in it."""
     file = arguments.file
     try:
-        data = file.read_bytes()
+        data = read_regular(file, _LARGEST_FILE)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise LinkageError(file, f'cannot be read ({reason})', 'name a URDF file') from None
+    if len(data) > _LARGEST_FILE:
+        raise LinkageError(file, f'is larger than {_LARGEST_FILE} bytes', 'name a URDF file')
     made = imported(
         read_urdf(data, str(file)),
         arguments.close,

@@ -48,6 +48,7 @@ from linkage_ros.cli.progress import progress
 from linkage_ros.cli.tables import show, Table
 from linkage_ros.cli.worst_states import examine
 from linkage_ros.errors import clean, LinkageError
+from linkage_ros.stop import heeded
 
 _MIB = 2**20
 
@@ -62,7 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Look at the bag; return 1 where it was stopped."""
     bag = opened(arguments.bag, stop)
-    account = info(bag, stop, trust_effects=arguments.trust_effects)
+    with heeded():  # it tells what it has seen
+        account = info(bag, stop, trust_effects=arguments.trust_effects)
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
     else:

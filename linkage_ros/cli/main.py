@@ -20,11 +20,12 @@ from __future__ import annotations
 import argparse
 from importlib import import_module
 import sys
+from threading import Event
 
 from linkage_ros import __version__
 from linkage_ros.cli.outlet import clean_output
 from linkage_ros.errors import LinkageError
-from linkage_ros.stop import stop_on_signals, StoppedError
+from linkage_ros.stop import end_soon, raising, stop_on_signals, StoppedError
 
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',
@@ -60,10 +61,27 @@ def module_of(command: str) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run ``linkage``; return 0, 1 for a run that went wrong, 2 for wrong input, 3 for a loss."""
-    # First of all: from here on Ctrl-C ends a run by closing its bag.
+    # First of all: from here on a signal ends a command, and a run by closing its bag.
     stop = stop_on_signals()
     clean_output()
     arguments = sys.argv[1:] if arguments is None else arguments
+    try:
+        try:
+            with raising():
+                return _run(arguments, stop)
+        except StoppedError:
+            end_soon(1)
+            name = ' '.join(['linkage', *(name for name in arguments[:1] if name in COMMANDS)])
+            print(f'{name}: stopped', file=sys.stderr)
+            sys.stdout.flush()  # where nobody reads, this takes until the end
+            return 1
+    except BrokenPipeError:
+        # Who read our output has gone; there is nobody to tell.
+        sys.stderr.close()
+        return 1
+
+
+def _run(arguments: list[str], stop: Event) -> int:
     commands = '\n'.join(f'  {name:<10} {text}' for name, text in COMMANDS.items())
     parser = argparse.ArgumentParser(
         prog='linkage',
@@ -83,13 +101,6 @@ def main(arguments: list[str] | None = None) -> int:
     except LinkageError as error:
         print(f'linkage {name}: {error}', file=sys.stderr)
         return 2
-    except StoppedError:
-        print(f'linkage {name}: stopped', file=sys.stderr)
-        return 1
-    except BrokenPipeError:
-        # Who read our output has gone; there is nobody to tell.
-        sys.stderr.close()
-        return 1
 
 
 if __name__ == '__main__':

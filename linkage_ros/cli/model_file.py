@@ -26,8 +26,8 @@ from linkage_ros.models.part import Part, PartError
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.load import kind_of
 from linkage_ros.scene.robot_model import scene_model, Write
-from linkage_ros.scene.whole_file import write_whole
 from linkage_ros.scene.yaml_file import read_yaml
+from linkage_ros.whole_file import write_whole
 
 
 def add_files(parser: argparse.ArgumentParser, kind: str) -> None:

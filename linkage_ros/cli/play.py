@@ -42,6 +42,7 @@ from linkage_ros.ros.bag_publishers import offer
 from linkage_ros.ros.cues import Part
 from linkage_ros.ros.playback import LATE, Playback
 from linkage_ros.ros.player import CLOCK, play, player_node, Wishes
+from linkage_ros.stop import heeded
 
 _CLOCK_RATE = 40.0  # as ``ros2 bag play``
 
@@ -114,7 +115,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
             f'it lasts {(order.end - begin) / 1e9:g} s',
         )
     ros = ['--ros-args', *arguments.ros_args] if arguments.ros_args else []
-    with player_node(ros) as node, progress('played [s]') as told:
+    with heeded(), player_node(ros) as node, progress('played [s]') as told:
         publishers = offer(node, topics, _say)
         if not publishers:
             raise BagError(bag.path, 'has no topic that can be published', 'nothing to play')

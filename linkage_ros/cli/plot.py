@@ -25,6 +25,7 @@ from threading import Event
 from typing import Any
 
 from linkage_ros.cli.bag_reading import add_trust, beside, opened, scene_of
+from linkage_ros.drawing.painting import save
 from linkage_ros.effects.turns import wrapped
 from linkage_ros.errors import BagError, LinkageError, shortened
 from linkage_ros.joint_state import JointStateReader, Rejection
@@ -153,9 +154,7 @@ def _figure(
     figure.suptitle(_plain(title, 160), fontsize=11)
     figure.tight_layout()
     try:
-        figure.savefig(picture)
-    except (OSError, ValueError) as error:
-        raise LinkageError(str(picture), str(error), 'name another picture with -o') from None
+        save(figure, picture)
     finally:
         plt.close(figure)
 

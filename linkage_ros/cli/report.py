@@ -47,8 +47,8 @@ from linkage_ros.report.run import Run, Window
 from linkage_ros.report.tables import TableOf
 from linkage_ros.report.words import seconds_text
 from linkage_ros.scene.scene import Scene
-from linkage_ros.scene.whole_file import replace_whole
 from linkage_ros.stop import StoppedError
+from linkage_ros.whole_file import replace_whole
 
 _MIB = 2**20
 _LONGEST = 2**62

@@ -27,6 +27,7 @@ from linkage_ros.cli.display import Display
 from linkage_ros.cli.summary import summary
 from linkage_ros.ros.node import LinkageNode
 from linkage_ros.ros.run import run_linkage_node
+from linkage_ros.stop import heeded
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -64,14 +65,15 @@ def run_scene(
         bags.extend(recording.folder for recording in node.recording.ended)
         print(summary(node))
 
-    code = run_linkage_node(
-        stop,
-        ros,
-        {'scene': scene, 'runs_directory': arguments.runs},
-        seconds=arguments.seconds,
-        view=Display(plain=arguments.plain),
-        at_end=at_end,
-    )
+    with heeded():
+        code = run_linkage_node(
+            stop,
+            ros,
+            {'scene': scene, 'runs_directory': arguments.runs},
+            seconds=arguments.seconds,
+            view=Display(plain=arguments.plain),
+            at_end=at_end,
+        )
     return code, bags[-1] if bags else None
 
 

@@ -37,6 +37,7 @@ from linkage_ros.cli.tables import show, Table, text
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import Way
+from linkage_ros.whole_file import write_whole
 
 _STEPS = 36
 _DIGITS = 6
@@ -118,13 +119,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     if arguments.output is None:
         sys.stdout.write(answer)
         return 0
-    try:
-        arguments.output.write_text(answer, encoding='utf-8')
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise LinkageError(
-            str(arguments.output), f'cannot be written ({reason})', 'name another file'
-        ) from None
+    write_whole(arguments.output, answer.encode())
     print(arguments.output)
     return 0
 

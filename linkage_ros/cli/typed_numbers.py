@@ -17,14 +17,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 import csv
 from math import isfinite
 from pathlib import Path
 
 from linkage_ros.errors import FileError, quoted
+from linkage_ros.regular_file import read_regular
 
 _MOST = 100_000
+_LARGEST_FILE = 10_000_000
 
 
 def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
@@ -45,13 +47,16 @@ def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
 
     """
     try:
-        text = file.read_text('utf-8-sig')
-    except (OSError, UnicodeDecodeError) as error:
+        data = read_regular(file, _LARGEST_FILE)
+        text = data[:_LARGEST_FILE].decode('utf-8-sig')
+    except (OSError, ValueError) as error:  # the latter for what is no text, and a NUL in a name
         reason = getattr(error, 'strerror', None) or 'is no text'
         raise FileError(file, '', f'cannot be read ({reason})', 'name a CSV file') from None
+    if len(data) > _LARGEST_FILE:
+        raise FileError(file, '', f'is larger than {_LARGEST_FILE} bytes', 'thin it out')
     delimiter = ';' if ';' in text else ','
     rows: list[tuple[float, ...]] = []
-    for number, cells in enumerate(csv.reader(text.splitlines(), delimiter=delimiter), 1):
+    for number, cells in _lines(file, text, delimiter):
         if not ''.join(cells).strip() or cells[0].lstrip().startswith('#'):
             continue
         row = _row(cells)
@@ -72,6 +77,16 @@ def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
     if not rows:
         raise FileError(file, '', 'holds no numbers', 'write rows of numbers with commas')
     return rows
+
+
+def _lines(file: Path, text: str, delimiter: str) -> Iterator[tuple[int, list[str]]]:
+    reader = csv.reader(text.splitlines(), delimiter=delimiter)
+    try:
+        yield from enumerate(reader, 1)
+    except csv.Error as error:  # a cell without end
+        raise FileError(
+            file, '', f'line {reader.line_num}: {error}', 'write rows of numbers with commas'
+        ) from None
 
 
 def _row(cells: Sequence[str]) -> tuple[float, ...] | None:

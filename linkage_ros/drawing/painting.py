@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
+from io import BytesIO
 from itertools import pairwise
 from math import ceil
 from pathlib import Path
@@ -27,6 +28,7 @@ from typing import Any
 from linkage_ros.drawing.labels import Label, place_labels
 from linkage_ros.drawing.shapes import Circle, Polygon, Segment, Shape
 from linkage_ros.errors import LinkageError
+from linkage_ros.whole_file import write_whole
 
 COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000')
 """Okabe and Ito's, which colour-blind readers can tell."""
@@ -84,14 +86,16 @@ def save(figure: Any, file: Path) -> None:
         Where the file cannot be written.
 
     """
-    metadata = {'.png': {'Software': None}, '.svg': {'Date': None}}.get(file.suffix.lower())
+    kind = file.suffix[1:].lower() or 'png'
+    metadata = {'png': {'Software': None}, 'svg': {'Date': None}}.get(kind)
+    picture = BytesIO()
     try:
-        figure.savefig(file, metadata=metadata)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        figure.savefig(picture, format=kind, metadata=metadata)
+    except ValueError as error:
         raise LinkageError(
-            str(file), f'cannot be written ({reason})', 'name another picture with -o'
+            file, f'cannot be written ({error})', 'name another picture with -o'
         ) from None
+    write_whole(file, picture.getvalue())
 
 
 def corners(places: Iterable[complex]) -> tuple[complex, complex]:

@@ -226,6 +226,10 @@ class Closure:
             joints += (factor * (x[i] - x[j]) + constant,)
         return new(Position, (status, 0.0, joints, state, poses))
 
+    def known(self, *inputs: float) -> State:
+        """Return what is known before the first step: the ground's coordinate and the inputs'."""
+        return State(self._coordinates('inputs', inputs) or [], [])
+
     def posed(self, *inputs: float) -> Position:
         """Close the loops as `position` does, whatever the limits."""
         return type(self).position(self, *inputs)

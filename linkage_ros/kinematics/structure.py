@@ -116,7 +116,7 @@ class Structure:
         """
         known = {GROUND}
         for before in self.groups[: self.groups.index(group)]:
-            known |= _links_of(before)
+            known |= links_of(before)
         found: list[Joint] = []
         pins: set[str] = set()
         for joint in self.joints:
@@ -133,7 +133,8 @@ class Structure:
         return tuple(found)
 
 
-def _links_of(group: Group) -> set[str]:
+def links_of(group: Group) -> set[str]:
+    """Return the links that a group places."""
     if isinstance(group, Driven):
         return {group.joint.link}
     if isinstance(group, Dyad):

@@ -18,11 +18,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import product
 from math import cos, inf, isfinite, nan, pi, remainder, tau
 from typing import NamedTuple
 
+from linkage_ros.kinematics.alone import pose_alone
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.cylinder import without_mirrored
 from linkage_ros.kinematics.golden import golden
@@ -37,6 +38,9 @@ _SAME = 1e-9
 
 _NOISE = 1e-13
 """What two values may differ by and be the same but for their rounding, in [rad]."""
+
+_DEEPER = 10.0
+"""How far below its sample a valley may go, of what the samples beside it lie above."""
 
 _APART = 1e-4
 """Places that are nearer to each other are one, in [rad] or [m]."""
@@ -57,6 +61,14 @@ class Extreme(NamedTuple):
 
     value: float
     at: tuple[float, ...]
+
+
+class Sampled(NamedTuple):
+    """What a function comes to at values of the input, from one end of a range to the other."""
+
+    interval: InputRange
+    values: list[float]
+    results: list[float]
 
 
 class Extremes(NamedTuple):
@@ -285,18 +297,20 @@ def extremes(
     sampled = []
     for interval in ranges:
         values = samples(interval, count)
-        sampled.append((interval, values, [function(value) for value in values]))
+        sampled.append(Sampled(interval, values, [function(value) for value in values]))
+    return _ends(function, sampled)
+
+
+def _ends(function: Callable[[float], float], sampled: Sequence[Sampled]) -> Extremes:
     lowest = _lowest(function, sampled)
-    upside_down = [(one, values, [-y for y in results]) for one, values, results in sampled]
+    upside_down = [one._replace(results=[-y for y in one.results]) for one in sampled]
     highest = _lowest(lambda value: -function(value), upside_down)
     return Extremes(lowest, Extreme(-highest.value, highest.at))
 
 
-def _lowest(
-    function: Callable[[float], float],
-    sampled: Sequence[tuple[InputRange, list[float], list[float]]],
-) -> Extreme:
+def _lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> Extreme:
     found: list[tuple[float, float]] = []
+    best = min((y for one in sampled for y in one.results if isfinite(y)), default=nan)
     for interval, values, results in sampled:
         last = len(values) - 1
         for i, result in enumerate(results):
@@ -309,7 +323,9 @@ def _lowest(
                 results[(i + 1) % last if turn else min(i + 1, last)],
             )
             found.append((result, values[i]))
-            if result <= min(beside) and result < max(beside):
+            # A valley that is not nearly as deep as the deepest stays above it, kink or no kink.
+            deep = result - best <= _DEEPER * (max(beside) - result) + _SAME
+            if deep and result <= min(beside) and result < max(beside):
                 lowest = golden(function, before, after)
                 # At a smooth valley the place has half the digits; the sample's may be better.
                 if result - lowest[0] > _NOISE:
@@ -369,19 +385,47 @@ def conditionings(way: Way) -> dict[int, Extremes]:
 
 def _of_each_step(way: Way, name: str, count: int) -> dict[int, Extremes]:
     """Return the extremes of what a method of the steps tells of their poses, by group."""
-    found = {}
-    for number, step in enumerate(way.closure.steps):
-        method = getattr(step, name, None)
-        if method is not None:
-            function = partial(_of_pose, way, number, method)
-            found[way.closure.step_groups[number]] = extremes(function, way.ranges, count)
-    return found
+    closure = way.closure
+    told = {
+        number: getattr(step, name)
+        for number, step in enumerate(closure.steps)
+        if hasattr(step, name)
+    }
+    if not told:
+        return {}
+    # One walk serves all steps: of n loops each would else be closed n times.
+    sampled: dict[int, list[Sampled]] = {number: [] for number in told}
+    closed = nan
+    for interval in way.ranges:
+        values = samples(interval, count)
+        for of_step in sampled.values():
+            of_step.append(Sampled(interval, values, []))
+        for value in values:
+            position = way.position(value)
+            if position.status.has_pose:
+                closed = value
+            for number, method in told.items():
+                result = method(position.poses[number]) if position.status.has_pose else nan
+                sampled[number][-1].results.append(result)
+    if closed != closed:
+        return {closure.step_groups[number]: _ends(lambda _: nan, []) for number in told}
+    return {
+        closure.step_groups[number]: _ends(_of_pose(way, number, method, closed), sampled[number])
+        for number, method in told.items()
+    }
 
 
-def _of_pose(way: Way, number: int, method: Callable[..., float], value: float) -> float:
-    """Return what a method tells of a step's pose; no number where the loops do not close."""
-    position = way.position(value)
-    return method(position.poses[number]) if position.status.has_pose else nan
+def _of_pose(
+    way: Way, number: int, method: Callable[..., float], closed: float
+) -> Callable[[float], float]:
+    """Return what a method tells of a step's pose; no number where its loops do not close."""
+    pose_at = pose_alone(way.closure, number, *way.inputs(closed))
+
+    def told(value: float) -> float:
+        pose = pose_at(*way.inputs(value))
+        return method(pose) if pose[0].has_pose else nan
+
+    return told
 
 
 def worst_residual(closure: Closure) -> tuple[float, tuple[float, ...], int] | None:

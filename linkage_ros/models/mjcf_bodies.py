@@ -121,12 +121,14 @@ class Bodies:
         """
         closure = self._closure
         step = _DIFFERENCE * (closure.scale if closure.linkage.inputs[index].slider else 1.0)
-        moved = [*self.inputs]
-        moved[index] += step
-        there = closure.position(*moved)
-        if not there.joints:
-            moved[index] -= 2.0 * step
+        for sign in (1.0, -1.0):
+            moved = [*self.inputs]
+            moved[index] += sign * step
             there = closure.position(*moved)
+            if there.joints:
+                break
+        else:
+            return 0.0  # its range is narrower than that: it hardly moves at all
         before, after = closure.points(self._position), closure.points(there)
         found = 0.0
         for link, mass in self._masses.items():

@@ -26,7 +26,6 @@ from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.errors import LinkageError, quoted
 from linkage_ros.ros.bag_topics import bag_topic, message_type
 from linkage_ros.shipped import share_folders
-from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -91,12 +90,15 @@ def offered(qos: QosProfile) -> QoSProfile:
 def _publisher(node: Node, topic: Topic) -> Publisher:
     """Return what publishes a topic; raises LinkageError where that cannot be."""
     kind = _class_of(topic)
+    unfit = LinkageError(
+        quoted(topic.name)[1:-1] or "''", 'is no name of a ROS 2 topic', 'convert the bag'
+    )
+    if '\0' in topic.name:  # rclpy would publish on what stands before it
+        raise unfit
     try:
         return node.create_publisher(kind, topic.name, offered(topic.qos))
-    except NameValidationException:
-        raise LinkageError(
-            topic.name or "''", 'is no name of a ROS 2 topic', 'convert the bag'
-        ) from None
+    except Exception:  # noqa: BLE001 (a space, a {word}, a name too long: each has its own)
+        raise unfit from None
 
 
 def _class_of(topic: Topic) -> Any:

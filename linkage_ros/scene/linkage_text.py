@@ -39,8 +39,8 @@ from linkage_ros.kinematics.linkage import (
     Slider,
 )
 from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.whole_file import write_whole
 from linkage_ros.scene.yaml_file import parse_yaml
+from linkage_ros.whole_file import write_whole
 
 _WIDTH = 99
 _WHOLE = 1e15

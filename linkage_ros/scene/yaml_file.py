@@ -28,6 +28,7 @@ from typing import Any, cast
 
 from linkage_ros.bounded_yaml import BoundedLoader
 from linkage_ros.errors import FileError, quoted
+from linkage_ros.regular_file import read_regular
 from linkage_ros.scene.section import LinedDict, Section
 import yaml
 
@@ -52,8 +53,7 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
 
     """
     try:
-        with Path(file).open('rb') as stream:
-            data = stream.read(_LARGEST_FILE + 1)
+        data = read_regular(file, _LARGEST_FILE)
     except OSError as error:
         raise FileError(
             file, '', f'cannot be read ({error.strerror})', 'name a file that can be read'

@@ -413,6 +413,9 @@ LEFT_OUT = [
     ('two words', 'std_msgs/msg/Empty', 'two words: is no name of a ROS 2 topic'),
     ('/a//b', 'std_msgs/msg/Empty', '/a//b: is no name of a ROS 2 topic'),
     ('', 'std_msgs/msg/Empty', "'': is no name of a ROS 2 topic"),
+    ('/a\0b', 'std_msgs/msg/Empty', r'/a\x00b: is no name of a ROS 2 topic'),
+    ('/{word}', 'std_msgs/msg/Empty', '/{word}: is no name of a ROS 2 topic'),
+    (f'/{"x" * 3000}', 'std_msgs/msg/Empty', f'/{"x" * 37}…{"x" * 38}: is no name'),
     ('/\x1b[2J', 'std_msgs/msg/Empty', r'/\x1b[2J: is no name of a ROS 2 topic'),
 ]
 

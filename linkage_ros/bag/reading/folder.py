@@ -26,6 +26,7 @@ from typing import Any
 from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
 from linkage_ros.bounded_yaml import bounded_yaml
 from linkage_ros.errors import BagError, quoted
+from linkage_ros.regular_file import read_regular
 from mcap.records import Metadata
 from mcap.writer import MCAP0_MAGIC
 
@@ -47,8 +48,7 @@ def information_of(folder: Path) -> dict[str, Any]:
     """Return what ``metadata.yaml`` says, nothing if it is missing: the files can do without."""
     file = folder / METADATA_FILE
     try:
-        with file.open('rb') as stream:
-            text = stream.read(MOST_METADATA + 1)
+        text = read_regular(file, MOST_METADATA)
     except FileNotFoundError:
         return {}
     except OSError as error:

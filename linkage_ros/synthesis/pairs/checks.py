@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from math import degrees, inf, isfinite, remainder, tau
+from math import degrees, inf, remainder, tau
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.synthesis.design import Wanted
@@ -31,6 +31,9 @@ MOVE = 'move one of the angles'
 
 _SAME = 1e-12
 """Angles nearer than this are the same, in [rad]."""
+
+_FARTHEST = 1e9
+"""An angle beyond this, in [rad], has lost the digits that say where in its turn it is."""
 
 _CONSISTENT = 1e-9
 """Equations that leave a smaller part of themselves do not contradict each other."""
@@ -55,9 +58,11 @@ def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) 
         raise SynthesisError('ground', f'{ground!r} m is no length', 'give it one above 0')
     pairs = [*enumerate(zip(crank, rocker, strict=True), 1)]
     for number, pair in pairs:
-        if not all(map(isfinite, pair)):
+        if not all(abs(angle) <= _FARTHEST for angle in pair):
             raise SynthesisError(
-                f'pair {number}', f'{_said(pair)} is no pair of angles', 'write two numbers'
+                f'pair {number}',
+                f'{_said(pair)} is no pair of angles',
+                f'write two numbers of at most {degrees(_FARTHEST):.1g}°',
             )
     for (i, one), (j, other) in combinations(pairs, 2):
         theta, phi = (abs(remainder(u - v, tau)) for u, v in zip(one, other, strict=True))

@@ -1,0 +1,101 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+``python -m campaigns.attacks``: what comes from elsewhere, changed at random, through everything.
+
+Nothing shows a traceback, hangs, fills the memory, or says more than a screen.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from datetime import datetime
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+import sys
+import time
+
+from bench.report import say, show, Table
+from campaigns.attacks import files, signals
+from campaigns.page import load, write_page
+from linkage_ros.accuracy.machine import describe_machine
+
+PAGE = Path('docs/recordings/attacks.md')
+
+INTRO = """\
+Made by `make attacks`. All linkages and scenes that come with the package, URDFs made of them, and
+tables are changed at random: numbers by zeros, by the smallest and the greatest there are, by what
+is none; keys and values by others, by other types and by words that mean something elsewhere;
+lines left out, doubled and moved; bits flipped; files cut, and encoded otherwise. Each goes
+through a command that takes such a file, which has to end in time and within 4 GiB of addresses:
+with what it was asked for, or with exit code 2 and one line of at most 1,000 letters, without a
+warning of a library. `linkage scene` may say several things that are wrong, a line each. Signals
+come to commands at random instants: the command ends with exit code 1 and a line, and leaves no file but
+what it was asked for. Whatever else happens is a finding.
+"""
+
+_Attack = Callable[[], tuple[dict[str, int], list[str]]]
+
+
+def main() -> int:
+    """Attack; 1 where anything is found."""
+    parser = argparse.ArgumentParser('python -m campaigns.attacks', description=__doc__)
+    parser.add_argument('--files', type=int, default=30_000, help='changed files')
+    parser.add_argument('--signals', type=int, default=300, help='commands that get a signal')
+    parser.add_argument('--bags', type=int, default=2000, help='hostile bags')
+    parser.add_argument('--seconds', type=float, default=120.0, help='of storms on the graph')
+    parser.add_argument('--jobs', type=int, default=2, help='processes that share the files')
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--write', action='store_true', help=f'keep the outcome in {PAGE}')
+    given = parser.parse_args()
+    began, begin = time.monotonic(), datetime.now().astimezone()
+    attacks: dict[str, _Attack] = {
+        'Files': partial(files.attack, given.files, given.seed, given.jobs),
+        'Signals': partial(signals.attack, given.signals, given.seed),
+    }
+    for name, share in (('bags', given.bags), ('graph', given.seconds)):
+        if find_spec(f'campaigns.attacks.{name}') is not None:
+            module = import_module(f'campaigns.attacks.{name}')
+            attacks[name.capitalize()] = partial(module.attack, share, given.seed)
+    tables, all_found = [], []
+    for name, attack in attacks.items():
+        tried, findings = attack()
+        table = Table(f'{name}: {sum(tried.values()):,} tried, {len(findings)} findings', ('', ''))
+        table.rows.extend((how, f'{count:,}') for how, count in tried.items())
+        tables.append(table)
+        all_found += findings
+        for finding in findings:
+            say(finding)
+    machine = Table('Machine', ('', ''), [*describe_machine()])
+    machine.rows.extend(
+        [
+            ('seed', str(given.seed)),
+            ('took', f'{time.monotonic() - began:.0f} s'),
+            ('begun', f'{begin:%F %T}'),
+            ('load in the end', load()),
+        ]
+    )
+    for table in (*tables, machine):
+        show(table)
+    if given.write:
+        write_page(PAGE, 'Attacks', INTRO, [*tables, machine])
+    return int(bool(all_found))
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,118 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Signals at random instants of every command that starts no node: each ends it, or comes too late.
+
+From when its handlers are there a command ends within seconds, with exit code 1 and a line, and
+leaves no file but what it was asked for. Before, Python starts, and no program can do anything.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+import contextlib
+import os
+from pathlib import Path
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+from linkage_ros.shipped import shipped
+
+_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+_LATEST = 1.5
+"""The last instant at which a signal comes, in [s] from when the handlers are there."""
+
+_PATIENCE = 30.0
+"""When a process counts as one that does not end, in [s]: others want the processor too."""
+
+_COMMANDS = {
+    'check': ['jansen_leg.yaml'],
+    'solve': ['jansen_leg.yaml', '--steps', '30000', '-o', 'x.csv'],
+    'draw': ['jansen_leg.yaml', '-o', 'x.svg'],
+    'urdf': ['jansen_leg.yaml', '-o', 'x.urdf'],
+    'mjcf': ['jansen_leg.yaml', '-o', 'x.xml'],
+    'scene': ['jansen_leg.yaml'],
+    'cost': ['jansen_leg.yaml', '--ticks', '100000'],
+    'accuracy': ['jansen_leg.yaml', '--only', 'solving', '-o', 'page'],
+    'synthesize': ['--function', 'log10(x)', '--range', '1', '2', '--crank-range', '0', '60',
+                   '--rocker-range', '0', '90', '--free-zeros', '--candidates', '100000000'],
+}  # fmt: skip
+
+
+def attack(count: int, seed: int) -> tuple[dict[str, int], list[str]]:
+    """Send signals; return how often a command ended how, and what must not be, a line each."""
+    tried: Counter[str] = Counter()
+    findings = []
+    for number in range(count):
+        how, finding = _try(random.Random(f'{seed} {number}'))
+        tried[how] += 1
+        if finding:
+            findings.append(f'signal {seed} {number}: {finding}')
+    return dict(sorted(tried.items())), findings
+
+
+def _try(rng: random.Random) -> tuple[str, str]:
+    command, sent = rng.choice(sorted(_COMMANDS)), rng.choice(_SIGNALS)
+    instant, again = rng.uniform(0.0, _LATEST), rng.random() < 0.3
+    asked = [word for word in _COMMANDS[command] if word.startswith(('x.', 'page'))]
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / 'jansen_leg.yaml').write_bytes(
+            shipped('linkages/jansen_leg.yaml').read_bytes()
+        )
+        process = subprocess.Popen(
+            [sys.executable, '-m', 'linkage_ros.cli.main', command, *_COMMANDS[command]],
+            cwd=folder,
+            env=os.environ | {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            _wait_for_handlers(process)
+            time.sleep(instant)
+            for _ in range(1 + again):
+                process.send_signal(sent)
+            begun = time.monotonic()
+            _, said = process.communicate(timeout=_PATIENCE)
+            took = time.monotonic() - begun
+        except subprocess.TimeoutExpired:
+            return f'{command}: no end', f'{command}, {sent.name} after {instant:.3f} s: no end'
+        finally:
+            process.kill()
+            process.communicate()
+        left = {file.name for file in Path(folder).iterdir()} - {'jansen_leg.yaml', *asked}
+    where = f'{command}, {sent.name} after {instant:.3f} s'
+    code = process.returncode
+    if left:
+        return f'{command}: {code}', f'{where}: left {", ".join(sorted(left))}'
+    if code == 0:
+        return f'{command}: had ended', ''
+    if (code, said.splitlines()[-1:]) != (1, [f'linkage {command}: stopped']) or 'Trace' in said:
+        return f'{command}: {code}', f'{where}: {code}: {said[:300]!r}'
+    return f'{command}: stopped within {5.0 if took < 5.0 else _PATIENCE:g} s', ''
+
+
+def _wait_for_handlers(process: subprocess.Popen[str]) -> None:
+    status = Path(f'/proc/{process.pid}/status')
+    while process.poll() is None:
+        with contextlib.suppress(OSError, ValueError):
+            (mask,) = [line for line in status.read_text().splitlines() if 'SigCgt' in line]
+            if all(int(mask.split()[1], 16) >> (number - 1) & 1 for number in _SIGNALS):
+                return
+        time.sleep(0.005)

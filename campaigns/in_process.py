@@ -1,0 +1,80 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A command run in this process, bounded in time: to start Python takes longer than most do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+import io
+import signal
+import traceback
+from typing import Any
+from unittest import mock
+
+from linkage_ros.cli import main as command_line
+from linkage_ros.stop import Stop
+
+
+class _TooLongError(BaseException):
+    """No `Exception`: nothing that a command catches."""
+
+
+def in_process(arguments: list[str], seconds: float) -> tuple[Any, str]:
+    """
+    Run ``linkage``.
+
+    Returns
+    -------
+    code : int or str
+        Its exit code, or how else it ended: 'no end' or 'traceback'.
+    said : str
+        What it said on standard error, or in place of it where and how it ended.
+
+    """
+    said, shown = io.StringIO(), io.StringIO()
+    try:
+        with redirect_stdout(shown), redirect_stderr(said), _bounded(seconds):
+            return command_line.main(arguments), said.getvalue()
+    except _TooLongError:
+        return 'no end', f'more than {seconds} s ({_place(traceback.format_exc())})'
+    except SystemExit as stopped:
+        return stopped.code, said.getvalue()
+    except Exception:  # noqa: BLE001 - whatever it is, a user would see it
+        return 'traceback', _place(traceback.format_exc())
+
+
+def _place(text: str) -> str:
+    """Return the last line of a traceback with the last place of ours in it."""
+    lines = text.strip().splitlines()
+    ours = [line.strip() for line in lines if 'linkage_ros/' in line and 'File' in line]
+    place = ours[-1].rpartition('linkage_ros/')[2] if ours else ''
+    return f'{lines[-1]} ({place.replace(chr(34), "")})'
+
+
+@contextmanager
+def _bounded(seconds: float) -> Iterator[None]:
+    def stop(_number: int, _frame: Any) -> None:
+        raise _TooLongError
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        # The signals stay the campaign's: a pool ends its processes by them.
+        with mock.patch.object(command_line, 'stop_on_signals', Stop):
+            yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

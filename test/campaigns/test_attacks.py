@@ -1,0 +1,67 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A sample of the attacks: no traceback, no hang, no screenful; and the judge sees them."""
+
+from __future__ import annotations
+
+import random
+
+from campaigns.attacks import files, signals
+from campaigns.attacks.mutations import mutated
+import pytest
+
+SEED = 20261122
+"""Not the campaign's own."""
+
+
+def test_changed_files_are_answered() -> None:
+    tried, findings = files.attack(60, SEED)
+    assert findings == []
+    assert sum(tried.values()) == 60
+    assert any(how.endswith(': 0') for how in tried)
+    assert any(how.endswith(': 2') for how in tried)
+
+
+def test_signals_end_commands() -> None:
+    tried, findings = signals.attack(6, SEED)
+    assert findings == []
+    assert sum(tried.values()) == 6
+
+
+def test_files_are_changed_in_many_ways() -> None:
+    original = b'links: {ground: {A: [0, 0], B: [0.1, 0]}}\ninput: {joint: j}\n'
+    found = {mutated(original, random.Random(number))[1] for number in range(300)}
+    assert len(found) > 200
+    assert sum(b'5e-324' in one for one in found) > 1
+
+
+@pytest.mark.parametrize(
+    ('command', 'code', 'said', 'found'),
+    [
+        ('check', 0, '', False),
+        ('check', 2, 'linkage check: x: is wrong; correct it\n', False),
+        ('scene', 2, 'linkage scene: one\nlinkage scene: other\n', False),
+        ('synthesize', 1, '', False),
+        ('check', 2, 'one\nother\n', True),
+        ('check', 2, '', True),
+        ('check', 2, 'x' * 2000, True),
+        ('check', 0, 'RuntimeWarning: overflow', True),
+        ('check', 1, '', True),
+        ('check', 'traceback', 'IndexError', True),
+        ('check', 'no end', 'more than 60 s', True),
+    ],
+)
+def test_the_judge_knows_an_end_that_must_not_be(command, code, said, found) -> None:
+    assert bool(files.judged(command, code, said)) is found

@@ -1,0 +1,203 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""SIGINT, SIGTERM and SIGHUP end every command, whatever it is at: exit code 1, one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from .conftest import environment
+
+SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+
+# What each command is told, and what it reads with. Where it computes, all of them close loops.
+PARSE = 'linkage_ros.scene.yaml_file:parse_yaml'
+READS = {
+    'check': (['four.yaml'], PARSE),
+    'solve': (['four.yaml', '-o', 'x.csv'], PARSE),
+    'draw': (['four.yaml', '-o', 'x.png'], PARSE),
+    'urdf': (['four.yaml', '-o', 'x.urdf'], PARSE),
+    'mjcf': (['four.yaml', '-o', 'x.xml'], PARSE),
+    'scene': (['four.yaml'], PARSE),
+    'cost': (['four.yaml'], PARSE),
+    'accuracy': (['four.yaml', '-o', 'page'], PARSE),
+    'demo': ([], PARSE),
+    'import': (['x.urdf', '-o', 'x.yaml'], 'linkage_ros.cli.import_urdf:read_urdf'),
+    'synthesize': (['--pairs', 'x.csv'], 'csv:reader'),
+}
+COMPUTE = ('check', 'solve', 'draw', 'urdf', 'mjcf', 'scene', 'cost', 'accuracy')
+CLOSES = 'linkage_ros.kinematics.closure:Closure.position'
+WRITES = 'os:fsync'
+
+# The command, with something in it that takes for ever, and says so when it begins.
+PROGRAM = """
+import os, pkgutil, sys, time
+from linkage_ros.cli.main import main
+place, name = sys.argv.pop(1).rsplit(sys.argv.pop(1), 1)
+owner = pkgutil.resolve_name(place)
+def stuck(*_, **__):
+    os.write(1, b'stuck')
+    while True:
+        time.sleep(0.01)
+setattr(owner, name, stuck)
+sys.exit(main())
+"""
+
+# Where what is raised is lost: Python can only say that something was raised in a finalizer.
+FINALIZER = """
+import os, sys, time
+from linkage_ros.cli.main import main
+from linkage_ros.scene import yaml_file
+class Lost:
+    def __del__(self):
+        os.write(1, b'stuck')
+        time.sleep(600.0)
+def parse(*_):
+    Lost()
+    while True:
+        time.sleep(0.01)
+yaml_file.parse_yaml = parse
+sys.exit(main())
+"""
+
+# The main thread waits for the wish again and again, and signals come all the time.
+STORM = """
+import signal, time
+from linkage_ros.stop import stop_on_signals
+stop = stop_on_signals()
+signal.signal(signal.SIGALRM, signal.getsignal(signal.SIGINT))
+signal.setitimer(signal.ITIMER_REAL, 1e-3, 1e-3)
+end = time.monotonic() + 3.0
+while time.monotonic() < end:
+    stop.wait(1e-6)
+signal.setitimer(signal.ITIMER_REAL, 0.0)
+assert stop.is_set() and stop.wait(60.0)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / 'four.yaml').write_text('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n')
+    (tmp_path / 'x.urdf').write_text('<robot/>')
+    (tmp_path / 'x.csv').write_text('1,2\n3,4\n5,7\n')
+    return tmp_path
+
+
+def start(folder: Path, program: str, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, '-c', program, *arguments],
+        cwd=folder,
+        env=environment(folder),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def ended_by(process: subprocess.Popen[str], *numbers: signal.Signals) -> tuple[int, str]:
+    """Return exit code and standard error of a process that was ended once it was stuck."""
+    try:
+        assert process.stdout is not None
+        assert process.stdout.read(5) == 'stuck', process.communicate()[1]
+        for number in numbers:
+            process.send_signal(number)
+        _, said = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    return process.returncode, said
+
+
+def stuck_at(folder: Path, place: str, *arguments: str) -> subprocess.Popen[str]:
+    separator = '.' if '.' in place.rpartition(':')[2] else ':'
+    return start(folder, PROGRAM, place, separator, *arguments)
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('command', READS)
+def test_a_command_ends_while_it_reads(folder, command, number) -> None:
+    typed, reads = READS[command]
+    before = sorted(folder.iterdir())
+    found = ended_by(stuck_at(folder, reads, command, *typed), number)
+    assert found == (1, f'linkage {command}: stopped\n')
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('command', COMPUTE)
+def test_a_command_ends_while_it_computes(folder, command, number) -> None:
+    before = sorted(folder.iterdir())
+    found = ended_by(stuck_at(folder, CLOSES, command, *READS[command][0]), number)
+    assert found == (1, f'linkage {command}: stopped\n')
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize('command', ['solve', 'draw', 'urdf', 'mjcf'])
+def test_a_command_that_is_stopped_while_it_writes_leaves_what_was_there(folder, command) -> None:
+    typed, _ = READS[command]
+    old = folder / typed[-1]
+    old.write_text('old')
+    before = sorted(folder.iterdir())
+    found = ended_by(stuck_at(folder, WRITES, command, *typed), signal.SIGTERM)
+    assert found == (1, f'linkage {command}: stopped\n')
+    assert sorted(folder.iterdir()) == before
+    assert old.read_text() == 'old'
+
+
+def test_an_impatient_user_gets_one_line(folder) -> None:
+    found = ended_by(stuck_at(folder, CLOSES, 'check', 'four.yaml'), *SIGNALS, *SIGNALS)
+    assert found == (1, 'linkage check: stopped\n')
+
+
+def test_a_signal_is_not_lost_in_a_finalizer(folder) -> None:
+    process = start(folder, FINALIZER, 'check', 'four.yaml')
+    assert ended_by(process, signal.SIGTERM) == (1, 'linkage check: stopped\n')
+
+
+def test_a_command_ends_whose_output_nobody_reads(folder) -> None:
+    process = start(
+        folder,
+        'import sys; from linkage_ros.cli.main import main; sys.exit(main())',
+        *('solve', 'four.yaml', '--steps', '5000', '--format', 'csv'),
+    )
+    try:
+        wait_until_it_sleeps(process)
+        process.terminate()
+        assert process.wait(60) == 1
+        assert process.stderr is not None
+        assert process.stderr.read() == 'linkage solve: stopped\n'
+    finally:
+        process.kill()
+
+
+def wait_until_it_sleeps(process: subprocess.Popen[str]) -> None:
+    """Wait until a process waits for its pipe to be read."""
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        if 'pipe_write' in Path(f'/proc/{process.pid}/wchan').read_text():
+            return
+        if process.stdout is not None and process.poll() is not None:
+            break
+        time.sleep(0.05)
+    pytest.skip('the kernel does not say where a process waits')
+
+
+def test_a_signal_that_comes_while_its_wish_is_waited_for_is_no_deadlock(folder) -> None:
+    subprocess.run([sys.executable, '-c', STORM], cwd=folder, timeout=60, check=True)
