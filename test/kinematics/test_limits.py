@@ -36,7 +36,7 @@ from linkage_ros.solvers.table import TableClosure
 import numpy as np
 import pytest
 
-from test.kinematics.platforms import linkage_of, platform
+from .platforms import linkage_of, platform
 
 CLOSED, LIMITED, TOGGLE, OPEN = Status.CLOSED, Status.LIMITED, Status.TOGGLE, Status.OPEN
 
