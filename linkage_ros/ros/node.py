@@ -324,6 +324,12 @@ class LinkageNode(LifecycleNode):
             return
         period = self.get_parameter('warning_period').value
         self._warnings.look(loop.counts, loop.pipeline.closures, self.crank_topic, period)
+        listening = [line.member for line in loop.pipeline.lines if line.topic]
+        # Where /clock does not come, no message has been looked for.
+        assert self.scene is not None
+        if listening and (loop.counts.ticks or not self.scene.rate):
+            inputs = [name for member in listening for name in member.inputs]
+            self._warnings.wait(loop.counts, self.crank_topic, inputs, period)
         if loop.failure:
             self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
         if loop.recorder is not None and loop.recorder.failure is not None:
