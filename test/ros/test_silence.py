@@ -90,8 +90,8 @@ def test_who_waits_in_vain_says_for_what(write_scene, start, linkage, scene, inp
 
 def test_who_is_under_torque_waits_for_nothing(graph, write_scene, start):
     scene = Path(LINKAGES.parent, 'scenes', 'torque_crank.yaml').read_text()
-    drive = scene[scene.index('drive:') :].replace('linkage:', '# linkage:')
-    node = start(write_scene('torque', drive.partition('record:')[0], 'four_bar'))
+    _, rate, said = scene.partition('rate:')
+    node = start(write_scene('torque', rate + said.partition('record:')[0], 'four_bar'))
     joint_states = graph.listen(JointState, '/joint_states')
     wait_for(lambda: joint_states, 'joint states')
     first = stamp_of(joint_states[0])
