@@ -152,6 +152,11 @@ class Bodies:
         place -= self._origins[branch.parent]
         given = child in closure.linkage.links
         name = self._names.own(child) if given else self._names.frame(child)
+        value = self._value(branch)
+        if branch.kind == 'R':
+            turn += branch.sign * value
+        else:
+            place += value * axis * rect(1.0, turn)
         where = numbers(place.real, place.imag, 0.0)
         body = ET.SubElement(self._links[branch.parent], 'body', name=name, pos=where)
         if turn:
@@ -164,8 +169,11 @@ class Bodies:
             _limit(joint, closure.linkage.limits.get(branch.joint, NO_LIMITS))
         else:
             joint.set('name', self._names.joint(f'{child}_at_{branch.name}'))
-        joint.set('axis', axis)
-        self.start.append(self._value(branch))
+        flat = numbers(axis.real, axis.imag, 0.0)
+        joint.set('axis', numbers(0.0, 0.0, branch.sign) if branch.kind == 'R' else flat)
+        # What the engine resets to is the pose that is written, with this as the joint's value.
+        joint.set('ref', number(value))
+        self.start.append(value)
         mass = closure.linkage.masses.get(child)
         solids = self._drawn[child] if given else _block(closure, child)
         if mass is not None:
@@ -187,17 +195,17 @@ class Bodies:
         return value
 
 
-def _held(closure: Closure, branch: Branch) -> tuple[complex, float, str, complex]:
+def _held(closure: Closure, branch: Branch) -> tuple[complex, float, complex, complex]:
     """
-    Return how a body hangs on its parent.
+    Return how a body hangs on its parent where its joint is at 0.
 
-    Where it does, in the frame of the parent's link; its angle; the axis, in its own frame; and
-    its origin, in the frame of its own link.
+    Where it does, in the frame of the parent's link; its angle; of one that slides the axis, in
+    its own frame; and its origin, in the frame of its own link.
     """
     links = closure.structure.links
     if branch.kind == 'R':
         place, own = links[branch.parent][branch.name], links[branch.child][branch.name]
-        return complex(*place), 0.0, numbers(0.0, 0.0, branch.sign), complex(*own)
+        return complex(*place), 0.0, 0j, complex(*own)
     slider = closure.linkage.sliders[branch.name]
     unit = complex(*slider.direction) / abs(complex(*slider.direction))
     if branch.parent == slider.along:
@@ -206,7 +214,7 @@ def _held(closure: Closure, branch: Branch) -> tuple[complex, float, str, comple
     else:
         place, own = links[branch.parent][slider.point], links[branch.child][slider.through]
         turn, axis = -slider.angle, -unit
-    return complex(*place), turn, numbers(axis.real, axis.imag, 0.0), complex(*own)
+    return complex(*place), turn, axis, complex(*own)
 
 
 def _block(closure: Closure, block: str) -> Body:

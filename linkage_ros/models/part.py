@@ -36,12 +36,15 @@ class Part(NamedTuple):
         What its links and joints have before their names.
     loads
         What acts on it; nothing where nobody says.
+    wrapped
+        Whether its angles are published in (−π, π].
 
     """
 
     closure: Closure
     prefix: str = ''
     loads: Loads | None = None
+    wrapped: bool = False
 
 
 class PartError(DefinitionError):

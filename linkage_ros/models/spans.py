@@ -18,8 +18,9 @@ How far joints go: what a published joint comes to while the input goes through 
 
 Of a single input, the range is the one that the linkage starts in (`usual_inputs`). It is sampled;
 between two samples a joint is taken to go no farther than it goes from one to the next, and a
-margin is added. Angles run on from where they begin, in (−π, π], as the node publishes them. With
-several inputs nobody can say: angles have no limit then, slides that of the linkage's reach.
+margin is added. An angle that passes π on the way has no limit: what the node publishes begins in
+(−π, π] wherever the input is then, so that it can be on either side, and a wrapped one is on both.
+With several inputs nobody can say: angles have no limit then, slides that of the linkage's reach.
 """
 
 from __future__ import annotations
@@ -58,6 +59,15 @@ class Span(NamedTuple):
     highest: float
     limited: bool = True
 
+    @property
+    def passes_pi(self) -> bool:
+        """Whether an angle that goes so far leaves (−π, π]."""
+        return self.lowest < -pi or self.highest > pi
+
+
+_ROUND = Span(-pi, pi, False)
+"""Of an angle without limits."""
+
 
 def spans(closure: Closure) -> dict[str, Span]:
     """Return how far each joint goes that messages name."""
@@ -65,7 +75,7 @@ def spans(closure: Closure) -> dict[str, Span]:
     if len(closure.linkage.inputs) > 1:
         far = reach(closure)
         return {
-            name: Span(-far, far) if isinstance(joint, SlideJoint) else Span(-pi, pi, False)
+            name: Span(-far, far) if isinstance(joint, SlideJoint) else _ROUND
             for name, joint in joints.items()
         }
     (start,) = usual_inputs(closure)
@@ -74,9 +84,10 @@ def spans(closure: Closure) -> dict[str, Span]:
     found = dict(zip(closure.linkage.joints, _published(closure, start, interval), strict=True))
     (given,) = closure.linkage.inputs
     margin = _MARGIN * (1.0 if interval.turning else reach(closure))
-    whole = Span(-pi, pi, False)
     own = Span(interval.lowest - margin, interval.highest + margin)
-    found.setdefault(given.joint, whole if interval.whole else own)
+    if interval.whole or (interval.turning and own.passes_pi):
+        own = _ROUND
+    found.setdefault(given.joint, own)
     return {name: found[name] for name in joints}
 
 
@@ -84,9 +95,13 @@ def _published(closure: Closure, start: float, interval: InputRange) -> list[Spa
     import numpy as np  # local import: the batch alone needs it
 
     values = np.array(samples(interval, _SAMPLES))
-    batch = closure.solve(values, derivatives=0)
-    closed = ~np.isnan(batch.positions).any(axis=0)
-    values, rows = values[closed], batch.positions[:, closed]
+    rows = closure.solve(values, derivatives=0).positions
+    for i in np.flatnonzero(np.isnan(rows).any(axis=0)):
+        # A batch leaves out toggles, and so the ends of most ranges; the node publishes them.
+        if joints := closure.position(float(values[i])).joints:
+            rows[:, i] = joints
+    closed = ~np.isnan(rows).any(axis=0)
+    values, rows = values[closed], rows[:, closed]
     first = int(np.argmin(np.abs(values - start)))
     found = []
     for row, turning in zip(rows, closure.turning, strict=True):
@@ -97,7 +112,7 @@ def _published(closure: Closure, start: float, interval: InputRange) -> list[Spa
 def _span(row: Array, first: int, turning: bool, closure: Closure, interval: InputRange) -> Span:
     low, high = int(row.argmin()), int(row.argmax())
     if turning and interval.whole and abs(row[-1] - row[0]) > pi:
-        return Span(-pi, pi, False)
+        return _ROUND
     margin = _MARGIN * (1.0 if turning else reach(closure))
 
     def beyond(i: int) -> float:
@@ -107,4 +122,5 @@ def _span(row: Array, first: int, turning: bool, closure: Closure, interval: Inp
         return margin + (max(sides, default=0.0) if inner else 0.0)
 
     begun = remainder(row[first], tau) - row[first] if turning else 0.0
-    return Span(float(row[low] + begun - beyond(low)), float(row[high] + begun + beyond(high)))
+    span = Span(float(row[low] + begun - beyond(low)), float(row[high] + begun + beyond(high)))
+    return _ROUND if turning and span.passes_pi else span

@@ -132,7 +132,8 @@ Links are bars in layers, of no particular shape; those with a mass are thin pla
 iyy = izz/2.
 A limit is as the linkage gives it; else what the joint comes to over the range of the input that
 the linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
-angles, the reach for slides. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
+angles, the reach for slides. An angle that passes pi has none either, since it is published as it
+begins in (-pi, pi], or wrapped. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
 
 
 def _write(robot: ET.Element, model: _Model) -> None:
@@ -152,7 +153,8 @@ def _write(robot: ET.Element, model: _Model) -> None:
     computed: dict[str, dict[str, str]] = {}
     for joint in model.tree.joints:
         of = joint.mimics or joint.name
-        computed[of] = _joint(robot, joint, found.get(of), given.get(of, NO_LIMITS))
+        limits = given.get(of, NO_LIMITS)
+        computed[of] = _joint(robot, joint, found.get(of), limits, model.part.wrapped)
     _start(robot, model, computed)
 
 
@@ -185,12 +187,15 @@ def _visuals(link: ET.Element, name: str, body: Body, origin: complex) -> None:
 
 
 def _joint(
-    robot: ET.Element, joint: TreeJoint, span: Span | None, limits: Limits
+    robot: ET.Element, joint: TreeJoint, span: Span | None, limits: Limits, wrapped: bool = False
 ) -> dict[str, str]:
     """Write a joint; return those of its limits that the linkage does not give."""
     kind: str = joint.kind
-    if kind == 'revolute' and span is not None and not span.limited and not limits.bounded:
-        kind = 'continuous'
+    if kind == 'revolute' and span is not None:
+        # Wrapped, an angle is on both sides of what it passes at π.
+        passing = wrapped and Span(limits.low, limits.high).passes_pi
+        if passing if limits.bounded else not span.limited:
+            kind = 'continuous'
     element = ET.SubElement(robot, 'joint', name=joint.name, type=kind)
     _origin(element, joint.place, joint.turn)
     ET.SubElement(element, 'parent', link=joint.parent)

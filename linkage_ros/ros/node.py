@@ -372,17 +372,18 @@ class LinkageNode(LifecycleNode):
             return
         period = self.get_parameter('warning_period').value
         self._warnings.look(loop.counts, loop.pipeline.closures, self.crank_topic, period)
-        ignored = loop.counts.ignored
-        if ignored and ignored == loop.counts.received:
-            line = f'{self.crank_topic}: {ignored} messages, none with {self._cranks}: '
-            remedy = 'name the joint so there, or remap the topic'
-            self._warnings.say('ignored', line + remedy, period)
         silence = self._clock_silence()
         if min(silence, (time.monotonic_ns() - self._activated) / NANOSECONDS) > CLOCK_PATIENCE:
             remedy = 'start the simulation, or set use_sim_time: false'
             self._warnings.say('clock', f'{no_clock(silence)}: {remedy}', period)
         while self._real_time.refused:
             self.get_logger().warning(self._real_time.refused.pop())
+        listening = [line.member for line in loop.pipeline.lines if line.topic]
+        # Where /clock does not come, no message has been looked for.
+        assert self.scene is not None
+        if listening and (loop.counts.ticks or not self.scene.rate):
+            inputs = [name for member in listening for name in member.inputs]
+            self._warnings.wait(loop.counts, self.crank_topic, inputs, period)
         if loop.failure:
             self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
         news = self.recording.look(loop)

@@ -50,6 +50,10 @@ _REMEDIES = {
 }
 
 
+_PATIENCE = 2.0
+"""How long nobody is told that the crank has not come yet, in [s]."""
+
+
 class Warnings:
     """
     What has been warned of, and when.
@@ -67,6 +71,37 @@ class Warnings:
         self._rejected = dict.fromkeys(Rejection, 0)
         self._unclosed = dict.fromkeys(Status, 0)
         self._lost = 0
+        self._begun = monotonic()
+
+    def wait(self, counts: Counts, crank_topic: str, inputs: Sequence[str], period: float) -> None:
+        """
+        Warn where no message has come, or none with the crank.
+
+        Parameters
+        ----------
+        counts
+            The tick's.
+        crank_topic
+            Where samples should come from.
+        inputs
+            Names of the joints that they should have.
+        period
+            Least time between two such warnings, in [s].
+
+        """
+        names = ', '.join(inputs)
+        if counts.ignored and counts.ignored == counts.received:
+            line = f'{crank_topic}: {counts.ignored} messages, none with {names}: '
+            self.say('ignored', line + 'name the joint so there, or remap the topic', period)
+        waited = monotonic() - self._begun
+        if not counts.received and not counts.published and waited > _PATIENCE:
+            self.say(
+                'waiting',
+                f'{crank_topic}: no message in {waited:.0f} s, so nothing is published; send '
+                f'sensor_msgs/JointState with {names} there, remap the topic, or name '
+                'another drive in a scene, as drive: {sine: …}',
+                period,
+            )
 
     def look(
         self, counts: Counts, closures: Sequence[Closure], crank_topic: str, period: float

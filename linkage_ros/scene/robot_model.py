@@ -47,7 +47,7 @@ def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> byte
 
     """
     parts = [
-        Part(closure, member.prefix, member.loads)
+        Part(closure, member.prefix, member.loads, scene.wrapped)
         for member, closure in zip(scene.members, closures, strict=True)
     ]
     try:

@@ -16,12 +16,15 @@
 """A crank that falls silent, hangs or is doubled: said, and never dressed up as fresh."""
 
 from contextlib import contextmanager
+from pathlib import Path
+import re
 from threading import Event, Thread
 import time
 
 import pytest
 from sensor_msgs.msg import JointState
 
+from .conftest import LINKAGES
 from .graph import crank, NS, stamp_of, wait_for
 
 OK, WARN, STALE = b'\0', b'\1', b'\3'
@@ -60,6 +63,40 @@ def publishing(publisher, make=lambda: crank(0.5)):
 def wait_until_taken(graph):
     """Wait until the diagnostics have counted samples."""
     wait_for(lambda: graph.value('crank', 'Samples received') > '0', 'samples')
+
+
+@pytest.mark.parametrize(
+    ('linkage', 'scene', 'inputs'),
+    [
+        ('five_bar', None, 'left_crank_joint, right_crank_joint'),
+        ('four_bar', TICKING, 'crank_joint'),
+        ('four_bar', 'rate: 0', 'crank_joint'),
+    ],
+)
+def test_who_waits_in_vain_says_for_what(write_scene, start, linkage, scene, inputs):
+    """A linkage file alone, of several inputs, waits for messages too."""
+    file = LINKAGES / f'{linkage}.yaml'
+    if scene is not None:
+        file = write_scene(f'waits_{linkage}_{scene[-1]}', scene, linkage)
+    node = start(file)
+    node.wait_for_log('no message in')
+    line = next(line for line in node.log.splitlines() if 'no message in' in line)
+    assert re.search(
+        rf'/crank_states: no message in \d+ s, so nothing is published; send '
+        rf'sensor_msgs/JointState with {inputs} there, remap the topic, or name another drive',
+        line,
+    )
+
+
+def test_who_is_under_torque_waits_for_nothing(graph, write_scene, start):
+    scene = Path(LINKAGES.parent, 'scenes', 'torque_crank.yaml').read_text()
+    _, rate, said = scene.partition('rate:')
+    node = start(write_scene('torque', rate + said.partition('record:')[0], 'four_bar'))
+    joint_states = graph.listen(JointState, '/joint_states')
+    wait_for(lambda: joint_states, 'joint states')
+    first = stamp_of(joint_states[0])
+    wait_for(lambda: stamp_of(joint_states[-1]) - first > 4 * NS, 'four seconds')
+    assert 'no message in' not in node.log
 
 
 def test_silence(graph, write_scene, start, publisher, joint_states):
