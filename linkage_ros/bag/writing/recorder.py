@@ -163,13 +163,14 @@ class Recorder:
         counts = []
         # First, so that nothing is let go that was not taken.
         let_go = self._writer.let_go
+        opened = self._writer.opened
         taken, lost = self._done
         for number, topic in enumerate(self._writer.topics):
             gone = let_go[number]
-            recorded = taken[number] - gone
+            recorded = taken[number] + opened[number] - gone
             dropped = self._overflowed[number].value() + lost[number]
             # Last, so that a message on its way is waiting, and never gone twice.
-            received = self._received[number].value()
+            received = self._received[number].value() + opened[number]
             waiting = received - recorded - dropped - gone
             counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting, gone))
         return tuple(counts)
@@ -273,7 +274,10 @@ class Recorder:
 
     def _account(self, summary: BagSummary) -> Account:
         """Return what became of all messages, once no more are taken; `dropped` is the rest."""
-        received = [tally.value() for tally in self._received]
+        received = [
+            tally.value() + opened
+            for tally, opened in zip(self._received, self._writer.opened, strict=True)
+        ]
         dropped = [
             came - there - gone
             for came, there, gone in zip(received, summary.counts, summary.let_go, strict=True)
