@@ -241,6 +241,7 @@ class Recorder:
             self._writer.close(self._custom)
         except Exception as error:  # noqa: BLE001 (as above)
             self._fail(error)
+        self._count_kept()
         self._lose_queue()
 
     def _goes_on(self) -> bool:
@@ -307,15 +308,19 @@ class Recorder:
         if not isinstance(error, RecordingError):
             reason = f'the recording ended early: {type(error).__name__}: {error}'
             error = RecordingError(self._writer.folder, reason, 'please report this')
+        self._count_kept()
+        if not self._writer.out_of_room:
+            self._open = False
+            self._lose_queue()
+        self.failure = error
+
+    def _count_kept(self) -> None:
+        """Count as lost what the writer has taken and could not keep."""
         kept = self._writer.kept
         taken, lost = self._done
         lost = [gone + had - has for gone, had, has in zip(lost, taken, kept, strict=True)]
         self._done = (list(kept), lost)
         self._safe = kept
-        if not self._writer.out_of_room:
-            self._open = False
-            self._lose_queue()
-        self.failure = error
 
     def _lose_queue(self) -> None:
         """Count what waits as lost."""

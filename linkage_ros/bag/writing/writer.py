@@ -330,7 +330,7 @@ class BagWriter:
             error = self._file.finish(last_records(said, summary, account))
         gone = self._lose_what_is_gone()
         error = error or gone
-        if error and not self._said:
+        if error and not self._failure:
             self._said = {FAILURE: str(self._ended_by(error))}
         summary = self._summarize()
         self._remove_gone()
