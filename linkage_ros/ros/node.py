@@ -273,7 +273,9 @@ class LinkageNode(LifecycleNode):
         assert self.scene is not None
         assert self.loop is not None
         directory = self.get_parameter('runs_directory').value
-        return self.recording.start(self.scene, self.loop, directory, self._bag_topics)
+        return self.recording.start(
+            self.scene, self.loop, directory, self._bag_topics, self._scene_topics.description
+        )
 
     def _bag_topics(self) -> list[tuple[str, Topic]]:
         """Describe what is recorded, in the order of the tick's topic numbers."""

@@ -62,6 +62,9 @@ _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
 EXTRA = 'extra'
 """The key of a topic of which there may be several."""
 
+DESCRIPTION = 'description_topic'
+"""The key of the topic of the robot model."""
+
 
 class RunRecording:
     """
@@ -92,6 +95,7 @@ class RunRecording:
         loop: TickLoop,
         directory: str,
         topics: Callable[[], Sequence[tuple[str, Topic]]],
+        description: bytes = b'',
     ) -> str:
         """
         Start a bag that explains itself, or a memory; return what came of it, as one line.
@@ -107,6 +111,8 @@ class RunRecording:
         topics
             Returns what will be recorded, in the order of the tick's topic numbers, each with the
             key under which the bag's account of the run names it; that of several names a list.
+        description
+            The message of the topic `DESCRIPTION`, with which each file begins; empty for none.
 
         """
         record = scene.record or _DEFAULT
@@ -118,7 +124,12 @@ class RunRecording:
             begun = WITH_THE_RUN if whole and with_the_run else MID_RUN
             folder = _folder(runs, record.name, scene.name)
             files = _attachments(scene, described, begun, loop.pipeline.lines)
-            return BagWriter(folder, [t for _, t in described], files, storage)
+            opening = [
+                (number, description)
+                for number, (key, _) in enumerate(described)
+                if key == DESCRIPTION
+            ]
+            return BagWriter(folder, [t for _, t in described], files, storage, opening)
 
         try:
             # Who calls a service does not know in which folder this process runs.

@@ -26,7 +26,7 @@ from linkage_ros.cdr import text_message
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import change_text
 from linkage_ros.ros.bag_topics import bag_topic, message_type
-from linkage_ros.ros.run_recording import EXTRA
+from linkage_ros.ros.run_recording import DESCRIPTION, EXTRA
 from linkage_ros.ros.tick_loop import Take
 from linkage_ros.scene.scene import Scene
 from rclpy.callback_groups import CallbackGroup
@@ -76,6 +76,8 @@ class SceneTopics:
         self._kinds: dict[str, str] = {}
         self._changes: Publisher | None = None
         self._description: Publisher | None = None
+        self.description = b''
+        """The message with the robot model, serialized; empty where the scene asks for none."""
         self._injectors: list[Any] = []
         self._withholds = False
         self.extras: list[Publisher] = []
@@ -143,7 +145,8 @@ class SceneTopics:
         self._description = self._node.create_publisher(
             text_type, 'robot_description', _DESCRIPTION_QOS
         )
-        self._description.publish(text_type(data=model))
+        self.description = text_message(model)
+        self._description.publish(self.description)
 
     def disconnect(self) -> None:
         """Have nothing."""
@@ -156,6 +159,7 @@ class SceneTopics:
             self._node.destroy_subscription(self.crank)
         self.extras, self._injectors, self._kinds = [], [], {}
         self._changes = self._description = self.crank = None
+        self.description = b''
 
     @property
     def crank_topic(self) -> str:
@@ -208,6 +212,10 @@ class SceneTopics:
             for extra in self.extras
         ]
         topics.append(('resets_topic', resets))
+        if (model := self._description) is not None:
+            # Last: no tick publishes it, so that it has none of the tick's numbers.
+            described = bag_topic(model.topic_name, model.msg_type, _DESCRIPTION_QOS)
+            topics.append((DESCRIPTION, described))
         return topics
 
 

@@ -212,6 +212,34 @@ def test_where_there_is_room_again_the_recording_goes_on_in_a_new_file(
         assert reader.message_count > 1000
 
 
+def test_a_run_that_dropped_messages_says_how_many_and_does_not_end_with_0(
+    graph, tmp_path, write_scene, start
+):
+    # Messages of 13 places each, faster than the recorder's thread looks, for a queue of 100.
+    record = f'record: {{directory: {tmp_path}, name: bag, queue: 100}}'
+    node = start(write_scene('drops', f'rate: 100\neffects: {{velocity: {{}}}}\n{record}'))
+    publisher = graph.publisher(JointState, '/crank_states')
+    large = crank(0.5, 1.0)
+    large.header.frame_id = 'x' * 200_000
+    wait_for(lambda: graph.node.count_subscribers('/crank_states') == 1, 'the node')
+
+    def dropped_some():
+        for _ in range(10):
+            publisher.publish(large)
+        status = graph.status('recording')
+        return status is not None and status.level == WARN
+
+    wait_for(dropped_some, 'messages dropped')
+    assert node.end() == INCOMPLETE
+    assert 'Traceback' not in node.log
+    line = node.log.splitlines()[-1]
+    told = counts_in_line(line)
+    dropped = sum(dropped for _, dropped in told.values())
+    received = dropped + sum(recorded for recorded, _ in told.values())
+    assert dropped
+    assert f'{tmp_path}/bag: {dropped:,} of {received:,} messages were dropped: ' in line
+
+
 def test_a_later_bag_does_not_hide_the_first_failure(
     graph, tmp_path, write_scene, start, keeps_publishing
 ):

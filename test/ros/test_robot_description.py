@@ -23,14 +23,20 @@ from __future__ import annotations
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.cli.proof import IDENTICAL, prove
+from linkage_ros.replay import recorded_scene
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import get_typestore, Stores
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from .graph import wait_for
 from ..models.walked import Walked  # noqa: TID252
 
+JAZZY = get_typestore(Stores.ROS2_JAZZY)
 TOPIC = '/robot_description'
 AS_RVIZ = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 TURNING = 'rate: 200\ndrive: {constant_rate: {rate: 3.0}}\n'
@@ -106,6 +112,33 @@ def test_without_the_key_there_is_none(graph, write_scene, start):
     states = graph.listen(JointState, '/joint_states')
     wait_for(lambda: states, 'a joint state')
     assert graph.node.count_publishers(TOPIC) == 0
+
+
+def test_each_file_of_its_bag_has_it_as_it_was_offered(graph, folder, write_scene, start):
+    record = f'record: {{directory: {folder}, name: bag, split_seconds: 1}}'
+    node = start(write_scene('bagged', TURNING + f'robot_description: true\n{record}'))
+    heard = late(graph)
+    states = graph.listen(JointState, '/joint_states')
+    wait_for(lambda: heard and len(states) > 300, 'a robot model, and joint states')
+    assert node.end() == 0
+    files = list((folder / 'bag').glob('*.mcap'))
+    assert len(files) >= 2
+    for file in files:
+        with AnyReader([file], default_typestore=JAZZY) as reader:
+            (connection,) = (c for c in reader.connections if c.topic == TOPIC)
+            (model,) = (
+                reader.deserialize(data, c.msgtype).data
+                for c, _, data in reader.messages([connection])
+            )
+        assert model == heard[0].data
+        assert connection.ext.offered_qos_profiles[0].durability.name == 'TRANSIENT_LOCAL'
+    assert replayed(folder / 'bag')
+
+
+def replayed(bag):
+    """Return whether a bag replays to the same bytes."""
+    found = read_bag(bag)
+    return prove(found, recorded_scene(found), found.messages()).verdict == IDENTICAL
 
 
 def test_joints_that_do_not_tell_all_are_said_in_a_line(write_scene, start):

@@ -163,13 +163,14 @@ class Recorder:
         counts = []
         # First, so that nothing is let go that was not taken.
         let_go = self._writer.let_go
+        opened = self._writer.opened
         taken, lost = self._done
         for number, topic in enumerate(self._writer.topics):
             gone = let_go[number]
-            recorded = taken[number] - gone
+            recorded = taken[number] + opened[number] - gone
             dropped = self._overflowed[number].value() + lost[number]
             # Last, so that a message on its way is waiting, and never gone twice.
-            received = self._received[number].value()
+            received = self._received[number].value() + opened[number]
             waiting = received - recorded - dropped - gone
             counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting, gone))
         return tuple(counts)
@@ -240,6 +241,7 @@ class Recorder:
             self._writer.close(self._custom)
         except Exception as error:  # noqa: BLE001 (as above)
             self._fail(error)
+        self._count_kept()
         self._lose_queue()
 
     def _goes_on(self) -> bool:
@@ -273,7 +275,10 @@ class Recorder:
 
     def _account(self, summary: BagSummary) -> Account:
         """Return what became of all messages, once no more are taken; `dropped` is the rest."""
-        received = [tally.value() for tally in self._received]
+        received = [
+            tally.value() + opened
+            for tally, opened in zip(self._received, self._writer.opened, strict=True)
+        ]
         dropped = [
             came - there - gone
             for came, there, gone in zip(received, summary.counts, summary.let_go, strict=True)
@@ -303,15 +308,19 @@ class Recorder:
         if not isinstance(error, RecordingError):
             reason = f'the recording ended early: {type(error).__name__}: {error}'
             error = RecordingError(self._writer.folder, reason, 'please report this')
+        self._count_kept()
+        if not self._writer.out_of_room:
+            self._open = False
+            self._lose_queue()
+        self.failure = error
+
+    def _count_kept(self) -> None:
+        """Count as lost what the writer has taken and could not keep."""
         kept = self._writer.kept
         taken, lost = self._done
         lost = [gone + had - has for gone, had, has in zip(lost, taken, kept, strict=True)]
         self._done = (list(kept), lost)
         self._safe = kept
-        if not self._writer.out_of_room:
-            self._open = False
-            self._lose_queue()
-        self.failure = error
 
     def _lose_queue(self) -> None:
         """Count what waits as lost."""

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 import threading
 import time
 
@@ -92,7 +93,7 @@ class SnapshotWriting:
 
     def _write(self, writer: BagWriter) -> RecordingSummary:
         recorder = Recorder(writer, capacity=_AHEAD + BATCH)
-        writer.account = self._account
+        writer.account = partial(self._account, writer)
         for number, message in enumerate(self.kept.messages()):
             if number % BATCH == 0:
                 time.sleep(NAP)
@@ -104,7 +105,7 @@ class SnapshotWriting:
         # After a failure not all was offered.
         topics = [
             replace(topic, received=there, dropped=there - topic.recorded)
-            for topic, there in zip(summary.topics, self.kept.counts, strict=True)
+            for topic, there in zip(summary.topics, self._received(writer), strict=True)
         ]
         return replace(summary, topics=tuple(topics))
 
@@ -122,9 +123,13 @@ class SnapshotWriting:
             time.sleep(POLL)
         return False
 
-    def _account(self, summary: BagSummary) -> Account:
+    def _received(self, writer: BagWriter) -> list[int]:
+        """Return how many messages of each topic there are to be written."""
+        return list(map(sum, zip(self.kept.counts, writer.opened, strict=True)))
+
+    def _account(self, writer: BagWriter, summary: BagSummary) -> Account:
+        received = self._received(writer)
         dropped = [
-            there - written
-            for there, written in zip(self.kept.counts, summary.counts, strict=True)
+            there - written for there, written in zip(received, summary.counts, strict=True)
         ]
-        return Account(self.kept.counts, summary.counts, dropped, (0,) * len(dropped))
+        return Account(received, summary.counts, dropped, (0,) * len(dropped))

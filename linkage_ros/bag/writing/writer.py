@@ -71,6 +71,9 @@ class BagWriter:
         itself.
     storage
         How it is stored; its ``flush_period`` is for whoever calls `flush`.
+    opening
+        Topic number and CDR bytes of what stands before the first message of each file, with its
+        log time: what was published once, for whoever comes later.
 
     Attributes
     ----------
@@ -78,6 +81,8 @@ class BagWriter:
         Messages of each topic that were in files that made way for newer ones.
     out_of_room
         Whether it has failed for want of room, so that `resume` may go on.
+    opened
+        How many messages of each topic are there by `opening`, and were not given to `write`.
     account
         Returns what became of all messages, given what the bag holds; none for a bag whose writer
         keeps no account.
@@ -95,6 +100,7 @@ class BagWriter:
         topics: Sequence[Topic],
         attachments: Mapping[str, tuple[str, bytes]] | None = None,
         storage: Storage | None = None,
+        opening: Sequence[tuple[int, bytes]] = (),
     ) -> None:
         self.folder = Path(folder)
         self.topics = tuple(topics)
@@ -106,6 +112,8 @@ class BagWriter:
         self._split_time = round(self.storage.split_seconds * 1e9)  # [ns]
         self._splits = self.storage.split_bytes > 0 or self._split_time > 0
         self._paths = (self.folder / f'{self.folder.name}_{number}.mcap' for number in count())
+        self._opening = tuple(opening)
+        self.opened = (0,) * len(self.topics)
         self._sequences = [0] * len(self.topics)
         self._refused = [0] * len(self.topics)
         self._ended: list[BagSummary] = []
@@ -171,12 +179,24 @@ class BagWriter:
             self._split()
         if self.storage.min_free_bytes and self._file.size != self._looked:
             self._look()
-        sequence = self._sequences[topic]
-        self._file.add(topic, log_time, publish_time, data, sequence % _SEQUENCE_END)
-        self._sequences[topic] = sequence + 1
+        if self._opening and self._file.first is None:
+            self._open_file(log_time)
+        self._add(topic, log_time, publish_time, data)
         if self._file.error:
             self._end(self._file.error)
         return True
+
+    def _open_file(self, log_time: int) -> None:
+        opened = list(self.opened)
+        for topic, data in self._opening:
+            self._add(topic, log_time, log_time, data)
+            opened[topic] += 1
+        self.opened = tuple(opened)
+
+    def _add(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
+        sequence = self._sequences[topic]
+        self._file.add(topic, log_time, publish_time, data, sequence % _SEQUENCE_END)
+        self._sequences[topic] = sequence + 1
 
     def flush(self) -> None:
         """Bring to the disk what was written, and look how full it is; raises as `write` does."""
@@ -239,9 +259,10 @@ class BagWriter:
 
     @property
     def kept(self) -> tuple[int, ...]:
-        """Return how many messages of each topic were taken by now and did not get lost since."""
+        """Return how many messages of each topic `write` took by now that are not lost since."""
         summary = self._summarize()
-        return tuple(map(sum, zip(summary.counts, summary.let_go, strict=True)))
+        there = zip(summary.counts, summary.let_go, self.opened, strict=True)
+        return tuple(counts + gone - opened for counts, gone, opened in there)
 
     @property
     def size(self) -> int:
@@ -309,7 +330,7 @@ class BagWriter:
             error = self._file.finish(last_records(said, summary, account))
         gone = self._lose_what_is_gone()
         error = error or gone
-        if error and not self._said:
+        if error and not self._failure:
             self._said = {FAILURE: str(self._ended_by(error))}
         summary = self._summarize()
         self._remove_gone()
