@@ -13,4 +13,4 @@
 # limitations under the License.
 
 
-"""Files, commands and graphs that mean harm."""
+"""Input that is meant to break something: files, bags, messages and calls, drawn at random."""

@@ -92,6 +92,8 @@ def report(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool =
         Which part of its run is told.
     stop
         The wish to stop.
+    trust_effects
+        Whether the modules that its scene names as effects are imported.
 
     Raises
     ------

@@ -292,7 +292,8 @@ class Section:
             part = key if key in content else key.partition('.')[0]
             if part not in content:
                 break
-            line, content, key = content.lines[part], content[part], key[len(part) + 1 :]
+            line, content = content.lines[part], content[part]
+            key = key.removeprefix(part).removeprefix('.')
         return line
 
     def _take(self, key: str, default: Any, expected: str) -> Any:

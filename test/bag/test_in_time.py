@@ -23,7 +23,7 @@ from linkage_ros.bag.reading import in_time
 from linkage_ros.bag.reading.in_time import TimeOrder
 from linkage_ros.bag.reading.reader import BagMessage, read_bag
 from linkage_ros.errors import BagError
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType, IndexType, Writer
 import pytest
 
 
@@ -135,3 +135,13 @@ def test_damage_is_met_where_it_is_and_not_before(tmp_path):
     assert 400 < len(found) <= 500
     # What lies before a start is not read.
     assert [m.log_time for m in order.messages(600)] == list(range(600, 1000))
+
+
+@pytest.mark.parametrize('options', [{}, {'index_types': IndexType.NONE}], ids=['index', 'none'])
+def test_a_bag_whose_chunks_all_overlap_does_not_fill_memory(tmp_path, monkeypatch, options):
+    write(tmp_path / 'a.mcap', [('/a', 1), ('/a', 9)] * 250, 64, CompressionType.NONE, **options)
+    order = TimeOrder(read_bag(tmp_path / 'a.mcap'))
+    assert len(list(order.messages())) == 500
+    monkeypatch.setattr('linkage_ros.bag.reading.in_time.MOST_HELD', 100_000)
+    with pytest.raises(BagError, match='more than 100,000 bytes of its messages are not in'):
+        list(order.messages())

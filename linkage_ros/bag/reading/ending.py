@@ -61,7 +61,8 @@ def ending_of(file: Path) -> Ending:
                 content = source.read(each.offset, each.length)
                 # What others say there may take seconds to understand, and tells us nothing.
                 if b'linkage_ros.' in content:
-                    record = strict(Metadata, content[HEAD.size :])
+                    head = HEAD.size
+                    record = strict(Metadata, content[head:])
                     custom = custom_of(serialized_metadata(record))
     except (DamagedError, OSError):
         pass  # to be met, and told, when the messages are read

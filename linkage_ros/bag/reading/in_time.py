@@ -41,6 +41,12 @@ from linkage_ros.errors import BagError
 WINDOW = 1_000_000_000
 """How much later than it should a message may stand in a file without an index, in [ns]."""
 
+MOST_HELD = 2**30
+"""How much may wait for its turn [bytes]: of chunks whose times overlap, or of a window."""
+
+_BESIDE = 400
+"""What a message takes in memory beside its own bytes."""
+
 _Entry = tuple[int, int, int, int, BagMessage | None]
 """Time, number of the file, place of the chunk, number in it from 1; a whole chunk has none."""
 
@@ -69,7 +75,7 @@ class TimeOrder:
     """
 
     def __init__(self, bag: Bag) -> None:
-        self._files = bag.files
+        self._files, self._path = bag.files, bag.path
         self._definitions: dict[int, Definitions] = {}
         self._chunks: list[tuple[int, _Entry]] = []  # each with its last time
         unindexed = []
@@ -101,21 +107,52 @@ class TimeOrder:
         """
         yield from merge(
             self._indexed(since),
-            _ordered(message for message in self._rest.messages() if message.log_time >= since),
+            self._ordered(
+                message for message in self._rest.messages() if message.log_time >= since
+            ),
             key=attrgetter('log_time'),
         )
 
     def _indexed(self, since: int) -> Iterator[BagMessage]:
         heap = [place for last, place in self._chunks if last >= since]
         heapify(heap)
+        held = 0
         while heap:
             _, number, place, _, message = heappop(heap)
             if message is not None:
+                held -= len(message.data) + _BESIDE
                 yield message
                 continue
             for index, found in enumerate(self._read(number, place), 1):
                 if found.log_time >= since:
+                    held = self._hold(held, found)
                     heappush(heap, (found.log_time, number, place, index, found))
+
+    def _ordered(self, messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
+        """Yield messages in the order of their times, each as soon as one is a window later."""
+        heap: list[tuple[int, int, BagMessage]] = []
+        numbers = count()
+        held = 0
+        for message in messages:
+            held = self._hold(held, message)
+            heappush(heap, (message.log_time, next(numbers), message))
+            while heap[0][0] < message.log_time - WINDOW:
+                first = heappop(heap)[2]
+                held -= len(first.data) + _BESIDE
+                yield first
+        while heap:
+            yield heappop(heap)[2]
+
+    def _hold(self, held: int, message: BagMessage) -> int:
+        """Return how much waits with one message more."""
+        held += len(message.data) + _BESIDE
+        if held > MOST_HELD:
+            raise BagError(
+                self._path,
+                f'more than {MOST_HELD:,} bytes of its messages are not in the order of time',
+                'write it anew in that order',
+            )
+        return held
 
     def _read(self, number: int, place: int) -> list[BagMessage]:
         """Return the messages of the chunk at a place of a file."""
@@ -148,15 +185,3 @@ def _index(file: Path) -> FileIndex | None:
     except DamagedError:
         return None
     return index if index.chunks and index.definitions.channels else None
-
-
-def _ordered(messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
-    """Yield messages in the order of their times, each as soon as one is a window later."""
-    heap: list[tuple[int, int, BagMessage]] = []
-    numbers = count()
-    for message in messages:
-        heappush(heap, (message.log_time, next(numbers), message))
-        while heap[0][0] < message.log_time - WINDOW:
-            yield heappop(heap)[2]
-    while heap:
-        yield heappop(heap)[2]

@@ -1,0 +1,360 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Bags that are changed at random, through the commands that look at one.
+
+Bits are flipped, files cut, records taken out, doubled, put elsewhere and into other bags, lengths
+and numbers replaced; mostly without the checksums, which would tell at once. So are the texts
+that a bag carries, with checksums that fit. A command has to end in time and within memory, with
+what it could tell or with one line. Whatever else comes of it is a finding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+import json
+from multiprocessing import get_context
+import os
+from pathlib import Path
+from random import Random
+import resource
+import signal
+from struct import Struct
+import tempfile
+from typing import Any
+
+from campaigns.damage.subject import KINDS, make
+from linkage_ros.bag.metadata import METADATA_FILE
+from linkage_ros.bag.reading.reader import RUN_FILE
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.storage import Storage
+from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.cli.main import main
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
+
+COMMANDS = {
+    'info': [],
+    'report': ['-o', 'x.html'],
+    'export': ['-o', 'x.csv'],
+    'plot': ['-o', 'x.png'],
+}
+"""What is tried on each bag, and what is typed behind its name."""
+
+_PART = 10
+"""Bags that a process takes."""
+
+_SECONDS = 60
+"""A command that takes longer has not ended. The slowest takes one, of a shared processor."""
+
+_MEMORY = 2**32
+"""Addresses that a process may have, in bytes; numpy and matplotlib take one and a half GiB."""
+
+_LONGEST_LINE = 7000
+_LINES = 4
+"""So many may go to standard error of a command that has told something."""
+
+_SIZE = 12_000
+_BEGIN = 1_700_000_000_000_000_000
+_PERIOD = 1_000_000
+_JOINT_STATE = 'sensor_msgs/msg/JointState'
+_SCENE = b"""linkage: l.yaml
+drive: {sine: {amplitude: 1.0, frequency: 2.0}}
+effects: {velocity: {}, delay: {seconds: 0.002}, bias: {joints: {rocker_joint: 0.01}}}
+"""
+_LINKAGE = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
+_HEAD = Struct('<BQ')
+_FOOTER = 37  # bytes, with the magic behind it
+_EXTREMES = (0, 1, 2**7, 2**8 - 1, 2**15, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**63, 2**64 - 1)
+_WORDS = (
+    *(b'', b'~', b'[[[[', b'{a: {b: {}}}', b'*a', b'&a [*a]', b'1e999', b'.nan', b'-1', b'\0'),
+    *(b'9' * 5000, b'x' * 50_000, b'\xff\xfe', b'\x1b[31m', '\u202e'.encode(), b'os.path: {}'),
+)
+_AT_CHECKSUM = {Opcode.CHUNK: 33, Opcode.DATA_END: 9, Opcode.FOOTER: 25}
+"""Where in a record its checksum stands; an attachment's stands at its end."""
+
+
+def attack(count: int, seed: int, jobs: int = 1) -> list[str]:
+    """
+    Try commands on bags.
+
+    Parameters
+    ----------
+    count
+        How many bags.
+    seed
+        Another seed changes them otherwise.
+    jobs
+        How many processes share them.
+
+    Returns
+    -------
+    findings : list of str
+        What must not be, a line each.
+
+    """
+    findings: list[str] = []
+    # Spawned: memory is limited there and not here. What hangs or dies takes its process alone.
+    with ProcessPoolExecutor(jobs, get_context('spawn')) as pool:
+        parts = {
+            begin: pool.submit(_part, seed, begin, min(begin + _PART, count))
+            for begin in range(0, count, _PART)
+        }
+        for begin, part in parts.items():
+            try:
+                findings += part.result(_PART * len(COMMANDS) * _SECONDS)
+            except Exception as error:  # noqa: BLE001, PERF203 (however a process may end)
+                findings.append(f'bags {seed} from {begin} on: {type(error).__name__}: {error}')
+    return findings
+
+
+def _part(seed: int, begin: int, end: int) -> list[str]:
+    """Try some of the bags, in a process of its own."""
+    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+    signal.signal(signal.SIGALRM, _late)
+    findings = []
+    with tempfile.TemporaryDirectory() as folder:
+        before = Path.cwd()
+        os.chdir(folder)
+        try:
+            for number in range(begin, end):
+                Path('bag').mkdir()
+                done = changed(Path('bag'), Random(f'{seed} {number}'))
+                for command, typed in COMMANDS.items():
+                    if wrong := judged(*ended(command, 'bag', *typed)):
+                        findings.append(f'bag {seed} {number}: {done}: {command}: {wrong}')
+                for file in Path('bag').iterdir():
+                    file.unlink()
+                Path('bag').rmdir()
+        finally:
+            os.chdir(before)
+    return findings
+
+
+class _LateError(BaseException):
+    pass
+
+
+def _late(*_: Any) -> None:
+    raise _LateError(f'not ended after {_SECONDS} s')
+
+
+def ended(*words: str) -> tuple[Any, str, str]:
+    """Return how a command ended in this process, what it printed, and what it said."""
+    out, said = StringIO(), StringIO()
+    signal.alarm(_SECONDS)
+    with redirect_stdout(out), redirect_stderr(said):
+        try:
+            code: Any = main([*words])
+        except SystemExit as error:
+            code = error.code
+        except BaseException as error:  # noqa: BLE001 (a finding, whatever it is)
+            code = f'{type(error).__name__}: {error}'
+        finally:
+            signal.alarm(0)
+    return code, out.getvalue(), said.getvalue()
+
+
+def judged(code: Any, out: str, said: str) -> str:
+    """Return what is wrong with an end, in a line; nothing where it is as it should be."""
+    # That a bag has no end is said beside what else is.
+    lines = [line for line in said.splitlines() if ': unfinished: ' not in line]
+    wrong = ''
+    if code not in (0, 1, 2):
+        wrong = f'{code}: {said.strip()}'
+    elif len(lines) > (1 if code == 2 else _LINES) or (code == 2 and not lines):
+        wrong = f'{len(lines)} lines: {said.strip()}'
+    elif not all(line.isprintable() for line in (*lines, *out.split('\n'))):
+        wrong = 'a line that is not printable'
+    elif any(len(line) > _LONGEST_LINE for line in lines):
+        wrong = f'a line of {max(map(len, lines))} letters'
+    elif code == 0 and not out:
+        wrong = 'nothing is told'
+    return wrong[:300]
+
+
+def changed(folder: Path, random: Random) -> str:
+    """Make a bag in an empty folder and change it; return in words what was done."""
+    kind = random.choice((*['of a scene'] * 6, *KINDS))
+    texts = {RUN_FILE: b'', SCENE_FILE: _SCENE, LINKAGE_FILE: _LINKAGE}
+    if kind != 'of a scene':
+        make(kind, folder / 'made', random.randrange(10**9), _SIZE)
+        for file in (folder / 'made').iterdir():
+            file.rename(folder / file.name)
+        (folder / 'made').rmdir()
+        done = []
+    elif random.random() < 0.4:
+        name = random.choice([*texts])
+        done = [f'the text of {name}']
+        _record(folder, lambda each, text: _edited(text, random) if each == name else text, random)
+    else:
+        done = []
+        _record(folder, lambda _, text: text, random)
+    metadata = folder / METADATA_FILE
+    if metadata.exists() and random.random() < 0.2:
+        metadata.write_bytes(_edited(metadata.read_bytes(), random))
+        done.append('the metadata')
+    (file,) = folder.glob('*.mcap')
+    content = file.read_bytes()
+    for _ in range(random.choice((1, 1, 2, 5)) if not done else 0):
+        change = random.choice(_CHANGES)
+        done.append(change.__name__.strip('_'))
+        content = change(content, random)
+    if random.random() < 0.7:
+        content = _without_checksums(content)
+        done.append('no checksums')
+        if random.random() < 0.4:
+            content = _without_index(content)
+            done.append('no index')
+    file.write_bytes(content)
+    return f'{kind}: {", ".join(done)}'
+
+
+def _record(folder: Path, edit: Callable[[str, bytes], bytes], random: Random) -> None:
+    """Record a short run; what its bag says of it is edited before."""
+    files = {SCENE_FILE: _SCENE, LINKAGE_FILE: _LINKAGE}
+    pipeline = Pipeline(parse_scene('attacked', 'here', files))
+    run = {
+        'scene': 'attacked',
+        'seed': 1,
+        'joint_states_topic': '/joint_states',
+        'withheld_topic': '/withheld',
+        'extra_topics': [],
+    }
+    texts = files | {RUN_FILE: json.dumps(run).encode()}
+    topics = [Topic('/joint_states', _JOINT_STATE, 'text', 'RIHS01_' + '0a' * 32)]
+    topics.append(Topic('/withheld', 'builtin_interfaces/msg/Time', 'text', ''))
+    writer = BagWriter(
+        folder / 'made',
+        topics,
+        {name: ('', edit(name, text)) for name, text in texts.items()},
+        Storage(compression=random.choice(('none', 'lz4', 'zstd'))),
+    )
+    for number in range(40):
+        stamp = _BEGIN + number * _PERIOD
+        if message := pipeline.tick(stamp).message:
+            writer.write(0, stamp, stamp, message)
+        if number % 15 == 0:
+            writer.flush()
+    writer.close({})
+    for file in (folder / 'made').iterdir():
+        file.rename(folder / file.name)
+    (folder / 'made').rmdir()
+
+
+def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield kind, beginning and end of each record, as far as they are whole."""
+    at = len(MCAP0_MAGIC)
+    while at + _HEAD.size <= len(content) - len(MCAP0_MAGIC):
+        kind, length = _HEAD.unpack_from(content, at)
+        end = at + _HEAD.size + length
+        if end > len(content):
+            return
+        yield kind, at, end
+        at = end
+
+
+def _without_checksums(content: bytes) -> bytes:
+    """Return a file in which no checksum tells that something has changed."""
+    changed = bytearray(content)
+    for kind, at, end in _records(content):
+        place = end - 4 if kind == Opcode.ATTACHMENT else at + _AT_CHECKSUM.get(kind, 0)
+        if place > at and place + 4 <= end:
+            changed[place : place + 4] = bytes(4)
+    # Where a record is broken the walk ends before it comes to the footer.
+    if len(changed) > _FOOTER:
+        changed[-12:-8] = bytes(4)
+    return bytes(changed)
+
+
+def _without_index(content: bytes) -> bytes:
+    """Return a file whose footer names no index, so that all before it is looked at."""
+    return content[:-28] + bytes(20) + content[-8:] if len(content) > _FOOTER else content
+
+
+def _some(content: bytes, random: Random) -> tuple[int, int]:
+    """Return beginning and end of some record, or of a few bytes where there is none."""
+    found = [(at, end) for _, at, end in _records(content)]
+    return random.choice(found) if found else (0, min(8, len(content)))
+
+
+def _flipped(content: bytes, random: Random) -> bytes:
+    changed = bytearray(content)
+    for _ in range(random.choice((1, 3, 30)) if changed else 0):
+        changed[random.randrange(len(changed))] ^= 1 << random.randrange(8)
+    return bytes(changed)
+
+
+def _cut(content: bytes, random: Random) -> bytes:
+    return content[: random.randrange(len(content) + 1)]
+
+
+def _spliced(content: bytes, random: Random) -> bytes:
+    """Put a record, or several, where another begins."""
+    begin, end = _some(content, random)
+    place, _ = _some(content, random)
+    return content[:place] + content[begin:end] * random.choice((1, 1, 100)) + content[place:]
+
+
+def _taken_out(content: bytes, random: Random) -> bytes:
+    begin, end = _some(content, random)
+    return content[:begin] + content[end:]
+
+
+def _swapped_lengths(content: bytes, random: Random) -> bytes:
+    (one, _), (other, _) = _some(content, random), _some(content, random)
+    changed = bytearray(content)
+    lengths = content[one + 1 : one + 9], content[other + 1 : other + 9]
+    changed[other + 1 : other + 9], changed[one + 1 : one + 9] = lengths
+    return bytes(changed)
+
+
+def _another_kind(content: bytes, random: Random) -> bytes:
+    begin, _ = _some(content, random)
+    return content[:begin] + bytes([random.randrange(256)]) + content[begin + 1 :]
+
+
+def _extreme(content: bytes, random: Random) -> bytes:
+    """Replace a number in a record, or its length, by one at the end of its range."""
+    begin, end = _some(content, random)
+    size = random.choice((2, 4, 8))
+    place = random.randrange(begin, max(begin + 1, min(end, begin + 120)))
+    number = random.choice(_EXTREMES) % 2 ** (8 * size)
+    return content[:place] + number.to_bytes(size, 'little') + content[place + size :]
+
+
+def _zeros(content: bytes, random: Random) -> bytes:
+    place, size = random.randrange(len(content) + 1), random.choice((8, 512, 4096))
+    return content[:place] + bytes(size) + content[place + size :]
+
+
+_CHANGES: tuple[Callable[[bytes, Random], bytes], ...] = (
+    *(_flipped, _cut, _spliced, _taken_out, _swapped_lengths, _another_kind, _extreme, _extreme),
+    _zeros,
+)
+
+
+def _edited(text: bytes, random: Random) -> bytes:
+    """Return a text with a part of it replaced, doubled or taken out."""
+    begin, end = sorted(random.randrange(len(text) + 1) for _ in range(2))
+    end = min(end, begin + random.choice((1, 8, 40)))
+    word = random.choice((*_WORDS, text[begin:end] * 3))
+    return text[:begin] + word + text[end:]
