@@ -69,9 +69,8 @@ class PDController(Companion):
         if self._joint not in message.name:
             return
         place = message.name.index(self._joint)
-        if place < min(
-            len(message.position), len(message.velocity)
-        ):  # an array without values is an empty one
+        # An array without values is an empty one.
+        if place < min(len(message.position), len(message.velocity)):
             self._state = message.position[place], message.velocity[place]
             self._heard = monotonic()
 
