@@ -31,6 +31,7 @@ from threading import Event
 from time import monotonic
 
 from linkage_ros.ros.companion import Companion, run_companion
+from linkage_ros.ros.simulated_time import ClockGuard
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 
@@ -61,13 +62,15 @@ class PDController(Companion):
         self._publisher = self.create_publisher(JointState, 'crank_commands', 1)
         self.create_subscription(JointState, 'joint_states', self._hear, 10)
         self.create_timer(1.0 / rate, self._command)
+        ClockGuard(self._time_source)
 
     def _hear(self, message: JointState) -> None:
         """Keep position and rate of the joint."""
         if self._joint not in message.name:
             return
         place = message.name.index(self._joint)
-        if place < len(message.velocity):  # an array without values is an empty one
+        # An array without values is an empty one.
+        if place < min(len(message.position), len(message.velocity)):
             self._state = message.position[place], message.velocity[place]
             self._heard = monotonic()
 

@@ -31,9 +31,11 @@ import subprocess
 import sys
 import time
 
+from builtin_interfaces.msg import Time
 from linkage_ros.bag.reading.reader import read_bag
 from linkage_ros.replay import recorded_scene, replay
 import pytest
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from .graph import PATIENCE, stamp_of, wait_for
@@ -223,6 +225,16 @@ def test_without_a_brake_it_falls_and_what_is_no_number_changes_nothing(
     assert same
 
 
+def test_a_controller_outlives_a_clock_that_holds_no_time(graph, control):
+    controller = control('use_sim_time:=true')
+    clock = graph.publisher(Clock, '/clock')
+    wait_for(clock.get_subscription_count, 'a subscription to /clock')
+    for _ in range(10):
+        clock.publish(Clock(clock=Time(sec=-5)))
+        time.sleep(0.05)
+    assert controller.end() == (0, ''), 'no complaint'
+
+
 def test_a_controller_without_a_joint_is_silent_and_ends_with_any_signal(graph, control):
     commands = graph.listen(JointState, '/crank_commands')
     states = graph.publisher(JointState, '/joint_states')
@@ -231,7 +243,8 @@ def test_a_controller_without_a_joint_is_silent_and_ends_with_any_signal(graph, 
     wait_for(lambda: graph.node.count_publishers('/crank_commands') == 3, 'three controllers')
     joint = JointState(name=['another'], position=[0.0], velocity=[0.0])
     positions_alone = JointState(name=['crank_joint'], position=[0.0])
-    for message in (joint, positions_alone):
+    velocities_alone = JointState(name=['crank_joint'], velocity=[0.0])
+    for message in (joint, positions_alone, velocities_alone):
         with publishing(states, lambda: message):  # noqa: B023
             wait_for(lambda: states.get_subscription_count() == 3, 'three subscribers')
             time.sleep(0.3)
