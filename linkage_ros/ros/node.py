@@ -337,7 +337,7 @@ class LinkageNode(LifecycleNode):
         period = self.get_parameter('warning_period').value
         self._warnings.look(loop.counts, loop.pipeline.closures, self.crank_topic, period)
         while self._real_time.refused:
-            self.get_logger().warning(self._real_time.refused.pop())
+            self.get_logger().warning(self._real_time.refused.pop(0))
         if loop.failure:
             self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
         if loop.recorder is not None and loop.recorder.failure is not None:
