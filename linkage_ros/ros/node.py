@@ -379,7 +379,7 @@ class LinkageNode(LifecycleNode):
             remedy = 'start the simulation, or set use_sim_time: false'
             self._warnings.say('clock', f'{no_clock(silence)}: {remedy}', period)
         while self._real_time.refused:
-            self.get_logger().warning(self._real_time.refused.pop())
+            self.get_logger().warning(self._real_time.refused.pop(0))
         listening = [line.member for line in loop.pipeline.lines if line.topic]
         # Where /clock does not come, no message has been looked for.
         assert self.scene is not None

@@ -86,7 +86,7 @@ class RealTime:
         """Return a pace that first asks for what the thread needs which runs it."""
 
         def asking(loop: TickLoop, stopping: Event) -> None:
-            self.refused.extend(self._ask())
+            self.refused += [*self._ask()]
             pace(loop, stopping)
 
         return asking if self.priority or self.processors else pace

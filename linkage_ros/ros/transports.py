@@ -29,9 +29,9 @@ import re
 
 from rclpy.utilities import get_rmw_implementation_identifier
 
-BUILTIN_TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
+_TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
 _SAID = (
-    BUILTIN_TRANSPORTS,
+    _TRANSPORTS,
     'FASTRTPS_DEFAULT_PROFILES_FILE',
     'FASTDDS_DEFAULT_PROFILES_FILE',
     'RMW_FASTRTPS_PUBLICATION_MODE',
@@ -42,7 +42,6 @@ _PROFILES = 'DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml'
 """With one of these in the working folder, too."""
 
 _SHARED = re.compile(r'/(?:fastrtps|fastdds)_port\d+$', re.MULTILINE)
-_MAPPED = Path('/proc/self/maps')
 
 
 def leave_out_shared_memory() -> None:
@@ -52,7 +51,7 @@ def leave_out_shared_memory() -> None:
     It has to be called before `rclpy.init`, and holds for this process and those that it starts.
     """
     if not (any(map(os.environ.get, _SAID)) or any(Path(name).is_file() for name in _PROFILES)):
-        os.environ[BUILTIN_TRANSPORTS] = 'UDPv4'
+        os.environ[_TRANSPORTS] = 'UDPv4'
 
 
 def standstill() -> str:
@@ -65,7 +64,7 @@ def standstill() -> str:
     if not get_rmw_implementation_identifier().startswith('rmw_fastrtps'):
         return ''
     try:
-        shared = _SHARED.search(_MAPPED.read_text())
+        shared = _SHARED.search(Path('/proc/self/maps').read_text())
     except OSError:  # not Linux
         return ''
     if shared is None:
