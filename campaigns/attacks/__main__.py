@@ -45,8 +45,8 @@ lines left out, doubled and moved; bits flipped; files cut, and encoded otherwis
 through a command that takes such a file, which has to end in time and within 4 GiB of addresses:
 with what it was asked for, or with exit code 2 and one line of at most 1,000 letters, without a
 warning of a library. `linkage scene` may say several things that are wrong, a line each. Signals
-come to commands at random instants: the command ends with exit code 1 and a line, and leaves no file but
-what it was asked for. Whatever else happens is a finding.
+come to commands at random instants: the command ends with exit code 1 and a line, and leaves no
+file but what it was asked for. Whatever else happens is a finding.
 """
 
 _Attack = Callable[[], tuple[dict[str, int], list[str]]]

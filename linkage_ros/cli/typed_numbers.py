@@ -25,7 +25,7 @@ from pathlib import Path
 from linkage_ros.errors import FileError, quoted
 from linkage_ros.regular_file import read_regular
 
-_MOST = 100_000
+_MOST = 1000
 _LARGEST_FILE = 10_000_000
 
 

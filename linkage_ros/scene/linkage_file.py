@@ -37,6 +37,9 @@ from linkage_ros.kinematics.linkage import (
 from linkage_ros.scene.section import Section
 
 _KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose', 'masses')
+_MOST_LINKS, _MOST_POINTS = 400, 10_000
+"""More links than these, and points of all links, are no machine's; a check takes seconds then."""
+
 _FARTHEST = 1e9
 """Coordinates beyond this, in [m], are no machine's; below it no square overflows."""
 
@@ -77,10 +80,17 @@ def read_linkage(content: Section) -> Linkage:
 
 def _linkage(content: Section) -> Linkage:
     links = content.section('links')
+    _bound(content, links, 'links', _MOST_LINKS)
     points = {}
     for name in links:
         link = links.section(name)
         points[name] = {point: link.point(point, most=_FARTHEST) for point in link}
+
+    count = sum(map(len, points.values()))
+    if count > _MOST_POINTS:
+        raise content.error(
+            'links', f'have {count} points', f'write at most {_MOST_POINTS} points'
+        )
 
     inputs = tuple(_input(driven) for driven in content.sections('input'))
 
@@ -91,6 +101,8 @@ def _linkage(content: Section) -> Linkage:
 
     sliders = content.section('sliders', required=False)
     joints = content.section('joints')
+    _bound(content, sliders, 'sliders', _MOST_LINKS)
+    _bound(content, joints, 'joints', _MOST_LINKS)
     if not list(joints):
         raise content.error('joints', 'publishes nothing', 'name a joint')
     for driven in inputs:
@@ -106,6 +118,12 @@ def _linkage(content: Section) -> Linkage:
         _pose(content.section('pose')) if 'pose' in content else None,
         _masses(content.section('masses', required=False), tuple(points)),
     )
+
+
+def _bound(content: Section, named: Section, key: str, most: int) -> None:
+    count = len(named.mapping)
+    if count > most:
+        raise content.error(key, f'there are {count}', f'write at most {most}')
 
 
 def _input(content: Section) -> Input:

@@ -46,6 +46,9 @@ SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
 LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
 """Ticks a second, in [Hz]: of these the higher is what a core was measured to hold."""
 
+_MOST_LINKAGES = 400
+"""A hundred take a core at 1 kHz."""
+
 Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
 
@@ -212,7 +215,12 @@ def _scene(
     if 'linkages' in content:
         if 'linkage' in content:
             raise content.error('linkage', 'stands beside linkages', 'write one of the two')
-        for entry in content.sections('linkages'):
+        entries = content.sections('linkages')
+        if len(entries) > _MOST_LINKAGES:
+            raise content.error(
+                'linkages', f'there are {len(entries)}', f'write at most {_MOST_LINKAGES}'
+            )
+        for entry in entries:
             linkage_content, data = open_linkage(entry)
             files[f'linkage_{len(files)}.yaml'] = data
             own = entry.ros_name(entry.text('name'))
