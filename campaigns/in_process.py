@@ -19,41 +19,74 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 import io
+import os
+from pathlib import Path
+import resource
 import signal
+import tempfile
 import traceback
-from typing import Any
+from typing import Any, NamedTuple
 from unittest import mock
 
 from linkage_ros.cli import main as command_line
 from linkage_ros.stop import Stop
+
+MEMORY = 2**32
+"""Addresses that a process may have, in bytes; numpy and matplotlib take one and a half GiB."""
 
 
 class _TooLongError(BaseException):
     """No `Exception`: nothing that a command catches."""
 
 
-def in_process(arguments: list[str], seconds: float) -> tuple[Any, str]:
+class Ended(NamedTuple):
     """
-    Run ``linkage``.
+    How a command ended.
 
-    Returns
-    -------
-    code : int or str
+    Attributes
+    ----------
+    code
         Its exit code, or how else it ended: 'no end' or 'traceback'.
-    said : str
+    said
         What it said on standard error, or in place of it where and how it ended.
+    shown
+        What it said on standard output.
 
     """
+
+    code: Any
+    said: str
+    shown: str
+
+
+def in_process(arguments: list[str], seconds: float) -> Ended:
+    """Run ``linkage``, for at most a time in [s]."""
     said, shown = io.StringIO(), io.StringIO()
     try:
         with redirect_stdout(shown), redirect_stderr(said), _bounded(seconds):
-            return command_line.main(arguments), said.getvalue()
+            return Ended(command_line.main(arguments), said.getvalue(), shown.getvalue())
     except _TooLongError:
-        return 'no end', f'more than {seconds} s ({_place(traceback.format_exc())})'
+        late = f'more than {seconds} s ({_place(traceback.format_exc())})'
+        return Ended('no end', late, shown.getvalue())
     except SystemExit as stopped:
-        return stopped.code, said.getvalue()
+        return Ended(stopped.code, said.getvalue(), shown.getvalue())
     except Exception:  # noqa: BLE001 - whatever it is, a user would see it
-        return 'traceback', _place(traceback.format_exc())
+        return Ended('traceback', _place(traceback.format_exc()), shown.getvalue())
+
+
+@contextmanager
+def confined() -> Iterator[Path]:
+    """Work in a new folder, which is removed after it, and with no more than `MEMORY`."""
+    before = Path.cwd()
+    most, hard = resource.getrlimit(resource.RLIMIT_AS)
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, hard))
+        try:
+            yield Path(folder)
+        finally:
+            resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+            os.chdir(before)
 
 
 def _place(text: str) -> str:

@@ -24,14 +24,12 @@ import argparse
 from collections.abc import Callable
 from datetime import datetime
 from functools import partial
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 import sys
 import time
 
 from bench.report import say, show, Table
-from campaigns.attacks import files, signals
+from campaigns.attacks import bags, files, graph, signals
 from campaigns.page import load, write_page
 from linkage_ros.accuracy.machine import describe_machine
 
@@ -44,9 +42,12 @@ is none; keys and values by others, by other types and by words that mean someth
 lines left out, doubled and moved; bits flipped; files cut, and encoded otherwise. Each goes
 through a command that takes such a file, which has to end in time and within 4 GiB of addresses:
 with what it was asked for, or with exit code 2 and one line of at most 1,000 letters, without a
-warning of a library. `linkage scene` may say several things that are wrong, a line each. Signals
-come to commands at random instants: the command ends with exit code 1 and a line, and leaves no
-file but what it was asked for. Whatever else happens is a finding.
+warning of a library. `linkage scene` may say several things that are wrong, a line each. Bags have
+bits flipped, records taken out, doubled and moved, lengths and texts replaced, and go through the
+commands that look at one, likewise. Signals come to commands at random instants: the command ends
+with exit code 1 and a line, and leaves no file but what it was asked for. A node gets floods of
+messages, good and bad, small and of megabytes, and storms of calls: it goes on, and accounts for
+every message. Whatever else happens is a finding.
 """
 
 _Attack = Callable[[], tuple[dict[str, int], list[str]]]
@@ -66,12 +67,10 @@ def main() -> int:
     began, begin = time.monotonic(), datetime.now().astimezone()
     attacks: dict[str, _Attack] = {
         'Files': partial(files.attack, given.files, given.seed, given.jobs),
+        'Bags': partial(bags.attack, given.bags, given.seed, given.jobs),
         'Signals': partial(signals.attack, given.signals, given.seed),
+        'Graph': partial(graph.attack, given.seconds, given.seed),
     }
-    for name, share in (('bags', given.bags), ('graph', given.seconds)):
-        if find_spec(f'campaigns.attacks.{name}') is not None:
-            module = import_module(f'campaigns.attacks.{name}')
-            attacks[name.capitalize()] = partial(module.attack, share, given.seed)
     tables, all_found = [], []
     for name, attack in attacks.items():
         tried, findings = attack()

@@ -24,28 +24,21 @@ what it could tell or with one line. Whatever else comes of it is a finding.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
 import json
-from multiprocessing import get_context
-import os
 from pathlib import Path
 from random import Random
-import resource
-import signal
 from struct import Struct
-import tempfile
-from typing import Any
 
 from campaigns.damage.subject import KINDS, make
+from campaigns.in_process import confined, Ended, in_process
+from campaigns.processes import results_of
 from linkage_ros.bag.metadata import METADATA_FILE
 from linkage_ros.bag.reading.reader import RUN_FILE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.storage import Storage
 from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cli.main import main
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from mcap.opcode import Opcode
@@ -64,9 +57,6 @@ _PART = 10
 
 _SECONDS = 60
 """A command that takes longer has not ended. The slowest takes one, of a shared processor."""
-
-_MEMORY = 2**32
-"""Addresses that a process may have, in bytes; numpy and matplotlib take one and a half GiB."""
 
 _LONGEST_LINE = 7000
 _LINES = 4
@@ -92,7 +82,7 @@ _AT_CHECKSUM = {Opcode.CHUNK: 33, Opcode.DATA_END: 9, Opcode.FOOTER: 25}
 """Where in a record its checksum stands; an attachment's stands at its end."""
 
 
-def attack(count: int, seed: int, jobs: int = 1) -> list[str]:
+def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[str]]:
     """
     Try commands on bags.
 
@@ -107,74 +97,42 @@ def attack(count: int, seed: int, jobs: int = 1) -> list[str]:
 
     Returns
     -------
-    findings : list of str
+    tried : dict
+        By command and how it ended how often it did.
+    findings : list
         What must not be, a line each.
 
     """
+    parts = [(seed, begin, min(begin + _PART, count)) for begin in range(0, count, _PART)]
+    tried: Counter[str] = Counter()
     findings: list[str] = []
-    # Spawned: memory is limited there and not here. What hangs or dies takes its process alone.
-    with ProcessPoolExecutor(jobs, get_context('spawn')) as pool:
-        parts = {
-            begin: pool.submit(_part, seed, begin, min(begin + _PART, count))
-            for begin in range(0, count, _PART)
-        }
-        for begin, part in parts.items():
-            try:
-                findings += part.result(_PART * len(COMMANDS) * _SECONDS)
-            except Exception as error:  # noqa: BLE001, PERF203 (however a process may end)
-                findings.append(f'bags {seed} from {begin} on: {type(error).__name__}: {error}')
-    return findings
+    for some, found in results_of(_part, parts, jobs):
+        tried += some
+        findings += found
+    return dict(sorted(tried.items())), findings
 
 
-def _part(seed: int, begin: int, end: int) -> list[str]:
-    """Try some of the bags, in a process of its own."""
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
-    signal.signal(signal.SIGALRM, _late)
-    findings = []
-    with tempfile.TemporaryDirectory() as folder:
-        before = Path.cwd()
-        os.chdir(folder)
-        try:
-            for number in range(begin, end):
-                Path('bag').mkdir()
-                done = changed(Path('bag'), Random(f'{seed} {number}'))
-                for command, typed in COMMANDS.items():
-                    if wrong := judged(*ended(command, 'bag', *typed)):
-                        findings.append(f'bag {seed} {number}: {done}: {command}: {wrong}')
-                for file in Path('bag').iterdir():
-                    file.unlink()
-                Path('bag').rmdir()
-        finally:
-            os.chdir(before)
-    return findings
+def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
+    seed, begin, end = part
+    tried, findings = Counter[str](), []
+    with confined():
+        for number in range(begin, end):
+            Path('bag').mkdir()
+            done = changed(Path('bag'), Random(f'{seed} {number}'))
+            for command, typed in COMMANDS.items():
+                ended = in_process([command, 'bag', *typed], _SECONDS)
+                tried[f'{command}: {ended.code}'] += 1
+                if wrong := judged(ended):
+                    findings.append(f'bag {seed} {number}: {done}: {command}: {wrong}')
+            for file in Path('bag').iterdir():
+                file.unlink()
+            Path('bag').rmdir()
+    return tried, findings
 
 
-class _LateError(BaseException):
-    pass
-
-
-def _late(*_: Any) -> None:
-    raise _LateError(f'not ended after {_SECONDS} s')
-
-
-def ended(*words: str) -> tuple[Any, str, str]:
-    """Return how a command ended in this process, what it printed, and what it said."""
-    out, said = StringIO(), StringIO()
-    signal.alarm(_SECONDS)
-    with redirect_stdout(out), redirect_stderr(said):
-        try:
-            code: Any = main([*words])
-        except SystemExit as error:
-            code = error.code
-        except BaseException as error:  # noqa: BLE001 (a finding, whatever it is)
-            code = f'{type(error).__name__}: {error}'
-        finally:
-            signal.alarm(0)
-    return code, out.getvalue(), said.getvalue()
-
-
-def judged(code: Any, out: str, said: str) -> str:
+def judged(ended: Ended) -> str:
     """Return what is wrong with an end, in a line; nothing where it is as it should be."""
+    code, said, out = ended
     # That a bag has no end is said beside what else is.
     lines = [line for line in said.splitlines() if ': unfinished: ' not in line]
     wrong = ''

@@ -22,16 +22,13 @@ line that is no longer than a screen. Whatever else comes of it is a finding.
 from __future__ import annotations
 
 from collections import Counter
-import os
 from pathlib import Path
 import random
-import resource
-import tempfile
 from typing import Any
 import warnings
 
 from campaigns.attacks.mutations import mutated
-from campaigns.in_process import in_process
+from campaigns.in_process import confined, in_process
 from campaigns.processes import results_of
 from linkage_ros.shipped import shipped
 
@@ -40,9 +37,6 @@ _PART = 50
 
 _SECONDS = 60.0
 """A command that takes longer has not ended. The slowest takes seconds, of a shared processor."""
-
-_MEMORY = 2**32
-"""Addresses that a process may have, in bytes; numpy and matplotlib take one and a half GiB."""
 
 _LONGEST_LINE = 1000
 
@@ -94,23 +88,15 @@ def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[s
 
 def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
     seed, begin, end = part
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    before, tried, findings = Path.cwd(), Counter[str](), []
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+    tried, findings = Counter[str](), []
+    with warnings.catch_warnings(), confined() as folder:
         warnings.simplefilter('default')
-        limit = resource.getrlimit(resource.RLIMIT_AS)
-        os.chdir(folder)
-        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, hard))
-        try:
-            originals = _originals(Path(folder))
-            for number in range(begin, end):
-                how, finding = _try(originals, f'{seed} {number}')
-                tried[how] += 1
-                if finding:
-                    findings.append(f'file {seed} {number}: {finding}')
-        finally:
-            resource.setrlimit(resource.RLIMIT_AS, limit)
-            os.chdir(before)
+        originals = _originals(folder)
+        for number in range(begin, end):
+            how, finding = _try(originals, f'{seed} {number}')
+            tried[how] += 1
+            if finding:
+                findings.append(f'file {seed} {number}: {finding}')
     return tried, findings
 
 
@@ -154,7 +140,7 @@ def _try(originals: dict[str, dict[str, bytes]], seed: str) -> tuple[str, str]:
         case _:
             command, arguments = 'synthesize', ['synthesize', f'--{name}', str(file)]
             arguments += ['--candidates', '200']
-    code, said = in_process(arguments, _SECONDS)
+    code, said, _ = in_process(arguments, _SECONDS)
     wrong = judged(command, code, said)
     return f'{command}: {code}', wrong and f'{name}: {done}: {" ".join(arguments)}: {wrong}'
 

@@ -67,9 +67,9 @@ _CLOSING = re.compile(
 )
 
 
-def attack(seconds: float, seed: int, tried: Counter[str] | None = None) -> list[str]:
+def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
     """
-    Attack a node; return what must not be, which is nothing.
+    Attack a node.
 
     Parameters
     ----------
@@ -77,11 +77,15 @@ def attack(seconds: float, seed: int, tried: Counter[str] | None = None) -> list
         How long floods and storms last together, in [s].
     seed
         Of all that is drawn.
-    tried
-        Takes how much of what was tried.
+
+    Returns
+    -------
+    tried : dict
+        How much of what was tried.
+    findings : list
+        What must not be, a line each.
 
     """
-    tried = Counter() if tried is None else tried
     with TemporaryDirectory(prefix='linkage_ros_attack_') as name:
         folder = Path(name)
         linkage = shipped('linkages/four_bar.yaml')
@@ -99,11 +103,10 @@ def attack(seconds: float, seed: int, tried: Counter[str] | None = None) -> list
                 node.check()
             node.check_end()
         except BenchError as error:
-            return [str(error)]
+            return {}, [str(error)]
         log = (folder / 'linkage_node.log').read_text(errors='replace')
     findings = outcome['findings'] + _judged(log, outcome['tried'])
-    tried.update(outcome['tried'])
-    return findings
+    return outcome['tried'], findings
 
 
 def _judged(log: str, tried: dict[str, int]) -> list[str]:

@@ -60,7 +60,7 @@ def judge_command(command: str, linkage: Linkage, findings: Findings, closes: bo
             arguments += ['-o', str(Path(folder) / 'page')]
         if output:
             arguments += ['-o', str(Path(folder) / f'out.{output}')]
-        code, said = in_process(arguments, _SECONDS)
+        code, said, _ = in_process(arguments, _SECONDS)
     said = said.replace(folder, '')
     if code == 0:
         findings.counts[f'{command}: done'] += 1

@@ -21,6 +21,7 @@ from pathlib import Path
 from random import Random
 
 from campaigns.attacks.bags import attack, changed, COMMANDS, judged
+from campaigns.in_process import Ended
 import pytest
 
 SEED = 20261123
@@ -30,7 +31,9 @@ SAMPLE = 20
 
 
 def test_changed_bags_are_told_in_time_and_within_memory() -> None:
-    assert attack(SAMPLE, SEED) == []
+    tried, findings = attack(SAMPLE, SEED)
+    assert findings == []
+    assert sum(tried.values()) == SAMPLE * len(COMMANDS)
 
 
 def test_the_same_seed_changes_a_bag_alike(tmp_path: Path) -> None:
@@ -54,12 +57,13 @@ def test_the_same_seed_changes_a_bag_alike(tmp_path: Path) -> None:
         ((0, '', ''), 'nothing is told'),
         ((0, 'a\x1b[0m', ''), 'not printable'),
         ((2, '', 'x' * 331_000), 'a line of 331000 letters'),
-        (('MemoryError: ', '', ''), 'MemoryError'),
-        (('_LateError: not ended after 60 s', '', ''), 'not ended'),
+        (('traceback', '', 'MemoryError'), 'MemoryError'),
+        (('no end', '', 'more than 60 s'), 'more than 60 s'),
     ],
 )
 def test_what_must_not_be_is_a_finding(end: tuple[object, str, str], wrong: str) -> None:
-    found = judged(*end)
+    code, shown, said = end
+    found = judged(Ended(code, said, shown))
     assert wrong in found
     assert bool(found) == bool(wrong)
 
