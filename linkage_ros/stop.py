@@ -76,7 +76,7 @@ class Stop(Event):
         """Return whether there is the wish."""
         return self._wished
 
-    def set(self) -> None:
+    def set(self) -> None:  # noqa: A003 (an event has it)
         """Wish it; from a handler of signals too."""
         self._wished = True
         self._wakes.put(None)

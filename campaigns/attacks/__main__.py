@@ -56,10 +56,10 @@ _Attack = Callable[[], tuple[dict[str, int], list[str]]]
 def main() -> int:
     """Attack; 1 where anything is found."""
     parser = argparse.ArgumentParser('python -m campaigns.attacks', description=__doc__)
-    parser.add_argument('--files', type=int, default=30_000, help='changed files')
-    parser.add_argument('--signals', type=int, default=300, help='commands that get a signal')
-    parser.add_argument('--bags', type=int, default=2000, help='hostile bags')
-    parser.add_argument('--seconds', type=float, default=120.0, help='of storms on the graph')
+    parser.add_argument('--files', type=int, default=3000, help='changed files')
+    parser.add_argument('--signals', type=int, default=60, help='commands that get a signal')
+    parser.add_argument('--bags', type=int, default=300, help='hostile bags')
+    parser.add_argument('--seconds', type=float, default=60.0, help='of storms on the graph')
     parser.add_argument('--jobs', type=int, default=2, help='processes that share the files')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--write', action='store_true', help=f'keep the outcome in {PAGE}')

@@ -106,7 +106,8 @@ def test_ticks_come_at_the_rate_of_the_scene_up_to_a_thousand(run, rate, ticked_
 def test_a_run_without_a_flush_goes_on_until_there_is_one(run):
     found = run(500, Storage(flush_period=0.25), 0.2)
     assert found.flushes
-    assert found.seconds >= 0.225
+    # The flush begins 0.225 s after its writer, which begins before the first tick.
+    assert found.seconds > 0.21
 
 
 def test_without_a_bag_there_are_ticks_only(run, tmp_path):

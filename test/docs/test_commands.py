@@ -38,7 +38,7 @@ NOT_RUN = {
     'builds .venv, and runs all tests': 1,
     'installs from a package index': 1,
     'needs RViz': 1,
-    'needs a ROS installation': 9,
+    'needs a ROS installation': 12,
     'needs rosdep and a ROS installation': 1,
     'needs the ros2 command line': 2,
 }

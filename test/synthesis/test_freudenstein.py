@@ -278,7 +278,7 @@ REFUSED: dict[str, tuple[Angles, Angles, str]] = {
     'no number': (
         (25, nan, 50),
         (30, 40, 60),
-        'pair 2: nan° → 40° is no pair of angles; write two numbers',
+        'pair 2: nan° → 40° is no pair of angles; write two numbers of at most 6e+10°',
     ),
     'mirrored': (
         (25, -25, 50),
