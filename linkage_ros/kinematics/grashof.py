@@ -84,17 +84,17 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     a, b, c, d
         Lengths of input, coupler, output and frame, above 0.
 
-    Raises
-    ------
-    ValueError
-        Where one is longer than the others together, so that the loop does not close.
+    Returns
+    -------
+    type : FourBarType
+        Without a code where one is longer than the others together: there is no loop.
 
     """
     sides = (a, b, c, d)
     shortest, p, q, longest = sorted(sides)
-    if fsum((shortest, p, q, -longest)) < 0.0 and margin(shortest, p, q, -longest):
-        raise ValueError(f'{longest!r} is longer than {shortest!r}, {p!r} and {q!r} together')
     excess = margin(p, q, -shortest, -longest)
+    if fsum((shortest, p, q, -longest)) < 0.0 and margin(shortest, p, q, -longest):
+        return FourBarType('', 'no loop (one link is longer than the others together)', excess)
     if excess > 0.0:
         return FourBarType(*_GRASHOF[sides.index(shortest)], excess)
     if excess < 0.0:

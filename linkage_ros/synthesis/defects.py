@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from cmath import phase
 from collections.abc import Iterable
-from math import degrees, nan, pi, remainder, tau
+from math import degrees, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.kinematics.grashof import four_bar_type, FourBarType
@@ -121,15 +121,8 @@ def assess(design: Design) -> Assessment:
     if found.turns:
         full = float(least_transmission(lengths, np.array(0.0), np.array(pi))[0])
     ratio = max(four_bar.lengths) / min(four_bar.lengths)
-    kind = _kind(four_bar.lengths)
+    kind = four_bar_type(*four_bar.lengths)
     return Assessment(met, kind, bool(found.turns), defects, travel, least, at, full, ratio)
-
-
-def _kind(lengths: tuple[float, float, float, float]) -> FourBarType:
-    try:
-        return four_bar_type(*lengths)
-    except ValueError:
-        return FourBarType('', 'no loop (one link is longer than the others together)', nan)
 
 
 def _defects(design: Design, met: tuple[Met, ...], found: Course) -> tuple[Defect, ...]:

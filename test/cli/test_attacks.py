@@ -29,6 +29,7 @@ LONG = 'x' * 300_000
 ANSWERED = [
     # file, its content, and what is typed before it
     *[(f'{ATTACKS}/never.yaml', '', command) for command in ('check', 'mjcf', 'scene')],
+    *[(f'{ATTACKS}/no_loop.yaml', '', command) for command in ('check', 'mjcf', 'scene')],
     *[(f'{ATTACKS}/bad_16917_mjcf.yaml', '', command) for command in ('check', 'mjcf', 'urdf')],
     *[('tiny.yaml', TINY, command) for command in ('check', 'solve', 'urdf', 'mjcf', 'scene')],
 ]

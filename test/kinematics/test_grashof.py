@@ -81,8 +81,10 @@ def test_the_margin_says_how_far_it_is_from_a_change_point() -> None:
 
 
 def test_what_does_not_close_has_no_name() -> None:
-    with pytest.raises(ValueError, match=r'7\.0 is longer'):
-        four_bar_type(1.0, 2.0, 3.0, 7.0)
+    no_loop = four_bar_type(1.0, 2.0, 3.0, 7.0)
+    assert no_loop.code == ''
+    assert no_loop.name.startswith('no loop')
+    assert no_loop.margin == -3.0
     assert four_bar_type(1.0, 2.0, 3.0, 6.0).code == 'RRR1'  # closes in one place, flat
 
 
