@@ -174,7 +174,10 @@ def test_messages_of_other_joints_are_ignored_and_counted_apart(rig, kind):
     status = rig.graph.status('crank')
     assert (status.level, status.message) == (OK, 'Samples arriving')
     assert rig.rejected() == before
-    assert len(warnings(rig)) == warned
+    # One of what was sent before may still come: they are throttled.
+    assert not [
+        line for line in warnings(rig)[warned:] if 'missing' in line or 'none with' in line
+    ]
     rig.hold(0.6)
 
 

@@ -57,7 +57,12 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
         newest_stamp=0,
     )
     loop = SimpleNamespace(
-        counts=counts, pipeline=pipeline, newest_stamp=0, recorder=None, injection=None
+        counts=counts,
+        pipeline=pipeline,
+        newest_stamp=0,
+        missed=0,
+        recorder=None,
+        injection=None,
     )
     health = Health(
         'node', 'scene', 0.0, 0, '/crank', (),
