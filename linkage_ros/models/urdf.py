@@ -243,7 +243,10 @@ def _start(robot: ET.Element, model: _Model, computed: Mapping[str, Mapping[str,
     inputs = usual_inputs(closure)
     given = zip(closure.linkage.inputs, inputs, strict=True)
     values = {driven.joint: value for driven, value in given}
-    values |= dict(zip(closure.linkage.joints, closure.position(*inputs).joints, strict=True))
+    position = closure.position(*inputs)
+    if not position.joints:
+        return  # of several inputs: it closes nowhere
+    values |= dict(zip(closure.linkage.joints, position.joints, strict=True))
     element = ET.SubElement(robot, 'linkage_start')
     for name in named_joints(closure.linkage):
         kind = 'input' if name in [each.joint for each in closure.linkage.inputs] else 'joint'

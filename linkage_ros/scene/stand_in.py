@@ -97,8 +97,9 @@ def _start(closure: Closure) -> tuple[float, InputRange]:
     way, pose = Way(closure), closure.linkage.pose
     if pose is None or pose.points:
         (start,) = usual_inputs(closure)
-        interval = way.range_about(start)
-        assert interval is not None, 'what is usual lies in a range'
+        # Of a range as narrow as the rounding of its values the usual one may lie beside it.
+        interval = way.range_about(start) or way.widest_range
+        assert interval is not None, 'reading the file has proved that it closes somewhere'
         return start, interval
     (start,) = pose.inputs
     near = _SAME * (1.0 if way.turning else closure.scale)

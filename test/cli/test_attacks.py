@@ -30,6 +30,8 @@ ANSWERED = [
     # file, its content, and what is typed before it
     *[(f'{ATTACKS}/never.yaml', '', command) for command in ('check', 'mjcf', 'scene')],
     *[(f'{ATTACKS}/no_loop.yaml', '', command) for command in ('check', 'mjcf', 'scene')],
+    (f'{ATTACKS}/two_inputs_closed_nowhere.yaml', '', 'urdf'),
+    (f'{ATTACKS}/range_of_rounding.yaml', '', 'scene'),
     *[(f'{ATTACKS}/bad_16917_mjcf.yaml', '', command) for command in ('check', 'mjcf', 'urdf')],
     *[('tiny.yaml', TINY, command) for command in ('check', 'solve', 'urdf', 'mjcf', 'scene')],
 ]
@@ -49,6 +51,7 @@ REFUSED = [
     (f'{LONG}: 1\n', 'scene', 'is not valid YAML'),
     (f'linkage: {LONG}\n', 'scene', 'is not a file'),
     (f'{LONG}\n', 'check', 'holds'),
+    ((ATTACKS / 'pins_in_one_place.yaml').read_text(), 'check', 'has two pins in one place'),
 ]
 
 
