@@ -39,7 +39,7 @@ help:
 	@echo 'make damage    cut a bag at every byte, flip every bit of it, into docs/recordings (30 min)'
 	@echo 'make kills     kill recordings at 1,400 instants, into docs/recordings (10 min)'
 	@echo 'make disk      let every call of a recording fail, disks fill and stall (10 min)'
-	@echo 'make attacks   send what is hostile through everything, into docs/recordings (2 h)'
+	@echo 'make attacks   send what is hostile through everything, into docs/recordings (5 min)'
 	@echo 'make endurance run 24 h in minutes and 10 min over DDS, into docs/recordings (25 min)'
 	@echo 'make gallery   draw the linkages that come with the package'
 	@echo 'make schema    write the JSON Schemas of scene and linkage files'

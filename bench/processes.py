@@ -109,9 +109,9 @@ class Process:
             if pipe is not None:
                 pipe.close()
 
-    def check_end(self) -> None:
-        """Raise where it has ended otherwise than well."""
-        if self._popen.returncode:
+    def check_end(self, *well: int) -> None:
+        """Raise where it has ended otherwise than well: with 0, or another code that is given."""
+        if self._popen.returncode not in (0, *well):
             raise BenchError(
                 f'{self.name}: ended with {self._popen.returncode}{self._last_words()}'
             )

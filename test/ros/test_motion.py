@@ -154,7 +154,9 @@ def test_half_of_two_inputs_is_not_used(graph, write_scene, start, publisher, mo
         return 'none with left_crank, right_crank' in node.log
 
     wait_for(told, 'the warning')
-    assert int(graph.value('crank', 'Messages without the crank')) > 0
+    wait_for(
+        lambda: int(graph.value('crank', 'Messages without the crank') or 0) > 0, 'the diagnostics'
+    )
     assert motions == []
     assert node.end() == 0
 
