@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 import multiprocessing
 from typing import TypeVar
@@ -32,3 +33,41 @@ def results_of(do: Callable[[Part], Result], work: Sequence[Part], jobs: int) ->
     # Spawned, not forked: whoever calls may have threads.
     with multiprocessing.get_context('spawn').Pool(jobs) as pool:
         yield from pool.imap_unordered(do, work)
+
+
+def tried_in_parts(
+    do: Callable[[tuple[int, int, int]], tuple[Counter[str], list[str]]],
+    count: int,
+    seed: int,
+    part: int,
+    jobs: int,
+) -> tuple[dict[str, int], list[str]]:
+    """
+    Try so many things, each known by a seed and its number.
+
+    Parameters
+    ----------
+    do
+        Tries those of a seed from a number to another; returns what it tried, and its findings.
+    count, seed
+        How many, and of which seed.
+    part
+        How many a process takes before it tells.
+    jobs
+        How many processes share them.
+
+    Returns
+    -------
+    tried : dict
+        How often what was tried.
+    findings : list
+        What must not be, a line each.
+
+    """
+    parts = [(seed, begin, min(begin + part, count)) for begin in range(0, count, part)]
+    tried: Counter[str] = Counter()
+    findings: list[str] = []
+    for some, found in results_of(do, parts, jobs):
+        tried += some
+        findings += found
+    return dict(sorted(tried.items())), findings

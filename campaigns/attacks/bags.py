@@ -33,7 +33,7 @@ from struct import Struct
 
 from campaigns.damage.subject import KINDS, make
 from campaigns.in_process import confined, Ended, in_process
-from campaigns.processes import results_of
+from campaigns.processes import tried_in_parts
 from linkage_ros.bag.metadata import METADATA_FILE
 from linkage_ros.bag.reading.reader import RUN_FILE
 from linkage_ros.bag.topic import Topic
@@ -103,13 +103,7 @@ def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[s
         What must not be, a line each.
 
     """
-    parts = [(seed, begin, min(begin + _PART, count)) for begin in range(0, count, _PART)]
-    tried: Counter[str] = Counter()
-    findings: list[str] = []
-    for some, found in results_of(_part, parts, jobs):
-        tried += some
-        findings += found
-    return dict(sorted(tried.items())), findings
+    return tried_in_parts(_part, count, seed, _PART, jobs)
 
 
 def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:

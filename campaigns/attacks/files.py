@@ -29,7 +29,7 @@ import warnings
 
 from campaigns.attacks.mutations import mutated
 from campaigns.in_process import confined, in_process
-from campaigns.processes import results_of
+from campaigns.processes import tried_in_parts
 from linkage_ros.shipped import shipped
 
 _PART = 50
@@ -77,13 +77,7 @@ def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[s
         What must not be, a line each.
 
     """
-    parts = [(seed, begin, min(begin + _PART, count)) for begin in range(0, count, _PART)]
-    tried: Counter[str] = Counter()
-    findings: list[str] = []
-    for some, found in results_of(_part, parts, jobs):
-        tried += some
-        findings += found
-    return dict(sorted(tried.items())), findings
+    return tried_in_parts(_part, count, seed, _PART, jobs)
 
 
 def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
