@@ -142,11 +142,6 @@ class LinkageNode(LifecycleNode):
         """Return the resolved name of the topic that the drives listen to; '' for none."""
         return self._scene_topics.crank_topic
 
-    @property
-    def _cranks(self) -> str:
-        assert self.scene is not None
-        return ', '.join(joint for member in self.scene.members for joint in member.inputs)
-
     # Transitions.
 
     @_reporting
@@ -193,11 +188,12 @@ class LinkageNode(LifecycleNode):
         for line in self._middleware.values():
             self.get_logger().info(line)
         rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
+        cranks = ', '.join(joint for member in self.scene.members for joint in member.inputs)
         drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))
         source = f'from {self.crank_topic}' if self.crank_topic else f'driven by {drives}'
         to = [each.topic_name for each in (self._joint_states, *self._scene_topics.extras)]
         self.get_logger().info(
-            f'{self.scene.name}: ticking {rate}; crank {self._cranks} {source}; '
+            f'{self.scene.name}: ticking {rate}; crank {cranks} {source}; '
             f'{", ".join(self.scene.joints)} to {" and ".join(to)}'
         )
         return TransitionCallbackReturn.SUCCESS
