@@ -57,7 +57,7 @@ def pose_alone(closure: Closure, number: int, *inputs: float) -> Callable[..., P
             state.coordinates.extend([0.0] * (coordinates - len(state.coordinates)))
             state.pins.extend([0j] * (pins - len(state.pins)))
             found = close(state)
-            if not found[0].has_pose:
+            if not found.status.has_pose:
                 break
         return found
 

@@ -27,6 +27,7 @@ from functools import cached_property
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import quoted
+from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.cylinder import without_mirrored, zero_length
 from linkage_ros.kinematics.groups import find_groups
@@ -44,14 +45,11 @@ from linkage_ros.kinematics.solution import Planner
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import Pose, State
 from linkage_ros.kinematics.structure import Structure
-from linkage_ros.tuples import new
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch.solve import Batch, Solver
     from linkage_ros.kinematics.follower import Follower
     from numpy.typing import ArrayLike
-
-_CLOSED = Status.CLOSED
 
 
 class Position(NamedTuple):
@@ -172,9 +170,6 @@ class Closure:
         self.steps = steps
         needed = len(steps)
         self._more_steps = tuple(planner.steps[needed:])
-        self._closing = tuple(step.close for step in steps)
-        self._rating = tuple(step.rates for step in steps)
-        self._accelerating = tuple(step.accelerations for step in steps)
         self._driven = len(linkage.inputs)
         factors = [1.0 / self.scale if given.slider else 1.0 for given in linkage.inputs]
         self._factors = None if set(factors) == {1.0} else factors
@@ -209,22 +204,22 @@ class Closure:
         x = self._coordinates('inputs', inputs)
         if x is None:
             return Position(Status.INDETERMINATE, 0.0, (), State([0.0, *inputs], []), [])
-        state = new(State, (x, []))
+        state = State(x, [])
         poses: list[Pose] = []
-        status = _CLOSED
-        for close in self._closing:
-            pose = close(state)
+        status = Status.CLOSED
+        for step in self.steps:
+            pose = step.close(state)
             poses.append(pose)
-            found = pose[0]
-            if found is not _CLOSED:
+            found = pose.status
+            if found is not Status.CLOSED:
                 if not found.has_pose:
-                    return Position(found, pose[1] * self.scale, (), state, poses)
+                    return Position(found, pose.gap * self.scale, (), state, poses)
                 if status.has_rates:
                     status = found
         joints: tuple[float, ...] = ()
         for i, j, factor, constant in self._terms:
             joints += (factor * (x[i] - x[j]) + constant,)
-        return new(Position, (status, 0.0, joints, state, poses))
+        return Position(status, 0.0, joints, state, poses)
 
     def known(self, *inputs: float) -> State:
         """Return what is known before the first step: the ground's coordinate and the inputs'."""
@@ -254,15 +249,14 @@ class Closure:
             Where a rate is no number.
 
         """
-        status, _, _, state, poses = position
         v = self._coordinates('rates', rates)
-        if v is None or not status.has_rates:
-            raise _no_motion('rates', rates, status)
-        speeds = new(State, (v, []))
+        if v is None or not position.status.has_rates:
+            raise _no_motion('rates', rates, position.status)
+        speeds = State(v, [])
         found = []
-        for rate, pose in zip(self._rating, poses, strict=True):
-            found.append(rate(pose, state, speeds))
-        return new(Velocity, (self._joints(v), speeds, found))
+        for step, pose in zip(self.steps, position.poses, strict=True):
+            found.append(step.rates(pose, position.state, speeds))
+        return Velocity(self._joints(v), speeds, found)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -283,15 +277,13 @@ class Closure:
             As `velocity` raises them.
 
         """
-        status, _, _, state, poses = position
         a = self._coordinates('accelerations', accelerations)
         if a is None:
-            raise _no_motion('accelerations', accelerations, status)
-        _, speeds, rates = velocity
-        changes = new(State, (a, []))
-        for accelerate, pose, rate in zip(self._accelerating, poses, rates, strict=True):
-            accelerate(pose, rate, state, speeds, changes)
-        return new(Acceleration, (self._joints(a), changes))
+            raise _no_motion('accelerations', accelerations, position.status)
+        changes = State(a, [])
+        for step, pose, rate in zip(self.steps, position.poses, velocity.rates, strict=True):
+            step.accelerations(pose, rate, position.state, velocity.state, changes)
+        return Acceleration(self._joints(a), changes)
 
     def solve(
         self,
@@ -468,12 +460,11 @@ class Closure:
             names = ', '.join(given.joint for given in self.linkage.inputs)
             raise ValueError(f'{what}: {len(values)} given; give {self._driven}: {names}')
         try:
-            for value in values:
-                # 0 of a finite number, which is false; NaN of all others, which is true.
-                if value - value:
-                    return None
+            if not all_finite(values):
+                return None
         except (TypeError, ValueError):
-            message = f'{what}: {quoted(value)} is not a number; solve() takes arrays'
+            wrong = next(value for value in values if not isinstance(value, (int, float)))
+            message = f'{what}: {quoted(wrong)} is not a number; solve() takes arrays'
             raise TypeError(message) from None
         if self._factors is None:
             return [0.0, *values]

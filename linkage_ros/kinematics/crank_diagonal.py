@@ -18,15 +18,14 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from math import atan2, cos, fsum, inf, pi, sin, sqrt
+import math
+from math import fsum, inf, pi
 
+from linkage_ros.kinematics.arithmetic import atan2, cos, sin, sqrt, where
 from linkage_ros.kinematics.diagonal import Diagonal, Growth, GrowthChange
-from linkage_ros.kinematics.rounding import passes_zero, reach, root_of, SMALLEST
+from linkage_ros.kinematics.rounding import passes_zero, reach, Root, root_of, SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
-from linkage_ros.tuples import new
-
-_CLOSED = Status.CLOSED
 
 
 class CrankDiagonal:
@@ -70,8 +69,8 @@ class CrankDiagonal:
     """
 
     __slots__ = (
-        '_constants', 'along', 'arms', 'brackets', 'fold_margin', 'half_turn', 'least', 'limits',
-        'quad', 'root', 'sides', 'stretch_margin',
+        '_apart_square', '_half_turn', '_whole', 'along', 'arms', 'brackets', 'fold_margin',
+        'least', 'limits', 'offset', 'quad', 'root', 'short_pair', 'sides', 'stretch_margin',
     )  # fmt: skip
 
     _at_change_point = Status.CHANGE_POINT
@@ -89,89 +88,81 @@ class CrankDiagonal:
         lower, upper, _ = limits
         least = abs(d - a)
         self.least = (Fraction(d) - Fraction(a)) ** 2
+        self._apart_square = float(self.least)
         self.sides = (a, d)
         self.along = float(Fraction(a) * (Fraction(d) - Fraction(a)))
         self.limits = limits
         self.fold_margin, self.stretch_margin = fold, stretch
         self.brackets = (fold * (least + lower), stretch * (upper + a + d))
-        short_pair = a + d > 2.0 * upper
-        whole = (fsum((upper, -max(a, d), min(a, d)))) * (upper + least) if short_pair else 0.0
+        self.short_pair = a + d > 2.0 * upper
+        self._whole = fsum((upper, -max(a, d), min(a, d))) * (upper + least)
         self.root, self.quad = mean_root(a, d), float(4 * Fraction(a) * Fraction(d))
-        self._constants = (
-            a, d - a, float(self.least), self.root, self.quad, *self.brackets, short_pair, whole,
-        )  # fmt: skip
-        self.arms = (*arms, offset)
-        self.half_turn = (sin(0.5 * offset), cos(0.5 * offset))
+        self.arms = arms
+        self.offset = offset
+        self._half_turn = (math.sin(0.5 * offset), math.cos(0.5 * offset))
 
     def at(self, known: State) -> Diagonal:
         """Return the diagonal."""
-        x = known[0]
-        a, difference, least, root, quad, fold, stretch, short_pair, whole = self._constants
-        first, second, offset = self.arms
-        base = x[second]
-        half = 0.5 * (x[first] - base)
+        first, second = self.arms
+        base = known.coordinates[second]
+        half = 0.5 * (known.coordinates[first] - base)
         half_sine, half_cosine = sin(half), cos(half)
-        if offset:
+        if self.offset:
             # Not added to an angle that may have turned a thousand times.
-            sine, cosine = self.half_turn
+            sine, cosine = self._half_turn
             half_sine, half_cosine = (
                 half_sine * cosine + half_cosine * sine,
                 half_cosine * cosine - half_sine * sine,
             )
-        near, far = root * half_sine, root * half_cosine
+        near, far = self.root * half_sine, self.root * half_cosine
         # Not of the roots, which are rounded once more.
-        excess, rest = quad * half_sine * half_sine, quad * half_cosine * half_cosine
-        square = least + excess
-        lower, upper, _ = self.limits
+        excess, rest = self.quad * half_sine * half_sine, self.quad * half_cosine * half_cosine
+        square = self._apart_square + excess
+        lower, upper, span = self.limits
         if square < SMALLEST:
             status = Status.OPEN if lower else Status.INDETERMINATE
             return Diagonal(0.0, 0.0, 0.0, 0.0, lower, near, far, 0.0, status)
+        a, d = self.sides
         direction = base + atan2(
-            -2.0 * a * half_sine * half_cosine, difference + 2.0 * a * half_sine * half_sine
+            -2.0 * a * half_sine * half_cosine, d - a + 2.0 * a * half_sine * half_sine
         )
-        root_fold, missing = reach(fold, near, excess)
-        if missing:
-            gap = missing / (sqrt(square) + lower)
+        fold_bracket, stretch_bracket = self.brackets
+        fold, stretch = reach(fold_bracket, near, excess), Root(1.0, 0.0, False)
+        if fold.missing:
+            gap = fold.missing / (sqrt(square) + lower)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
-        root_stretch = 1.0
-        if short_pair:
-            root_stretch, missing = root_of(whole - excess, abs(whole) + excess)
+        if self.short_pair:
+            stretch = root_of(self._whole - excess, abs(self._whole) + excess)
         elif upper != inf:
-            root_stretch, missing = reach(stretch, far, rest)
-        if missing:
-            gap = missing / (sqrt(square) + upper)
+            stretch = reach(stretch_bracket, far, rest)
+        if stretch.missing:
+            gap = stretch.missing / (sqrt(square) + upper)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
-        if upper != inf:
-            root_fold, root_stretch = self._complemented(excess, rest, root_fold, root_stretch)
-        status = _CLOSED
-        if (root_fold == 0.0 and fold) or (root_stretch == 0.0 and stretch):
+        root_fold, root_stretch = fold.root, stretch.root
+        status = Status.CLOSED
+        if fold.at_limit or stretch.at_limit:
             status = Status.TOGGLE
-        elif (not fold and difference and passes_zero(half_sine, half)) or (
-            not stretch and passes_zero(half_cosine, half)
-        ):
-            status = self._at_change_point
-        return new(
-            Diagonal,
-            (square, direction, root_fold, root_stretch, 0.0, near, far, excess, status),
+        else:
+            if upper != inf:
+                # Of the two the greater is made of the smaller, where it is not signed.
+                folding = fold_bracket + excess
+                stretching = self._whole - excess if self.short_pair else stretch_bracket + rest
+                folds = folding < stretching
+                if fold_bracket:
+                    root_fold = sqrt(where(folds, folding, span - stretching))
+                if stretch_bracket:
+                    root_stretch = sqrt(where(folds, span - folding, stretching))
+            if (not fold_bracket and d != a and passes_zero(half_sine, half)) or (
+                not stretch_bracket and passes_zero(half_cosine, half)
+            ):
+                status = self._at_change_point
+        return Diagonal(
+            square, direction, root_fold, root_stretch, 0.0, near, far, excess, status
         )
-
-    def _complemented(
-        self, excess: float, rest: float, root_fold: float, root_stretch: float
-    ) -> tuple[float, float]:
-        """Return both roots; the greater is made of the smaller, where it is not signed."""
-        _, _, _, _, _, fold, stretch, short_pair, whole = self._constants
-        folding, stretching = fold + excess, whole - excess if short_pair else stretch + rest
-        if (fold and not root_fold) or (stretch and not root_stretch):
-            return root_fold, root_stretch
-        if folding < stretching and stretch:
-            root_stretch = sqrt(self.limits[2] - folding)
-        elif folding >= stretching and fold:
-            root_fold = sqrt(self.limits[2] - stretching)
-        return root_fold, root_stretch
 
     def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> Growth:
         """
-        Return φ̇·(q − i·p), and what OD turns by.
+        Return φ̇·q and −φ̇·p, beside what OD turns by.
 
         With n̂ the diagonal's direction turned left::
 
@@ -181,22 +172,21 @@ class CrankDiagonal:
         The lean is q by the roots fold and stretch, of which at a change point one is near or far
         itself.
         """
-        v = speeds[0]
-        first, second, _ = self.arms
-        square, _, fold, stretch, _, near, far, excess, _ = diagonal
-        p = (self.along - 0.5 * excess) / square
+        first, second = self.arms
+        square, near, far = diagonal.square, diagonal.near, diagonal.far
+        p = (self.along - 0.5 * diagonal.excess) / square
         q = 0.5 * near * far / square
-        fold_ratio, stretch_ratio = self.ratios(near, far, fold, stretch)
-        base = v[second]
+        fold_ratio, stretch_ratio = self.ratios(diagonal)
+        base = speeds.coordinates[second]
         lean = 0.5 * fold_ratio * stretch_ratio / square
-        return new(Growth, (q - 1j * p, v[first] - base, base, lean))
+        return Growth(q, -p, speeds.coordinates[first] - base, base, lean)
 
-    def ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
+    def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
         """Return near by fold and far by stretch; where one is the other the ratio is 1."""
         fold_bracket, stretch_bracket = self.brackets
         return (
-            near / fold if fold_bracket else 1.0,
-            far / stretch if stretch_bracket else 1.0,
+            diagonal.near / diagonal.fold if fold_bracket else 1.0,
+            diagonal.far / diagonal.stretch if stretch_bracket else 1.0,
         )
 
     def accelerations(
@@ -214,19 +204,19 @@ class CrankDiagonal:
         q' + q²·(1 − c²) of an RPR one, with what cancels there taken out: at a change point one of
         the brackets is 0, and near by fold, or far by stretch, is 1.
         """
-        a = changes[0]
-        first, second, _ = self.arms
-        q, p = growth.unit.real, -growth.unit.imag
-        short, long = self.sides
-        turn = p * (1.0 + p) + 1j * (q * ((long - short) * (long + short) / diagonal.square))
-        bend = self.bend(diagonal)
-        return new(GrowthChange, (turn, a[first] - a[second], a[second], bend))
+        first, second = self.arms
+        a, d = self.sides
+        swirl = growth.growth * ((d - a) * (d + a) / diagonal.square)
+        pull = -growth.turn * (1.0 - growth.turn)
+        base = changes.coordinates[second]
+        change = changes.coordinates[first] - base
+        return GrowthChange(pull, swirl, change, base, self.bend(diagonal))
 
     def bend(self, diagonal: Diagonal) -> float:
         """Return the bend that `accelerations` tells of."""
-        square, _, fold, stretch, _, near, far, _, _ = diagonal
+        near, far, fold, stretch = diagonal.near, diagonal.far, diagonal.fold, diagonal.stretch
         fold_bracket, stretch_bracket = self.brackets
-        fold_ratio, stretch_ratio = self.ratios(near, far, fold, stretch)
+        fold_ratio, stretch_ratio = self.ratios(diagonal)
         bend = 0.0
         if fold_bracket:
             bend = fold_bracket * (far / fold) / fold * (stretch_ratio / fold)
@@ -234,19 +224,19 @@ class CrankDiagonal:
             bend -= near * fold_ratio
         elif stretch_bracket:
             bend -= stretch_bracket * (near / stretch) / stretch * (fold_ratio / stretch)
-        return 0.25 * bend / square
+        return 0.25 * bend / diagonal.square
 
     @property
     def singular_angles(self) -> tuple[float, ...]:
         """Differences of the two coordinates at which all links lie in one line, in [rad]."""
         margins = ((self.fold_margin, 0.0), (self.stretch_margin, pi))
-        return tuple(phi - self.arms[2] for margin, phi in margins if margin == 0.0)
+        return tuple(phi - self.offset for margin, phi in margins if margin == 0.0)
 
 
 def mean_root(a: float, d: float) -> float:
     """Return 2·√(ad), correctly rounded."""
     # Two roots, since a·d may underflow where the lengths differ by many decades.
-    root = 2.0 * sqrt(a) * sqrt(d)
+    root = 2.0 * math.sqrt(a) * math.sqrt(d)
     if not root:
         return root
     exact = Fraction(root)
@@ -271,6 +261,6 @@ class UnsignedDiagonal(CrankDiagonal):
         found = super().at(known)
         return found._replace(fold=abs(found.fold), stretch=abs(found.stretch))
 
-    def ratios(self, near: float, far: float, fold: float, stretch: float) -> tuple[float, float]:
+    def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
         """Return near by fold and far by stretch."""
-        return near / fold, far / stretch
+        return diagonal.near / diagonal.fold, diagonal.far / diagonal.stretch

@@ -68,14 +68,15 @@ class Diagonal(NamedTuple):
 
 class Growth(NamedTuple):
     """
-    The rates of a diagonal: ṡ/s + i·(rate of the direction) = swing·unit + i·base.
+    The rates of a diagonal: ṡ/s = swing·growth, and its direction's rate is base + swing·turn.
 
-    The unit may be huge where A is next to D. What it is multiplied by in a dyad is as small then:
-    that product comes first. ``lean`` is the unit's real part by fold and stretch: at a change
+    Growth and turn may be huge where A is next to D. What they are multiplied by in a dyad is as
+    small then: that product comes first. ``lean`` is the growth by fold and stretch: at a change
     point all three are 0, and it is not.
     """
 
-    unit: complex
+    growth: float
+    turn: float
     swing: float
     base: float
     lean: float
@@ -83,17 +84,18 @@ class Growth(NamedTuple):
 
 class GrowthChange(NamedTuple):
     """
-    The derivative of a `Growth`, ṡ² / s² added: change·unit + swing²·square + i·base.
+    The derivative of a `Growth`, ṡ²/s² added to that of ṡ/s.
 
-    So the square's real part is s̈/s at a rate of 1, which is no difference of large numbers where
-    A is next to D.
+    That is s̈/s = change·growth + swing²·pull, which is no difference of large numbers where A is
+    next to D; and the direction's is base + change·turn + swing²·swirl.
 
-    The bend is what the square's real part leaves of a dyad's own second derivative (each dyad
-    says what), by fold and stretch: near a change point a difference of large numbers, so a
-    `CrankDiagonal` tells it, where all others leave it to the dyad.
+    The bend is what the pull leaves of a dyad's own second derivative (each dyad says what), by
+    fold and stretch: near a change point a difference of large numbers, so a `CrankDiagonal` tells
+    it in the place of the pull, where all others leave it to the dyad.
     """
 
-    square: complex
+    pull: float
+    swirl: float
     change: float
     base: float
     bend: float | None

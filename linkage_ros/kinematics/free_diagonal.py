@@ -17,17 +17,14 @@
 
 from __future__ import annotations
 
-from cmath import phase
 from fractions import Fraction
-from math import inf, sqrt
+from math import inf
 
+from linkage_ros.kinematics.arithmetic import phase, sqrt, where
 from linkage_ros.kinematics.diagonal import Diagonal, Growth, GrowthChange
-from linkage_ros.kinematics.rounding import root_of, SMALLEST
+from linkage_ros.kinematics.rounding import Root, root_of, SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
-from linkage_ros.tuples import new
-
-_CLOSED = Status.CLOSED
 
 
 class FreeDiagonal:
@@ -49,36 +46,30 @@ class FreeDiagonal:
 
     def __init__(self, ends: tuple[int, int], limits: tuple[float, float, float]) -> None:
         self._ends = ends
-        self._limits = limits
+        self._limits = (*limits, limits[1] != inf)
 
     def at(self, known: State) -> Diagonal:
         """Return the diagonal."""
-        pins = known[1]
-        first, second = self._ends
-        start, end = pins[first], pins[second]
+        start, end = (known.pins[i] for i in self._ends)
         return free_diagonal(end - start, abs(start) + abs(end), *self._limits)
 
     def rates(self, diagonal: Diagonal, known: State, speeds: State) -> Growth:
         """Return the velocity of D against A, divided by AD."""
         first, second = self._ends
-        pins, velocities = known[1], speeds[1]
-        unit = (velocities[second] - velocities[first]) / (pins[second] - pins[first])
-        return new(Growth, (unit, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch))
+        vector = known.pins[second] - known.pins[first]
+        return free_growth(diagonal, vector, speeds.pins[second] - speeds.pins[first])
 
     def accelerations(
         self, _diagonal: Diagonal, growth: Growth, known: State, _speeds: State, changes: State
     ) -> GrowthChange:
         """Return the derivative of `rates`."""
         first, second = self._ends
-        pins, pulls = known[1], changes[1]
-        unit = growth.unit
-        square = (pulls[second] - pulls[first]) / (pins[second] - pins[first])
-        square += unit.imag * (unit.imag - 2j * unit.real)
-        return new(GrowthChange, (square, 0.0, 0.0, None))
+        vector = known.pins[second] - known.pins[first]
+        return free_growth_change(growth, vector, changes.pins[second] - changes.pins[first])
 
 
 def free_diagonal(
-    vector: complex, size: float, lower: float, upper: float, span: float
+    vector: complex, size: float, lower: float, upper: float, span: float, bounded: bool = True
 ) -> Diagonal:
     """Return the diagonal of a vector whose ends have coordinates of a size."""
     s = abs(vector)
@@ -86,22 +77,40 @@ def free_diagonal(
     if square < SMALLEST:
         status = Status.OPEN if lower else Status.INDETERMINATE
         return Diagonal(0.0, 0.0, 0.0, 0.0, lower, 0.0, 0.0, 0.0, status)
-    folding = (s - lower) * (s + lower)
-    root_fold, missing = root_of(folding, (size + lower) * (s + lower))
-    gap, root_stretch = missing / (s + lower), 1.0
-    if upper != inf and not gap:
+    folding, stretching = (s - lower) * (s + lower), 1.0
+    fold, stretch = root_of(folding, (size + lower) * (s + lower)), Root(1.0, 0.0, False)
+    gap = 0.0
+    if fold.missing:
+        gap = fold.missing / (s + lower)
+    elif bounded:
         stretching = (upper - s) * (upper + s)
-        root_stretch, missing = root_of(stretching, (size + upper) * (upper + s))
-        gap = missing / (upper + s)
-        if root_fold and root_stretch:
-            if folding < stretching:
-                root_stretch = sqrt(span - folding)
-            else:
-                root_fold = sqrt(span - stretching)
+        stretch = root_of(stretching, (size + upper) * (upper + s))
+        if stretch.missing:
+            gap = stretch.missing / (upper + s)
     if gap:
         return Diagonal(square, 0.0, 0.0, 0.0, gap, 0.0, 0.0, 0.0, Status.OPEN)
-    status = _CLOSED if root_fold and root_stretch else Status.TOGGLE
-    return new(
-        Diagonal,
-        (square, phase(vector), root_fold, root_stretch, 0.0, 0.0, 0.0, square, status),
+    root_fold, root_stretch, status = fold.root, stretch.root, Status.CLOSED
+    if fold.at_limit or stretch.at_limit:
+        status = Status.TOGGLE
+    elif bounded:
+        folds = folding < stretching
+        root_fold = sqrt(where(folds, folding, span - stretching))
+        root_stretch = sqrt(where(folds, span - folding, stretching))
+    return Diagonal(
+        square, phase(vector), root_fold, root_stretch, 0.0, 0.0, 0.0, square, status
     )
+
+
+def free_growth(diagonal: Diagonal, vector: complex, velocity: complex) -> Growth:
+    """Return how a diagonal grows that changes at a velocity."""
+    unit = velocity / vector
+    return Growth(
+        unit.real, unit.imag, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch
+    )
+
+
+def free_growth_change(growth: Growth, vector: complex, pull: complex) -> GrowthChange:
+    """Return the derivative of `free_growth`, of a diagonal that changes at an acceleration."""
+    square = pull / vector
+    square += growth.turn * (growth.turn - 2j * growth.growth)
+    return GrowthChange(square.real, square.imag, 0.0, 0.0, None)

@@ -263,7 +263,7 @@ class Iteration:
         """Return what is known before this step, at any inputs."""
         known = State([0.0, *inputs], [])
         for step in self._before:
-            if not step.close(known)[0].has_pose:
+            if not step.close(known).status.has_pose:
                 return None
         return known
 
@@ -274,7 +274,7 @@ class Iteration:
         known, speeds = State([0.0, *inputs], []), State([0.0, *rates], [])
         for step in self._before:
             pose = step.close(known)
-            if not pose[0].has_rates:
+            if not pose.status.has_rates:
                 return None
             step.rates(pose, known, speeds)
         return known, speeds

@@ -153,7 +153,7 @@ def limited(position: Callable[..., Position], bounds: Bounds) -> Callable[..., 
 
     def close(*inputs: float) -> Position:
         found = position(*inputs)
-        if found[0] in _UNDISTURBED and exceeded(inputs, found[2]) is not None:
+        if found.status in _UNDISTURBED and exceeded(inputs, found.joints) is not None:
             return found._replace(status=Status.LIMITED)
         return found
 

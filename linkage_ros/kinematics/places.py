@@ -17,7 +17,8 @@
 
 from __future__ import annotations
 
-from linkage_ros.kinematics.step import facing, PLACED, Pose, State
+from linkage_ros.kinematics.arithmetic import facing
+from linkage_ros.kinematics.step import PLACED, Pose, State
 
 
 class FixedPoint:
@@ -38,18 +39,18 @@ class FixedPoint:
 
     def close(self, known: State) -> Pose:
         """Append the point."""
-        known[1].append(self._place)
+        known.pins.append(self._place)
         return PLACED
 
     def rates(self, _pose: Pose, _known: State, speeds: State) -> None:
         """Append that it stands."""
-        speeds[1].append(0j)
+        speeds.pins.append(0j)
 
     def accelerations(
         self, _pose: Pose, _rates: None, _known: State, _speeds: State, changes: State
     ) -> None:
         """Append that it stands."""
-        changes[1].append(0j)
+        changes.pins.append(0j)
 
 
 class PointOnLink:
@@ -69,8 +70,6 @@ class PointOnLink:
 
     __slots__ = ('_arm', '_pin', '_vector')
 
-    _facing = staticmethod(facing)
-
     def __init__(self, pin: int, arm: int, vector: complex) -> None:
         self._pin = pin
         self._arm = arm
@@ -78,24 +77,24 @@ class PointOnLink:
 
     def close(self, known: State) -> Pose:
         """Append the point."""
-        x, pins = known
-        pins.append(pins[self._pin] + self._facing(x[self._arm]) * self._vector)
+        arm = facing(known.coordinates[self._arm]) * self._vector
+        known.pins.append(known.pins[self._pin] + arm)
         return PLACED
 
     def rates(self, _pose: Pose, known: State, speeds: State) -> complex:
         """Append its velocity; return the way from the pin."""
-        v, velocities = speeds
         # Not the difference of the two places: far from the origin that has few digits.
-        arm: complex = self._facing(known[0][self._arm]) * self._vector
-        velocities.append(velocities[self._pin] + 1j * v[self._arm] * arm)
+        arm = facing(known.coordinates[self._arm]) * self._vector
+        turn = speeds.coordinates[self._arm]
+        speeds.pins.append(speeds.pins[self._pin] + 1j * turn * arm)
         return arm
 
     def accelerations(
         self, _pose: Pose, arm: complex, _known: State, speeds: State, changes: State
     ) -> None:
         """Append its acceleration."""
-        turn, (a, pulls) = speeds[0][self._arm], changes
-        pulls.append(pulls[self._pin] + (1j * a[self._arm] - turn * turn) * arm)
+        turn, change = speeds.coordinates[self._arm], changes.coordinates[self._arm]
+        changes.pins.append(changes.pins[self._pin] + (1j * change - turn * turn) * arm)
 
 
 class PointOnRail:
@@ -117,8 +116,6 @@ class PointOnRail:
 
     __slots__ = ('_arm', '_pin', '_slide', '_unit')
 
-    _facing = staticmethod(facing)
-
     def __init__(self, pin: int, arm: int, slide: int, unit: complex) -> None:
         self._pin = pin
         self._arm = arm
@@ -127,28 +124,28 @@ class PointOnRail:
 
     def close(self, known: State) -> Pose:
         """Append the point."""
-        x, pins = known
-        unit = self._facing(x[self._arm]) * self._unit
-        pins.append(pins[self._pin] + x[self._slide] * unit)
+        unit = facing(known.coordinates[self._arm]) * self._unit
+        slide = known.coordinates[self._slide]
+        known.pins.append(known.pins[self._pin] + slide * unit)
         return PLACED
 
     def rates(self, _pose: Pose, known: State, speeds: State) -> None:
         """Append its velocity."""
-        x, (v, velocities) = known[0], speeds
-        unit = self._facing(x[self._arm]) * self._unit
+        x, v = known.coordinates, speeds.coordinates
+        unit = facing(x[self._arm]) * self._unit
         moved = v[self._slide] + 1j * (v[self._arm] * x[self._slide])
-        velocities.append(velocities[self._pin] + moved * unit)
+        speeds.pins.append(speeds.pins[self._pin] + moved * unit)
 
     def accelerations(
         self, _pose: Pose, _rates: None, known: State, speeds: State, changes: State
     ) -> None:
         """Append its acceleration."""
-        x, v, (a, pulls) = known[0], speeds[0], changes
-        unit = self._facing(x[self._arm]) * self._unit
+        x, v, a = known.coordinates, speeds.coordinates, changes.coordinates
+        unit = facing(x[self._arm]) * self._unit
         slide, turn = x[self._slide], v[self._arm]
         across = a[self._arm] * slide + 2.0 * turn * v[self._slide]
         moved = a[self._slide] - turn * turn * slide + 1j * across
-        pulls.append(pulls[self._pin] + moved * unit)
+        changes.pins.append(changes.pins[self._pin] + moved * unit)
 
 
 class Turned:
@@ -187,5 +184,5 @@ class Turned:
         self._append(changes)
 
     def _append(self, state: State) -> None:
-        values = state[0]
+        values = state.coordinates
         values.append(values[self._arm] + self._sign * values[self._turn])

@@ -24,16 +24,15 @@ all others from the coordinates (`FreeRail`).
 
 from __future__ import annotations
 
-from cmath import phase, rect
-from math import fsum, inf, pi, sqrt
+from cmath import rect
+import math
+from math import fsum, inf, pi
 from typing import NamedTuple, Protocol
 
-from linkage_ros.kinematics.rounding import margin, passes_zero, reach, root_of
+from linkage_ros.kinematics.arithmetic import facing, phase, vector, where
+from linkage_ros.kinematics.rounding import margin, passes_zero, reach, Root, root_of
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import facing, State
-from linkage_ros.tuples import new
-
-_CLOSED = Status.CLOSED
+from linkage_ros.kinematics.step import State
 
 
 class Sight(NamedTuple):
@@ -126,7 +125,10 @@ class CrankRail:
 
     """
 
-    __slots__ = ('_arm', '_constants', '_half_turn', '_link', '_products', 'arms')
+    __slots__ = (
+        '_above', '_arm', '_below', '_changes_over', '_half_turn', '_length', '_link', '_pivot',
+        '_products', '_root_length', 'arms',
+    )  # fmt: skip
 
     _at_change_point = Status.CHANGE_POINT
 
@@ -137,7 +139,10 @@ class CrankRail:
             if link == inf
             else (margin(link, side, -a) for side in (-pivot.imag, pivot.imag))
         )
-        self._constants = (a, pivot, below, above, sqrt(2.0 * a), not (below and above))
+        self._length, self._pivot = a, pivot
+        self._below, self._above = below, above
+        self._root_length = math.sqrt(2.0 * a)
+        self._changes_over = not (below and above)
         # Of `across`: sums that cancel of a short crank beside a long link.
         self._products = (
             (0.0, 0.0)
@@ -152,61 +157,60 @@ class CrankRail:
     @property
     def singular_angles(self) -> tuple[float, ...]:
         """Differences of the two coordinates at which all links lie across the line, in [rad]."""
-        _, _, below, above, _, _ = self._constants
-        across = ((below, 0.5 * pi), (above, -0.5 * pi))
+        across = ((self._below, 0.5 * pi), (self._above, -0.5 * pi))
         return tuple(psi - phase(self._arm) for bracket, psi in across if bracket == 0.0)
 
     def at(self, known: State) -> Sight:
         """Return the pin in the frame of the rail."""
-        a, pivot, below, above, root, changes_over = self._constants
         first, second = self.arms
-        x, link = known[0], self._link
-        base = x[second]
-        swing = x[first] - base
-        arm = rect(1.0, swing) * self._arm
-        place = pivot + arm
-        if link == inf:
-            return new(Sight, (place, inf, inf, 0.0, base, arm, 0.0, _CLOSED))
-        eta = rect(1.0, -0.5 * swing) * self._half_turn
+        base = known.coordinates[second]
+        swing = known.coordinates[first] - base
+        arm = facing(swing) * self._arm
+        place = self._pivot + arm
+        if self._link == inf:
+            return Sight(place, inf, inf, 0.0, base, arm, 0.0, Status.CLOSED)
+        eta = facing(-0.5 * swing) * self._half_turn
         sine, cosine = eta.imag, eta.real
-        root_below, gap = self._root(below, root * sine, 2.0 * a * sine * sine, -place.imag)
-        root_above = 0.0
-        if not gap:
-            part = root * cosine
-            root_above, gap = self._root(above, part, 2.0 * a * cosine * cosine, place.imag)
-        if gap:
+        part, other_part = self._root_length * sine, self._root_length * cosine
+        square, other_square = (2.0 * self._length * side * side for side in (sine, cosine))
+        below, above = self._root(self._below, part, square, -place.imag), Root(0.0, 0.0, False)
+        if not below.missing:
+            above = self._root(self._above, other_part, other_square, place.imag)
+        if gap := below.missing or above.missing:
             return Sight(place, 0.0, 0.0, gap, base, arm, 0.0, Status.OPEN)
-        lean, status = 0.0, _CLOSED
-        if changes_over:
+        lean, status = 0.0, Status.CLOSED
+        if self._changes_over:
             # Of the rate, which is 0 where the root is; two forms of one zero would not cancel.
-            arm = complex(2.0 * a * sine * cosine, arm.imag)
+            arm = vector(2.0 * self._length * sine * cosine, arm.imag)
             lean = 1.0
-            if above:
-                lean = root * cosine / root_above if root_above else 0.0
-            elif below:
-                lean = root * sine / root_below if root_below else 0.0
-            if (not below and passes_zero(sine, 0.5 * swing)) or (
-                not above and passes_zero(cosine, 0.5 * swing)
+            if self._above:
+                lean = 0.0 if above.at_limit else other_part / above.root
+            elif self._below:
+                lean = 0.0 if below.at_limit else part / below.root
+            if (not self._below and passes_zero(sine, 0.5 * swing)) or (
+                not self._above and passes_zero(cosine, 0.5 * swing)
             ):
                 status = self._at_change_point
-        return new(Sight, (place, root_below, root_above, 0.0, base, arm, lean, status))
+        return Sight(place, below.root, above.root, 0.0, base, arm, lean, status)
 
-    def _root(
-        self, bracket: float, part: float, square: float, side: float
-    ) -> tuple[float, float]:
-        """Return the root of the link's length less what it has to reach, and the gap."""
+    def _root(self, bracket: float, part: float, square: float, side: float) -> Root:
+        """Return the root of the link's length less what it has to reach."""
+        if bracket == 0.0:
+            return reach(bracket, part, square)
         size = self._link + abs(side)
         # The square has more roundings than the side: where it is as great, it is no better.
-        if bracket == 0.0 or 4.0 * (abs(bracket) + square) < size:
-            return reach(bracket, part, square)
-        return root_of(self._link + side, size)
+        shorter = 4.0 * (abs(bracket) + square) < size
+        return root_of(
+            where(shorter, bracket + square, self._link + side),
+            where(shorter, abs(bracket) + square, size),
+        )
 
     def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
         """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
         first, second = self.arms
-        v = speeds[0]
-        swing, arm = v[first] - v[second], sight.arm
-        return 1j * (swing * arm.real) - swing * arm.imag, v[second]
+        turn, arm = speeds.coordinates[second], sight.arm
+        swing = speeds.coordinates[first] - turn
+        return 1j * (swing * arm.real) - swing * arm.imag, turn
 
     def accelerations(
         self,
@@ -218,17 +222,17 @@ class CrankRail:
     ) -> tuple[complex, float]:
         """Return the pin's acceleration in the frame of the rail, and that of the frame."""
         first, second = self.arms
-        v, a = speeds[0], changes[0]
-        swing = v[first] - v[second]
-        return (1j * (a[first] - a[second]) - swing * swing) * sight.arm, a[second]
+        swing = speeds.coordinates[first] - speeds.coordinates[second]
+        change = changes.coordinates[second]
+        swing_change = changes.coordinates[first] - change
+        return (1j * swing_change - swing * swing) * sight.arm, change
 
     def climb(self, sight: Sight, rise: float, speeds: State) -> float:
         """Return the rate of y, the rise, by below and above."""
-        if not self._constants[-1]:
+        if not self._changes_over:
             return rise / (sight.below * sight.above)
         first, second = self.arms
-        v = speeds[0]
-        return (v[first] - v[second]) * sight.lean
+        return (speeds.coordinates[first] - speeds.coordinates[second]) * sight.lean
 
     def across(
         self, sight: Sight, _pull: complex, link_rate: float, speeds: State, changes: State
@@ -245,27 +249,27 @@ class CrankRail:
         terms is taken; with a change point the one whose bracket is 0, which no other does.
         """
         first, second = self.arms
-        v, changed = speeds[0], changes[0]
-        _, pivot, below, above, _, changes_over = self._constants
-        e, y = pivot.imag, sight.place.imag
-        swing, change = v[first] - v[second], changed[first] - changed[second]
-        if changes_over:
-            if not below:
-                bent = e * sight.below / sight.above**3 if above else 0.0
-            else:
-                bent = e * sight.above / sight.below**3
+        swing = speeds.coordinates[first] - speeds.coordinates[second]
+        change = changes.coordinates[first] - changes.coordinates[second]
+        e, y, below, above = self._pivot.imag, sight.place.imag, sight.below, sight.above
+        if self._changes_over:
+            bent = 0.0
+            if self._below:
+                bent = e * above / below**3
+            elif self._above:
+                bent = e * below / above**3
             return change * sight.lean + swing * swing * bent
-        if y > 0.0:
-            terms = e * sight.below**4, y * self._products[0]
-        else:
-            terms = e * sight.above**4, y * self._products[1]
-        parts = -swing * swing * sight.arm.imag, y * link_rate * link_rate
-        along = sight.below * sight.above
+        left_of_line = y > 0.0
+        term = e * where(left_of_line, below, above) ** 4
+        other_term = y * where(left_of_line, *self._products)
+        part, other_part = -swing * swing * sight.arm.imag, y * link_rate * link_rate
+        along = below * above
         square = (swing / along) ** 2
-        if (abs(terms[0]) + abs(terms[1])) * square < abs(parts[0]) + abs(parts[1]):
-            rest = (terms[0] - terms[1]) * square
-        else:
-            rest = parts[0] + parts[1]
+        rest = where(
+            (abs(term) + abs(other_term)) * square < abs(part) + abs(other_part),
+            (term - other_term) * square,
+            part + other_part,
+        )
         return (change * sight.arm.real + rest) / along
 
 
@@ -279,8 +283,7 @@ class UnsignedRail(CrankRail):
     def at(self, known: State) -> Sight:
         """Return the pin in the frame of the rail."""
         found = super().at(known)
-        opposite = (found.below < 0.0) != (found.above < 0.0)
-        lean = found.lean * (1.0 - 2.0 * opposite)
+        lean = where((found.below < 0.0) != (found.above < 0.0), -found.lean, found.lean)
         return found._replace(below=abs(found.below), above=abs(found.above), lean=lean)
 
 
@@ -303,8 +306,6 @@ class FreeRail:
 
     __slots__ = ('_arm', '_back', '_ends', '_link')
 
-    _facing = staticmethod(facing)
-
     def __init__(self, ends: tuple[int, int], link: float, arm: int, unit: complex) -> None:
         self._ends = ends
         self._link = link
@@ -313,27 +314,25 @@ class FreeRail:
 
     def at(self, known: State) -> Sight:
         """Return the pin in the frame of the rail."""
-        x, pins = known
-        base = x[self._arm]
-        start, end = (pins[i] for i in self._ends)
-        place = (end - start) * (self._facing(-base) * self._back)
+        base = known.coordinates[self._arm]
+        start, end = (known.pins[i] for i in self._ends)
+        place = (end - start) * (facing(-base) * self._back)
         link = self._link
         if link == inf:
-            return new(Sight, (place, inf, inf, 0.0, base, 0j, 0.0, _CLOSED))
+            return Sight(place, inf, inf, 0.0, base, 0j, 0.0, Status.CLOSED)
         size = abs(start) + abs(end) + link
-        below, gap = root_of(link - place.imag, size)
-        above = 0.0
-        if not gap:
-            above, gap = root_of(link + place.imag, size)
-        status = Status.OPEN if gap else _CLOSED
-        return new(Sight, (place, below, above, gap, base, 0j, 0.0, status))
+        below, above = root_of(link - place.imag, size), Root(0.0, 0.0, False)
+        if not below.missing:
+            above = root_of(link + place.imag, size)
+        gap = below.missing or above.missing
+        status = Status.OPEN if gap else Status.CLOSED
+        return Sight(place, below.root, above.root, gap, base, 0j, 0.0, status)
 
     def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
         """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
-        v, velocities = speeds
-        start, end = (velocities[i] for i in self._ends)
-        turn = v[self._arm]
-        back = self._facing(-sight.base) * self._back
+        start, end = (speeds.pins[i] for i in self._ends)
+        turn = speeds.coordinates[self._arm]
+        back = facing(-sight.base) * self._back
         return (end - start) * back - 1j * turn * sight.place, turn
 
     def accelerations(
@@ -345,11 +344,10 @@ class FreeRail:
         changes: State,
     ) -> tuple[complex, float]:
         """Return the pin's acceleration in the frame of the rail, and that of the frame."""
-        a, pulls = changes
-        start, end = (pulls[i] for i in self._ends)
+        start, end = (changes.pins[i] for i in self._ends)
         velocity, turn = rates
-        change = a[self._arm]
-        back = self._facing(-sight.base) * self._back
+        change = changes.coordinates[self._arm]
+        back = facing(-sight.base) * self._back
         # Coriolis, Euler and centrifugal terms of a frame that turns.
         apparent = 2j * turn * velocity + (1j * change - turn * turn) * sight.place
         return (end - start) * back - apparent, change

@@ -143,7 +143,7 @@ def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:
         diagonal = getattr(step, 'diagonal', None)
         if isinstance(diagonal, CrankDiagonal) and diagonal.arms[:2] == (1, 0):
             found = _crank_intervals(diagonal)
-            shifted = [(low - diagonal.arms[2], high - diagonal.arms[2]) for low, high in found]
+            shifted = [(low - diagonal.offset, high - diagonal.offset) for low, high in found]
             # The first dyad sets the frame; further ones on the same crank are cut out below.
             exact = exact and intervals == [(-pi, pi)]
             intervals = shifted if exact else intervals

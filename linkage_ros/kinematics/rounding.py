@@ -17,7 +17,10 @@
 
 from __future__ import annotations
 
-from math import fsum, sqrt
+from math import fsum
+from typing import NamedTuple
+
+from linkage_ros.kinematics.arithmetic import sqrt, where
 
 UNIT_ROUNDOFF = 2.0**-53
 
@@ -39,26 +42,48 @@ def margin(*lengths: float) -> float:
     return 0.0 if abs(total) <= 4.0 * UNIT_ROUNDOFF * fsum(map(abs, lengths)) else total
 
 
-def reach(constant: float, part: float, square: float) -> tuple[float, float]:
+class Root(NamedTuple):
     """
-    Return the root of ``constant + part²``, and that sum where it is negative; given the square.
+    The root of a reach: how far a dyad is from its limit.
+
+    Attributes
+    ----------
+    root
+        0 at the limit.
+    missing
+        0 where the dyad closes, else what is missing of the sum.
+    at_limit
+        Whether the sum is zero but for its rounding error.
+
+    """
+
+    root: float
+    missing: float
+    at_limit: bool
+
+
+def reach(constant: float, part: float, square: float) -> Root:
+    """
+    Return the root of ``constant + part²``, given the square.
 
     A dyad that folds or stretches does so where such a sum, its reach, goes to zero. The constant
     is a bracket of the linkage; the part is signed by the half angle. Where the constant is zero,
     the root is the part and has its sign. A sum within its own rounding error of zero is zero:
     those are the last few floats on either side of a toggle, where the rate has no correct digit.
-
-    Returns
-    -------
-    root : float
-        0 at a toggle.
-    missing : float
-        0 where the dyad closes, else what is missing of the sum.
-
     """
     if constant == 0.0:
-        return part, 0.0
+        return Root(part, 0.0, False)
     return root_of(constant + square, abs(constant) + square)
+
+
+def root_of(total: float, size: float) -> Root:
+    """Return the root as `reach` does, of a sum whose terms are of a size."""
+    rounding = ROUNDING * size
+    if total > rounding:
+        return Root(sqrt(total), 0.0, False)
+    if total >= -rounding:
+        return Root(0.0, 0.0, True)
+    return Root(0.0, -total, False)
 
 
 def passes_zero(part: float, half_angle: float) -> bool:
@@ -68,12 +93,5 @@ def passes_zero(part: float, half_angle: float) -> bool:
     An angle is rounded at its own size, and π is no double: at the double next to it the cosine of
     the half angle is 6e-17.
     """
-    return abs(part) <= ROUNDING * max(1.0, abs(half_angle))
-
-
-def root_of(total: float, size: float) -> tuple[float, float]:
-    """Return root and what is missing as `reach` does, of a sum whose terms are of a size."""
-    rounding = ROUNDING * size
-    if total > rounding:
-        return sqrt(total), 0.0
-    return 0.0, (0.0 if total >= -rounding else -total)
+    size = abs(half_angle)
+    return abs(part) <= ROUNDING * where(size > 1.0, size, 1.0)

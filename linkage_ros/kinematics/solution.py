@@ -26,7 +26,6 @@ from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.diagonal import AnyDiagonal
 from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
-from linkage_ros.kinematics.dyads.crank_rrr import CrankRRRDyad
 from linkage_ros.kinematics.dyads.driven_rrr import Carry, DrivenRRRDyad, Side
 from linkage_ros.kinematics.dyads.folding_rrr import FoldingRRRDyad
 from linkage_ros.kinematics.dyads.prp import PRPDyad
@@ -182,8 +181,6 @@ class Planner(KnownLinks):
         kind: type[RRRDyad] = RRRDyad
         if FoldingRRRDyad.fits(diagonal):
             kind = FoldingRRRDyad
-        elif type(diagonal) is CrankDiagonal and CrankRRRDyad.fits(diagonal):
-            kind = CrankRRRDyad
         self.add(kind(diagonal, b, c, sign))
         k = self.new_coordinates(2)
         self.angles[one] = _facing(one, k, base, one_arm)

@@ -24,9 +24,6 @@ the inputs follow, then what the steps append. Lengths are in the unit of the cl
 
 from __future__ import annotations
 
-from cmath import rect
-from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 from linkage_ros.kinematics.status import Status
@@ -49,14 +46,26 @@ class State(NamedTuple):
     pins: list[complex]
 
 
-Pose = tuple[Any, ...]
-"""What a step found: its status and its gap first, then what its own rates start from."""
+class Pose(Protocol):
+    """What a step found, and what its own rates start from."""
 
-facing: Callable[[Any], Any] = partial(rect, 1.0)
-"""Returns e^{iθ}; the steps that solve arrays have one of their own in its place."""
+    @property
+    def status(self) -> Status:
+        """Whether it closes."""
 
-PLACED: Pose = (Status.CLOSED, 0.0)
-"""The pose of a step that cannot fail."""
+    @property
+    def gap(self) -> float:
+        """What it misses by where it does not close, else 0, in the unit of the lengths."""
+
+
+class Placed(NamedTuple):
+    """The pose of a step that cannot fail."""
+
+    status: Status = Status.CLOSED
+    gap: float = 0.0
+
+
+PLACED = Placed()
 
 
 class Step(Protocol):

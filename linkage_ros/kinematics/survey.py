@@ -423,7 +423,7 @@ def _of_pose(
 
     def told(value: float) -> float:
         pose = pose_at(*way.inputs(value))
-        return method(pose) if pose[0].has_pose else nan
+        return method(pose) if pose.status.has_pose else nan
 
     return told
 

@@ -33,14 +33,13 @@ were 1,000 times as far, and 23 u·κ in random linkages.
 
 from __future__ import annotations
 
-from cmath import phase, rect
-from math import atan2, pi
+from math import pi
 from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import atan2, facing, phase
 from linkage_ros.kinematics.rounding import ROUNDING
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
-from linkage_ros.tuples import new
 
 
 class CrankPRPPose(NamedTuple):
@@ -97,9 +96,9 @@ class CrankPRPDyad:
 
     def close(self, known: State) -> CrankPRPPose:
         """Append both ways along the lines."""
-        x = known[0]
+        x = known.coordinates
         (i, j), (one, other) = self.arms, self._offsets
-        across = rect(1.0, x[j] - x[i]) * self._across
+        across = facing(x[j] - x[i]) * self._across
         sine, cosine = across.imag, across.real
         if abs(sine) <= ROUNDING:
             gap = abs(one * cosine - other)
@@ -107,16 +106,17 @@ class CrankPRPDyad:
             status = Status.OPEN if far else Status.INDETERMINATE
             return CrankPRPPose(status, gap if far else 0.0, 0.0, 0.0, across)
         first, second = (one * cosine - other) / sine, (one - other * cosine) / sine
-        x += (first, second)
-        return new(CrankPRPPose, (Status.CLOSED, 0.0, first, second, across))
+        x.append(first)
+        x.append(second)
+        return CrankPRPPose(Status.CLOSED, 0.0, first, second, across)
 
     def rates(self, pose: CrankPRPPose, _known: State, speeds: State) -> float:
         """Append their rates; return δ̇/sin δ."""
-        v = speeds[0]
+        v = speeds.coordinates
         i, j = self.arms
-        _, _, first, second, across = pose
-        swing = (v[j] - v[i]) / across.imag
-        v += (-swing * second, -swing * first)
+        swing = (v[j] - v[i]) / pose.across.imag
+        v.append(-swing * pose.second)
+        v.append(-swing * pose.first)
         return swing
 
     def accelerations(
@@ -128,15 +128,12 @@ class CrankPRPDyad:
         changes: State,
     ) -> None:
         """Append their accelerations."""
-        a = changes[0]
+        a = changes.coordinates
         i, j = self.arms
-        _, _, first, second, across = pose
-        sine, cosine = across.imag, across.real
-        pull, whirl = (a[j] - a[i]) / sine, swing * swing
-        a += (
-            whirl * (first + second * cosine) - pull * second,
-            whirl * (second + first * cosine) - pull * first,
-        )
+        first, second, cosine = pose.first, pose.second, pose.across.real
+        pull, whirl = (a[j] - a[i]) / pose.across.imag, swing * swing
+        a.append(whirl * (first + second * cosine) - pull * second)
+        a.append(whirl * (second + first * cosine) - pull * first)
 
     def transmission_angle(self, pose: CrankPRPPose) -> float:
         """Return the angle between the two lines, in [0, π/2], in [rad]."""

@@ -25,20 +25,24 @@ velocity of its outer pin, this gives the velocity equation of a dyad of constan
 
 from __future__ import annotations
 
-from cmath import phase
 from typing import NamedTuple
 
-from linkage_ros.kinematics.diagonal import Growth, GrowthChange
+from linkage_ros.kinematics.arithmetic import facing, phase
+from linkage_ros.kinematics.diagonal import Growth
 from linkage_ros.kinematics.dyads.rrr import (
     close_triangle,
     RRRPose,
     triangle_accelerations,
     triangle_rates,
 )
-from linkage_ros.kinematics.free_diagonal import free_diagonal
+from linkage_ros.kinematics.free_diagonal import (
+    free_diagonal,
+    free_growth,
+    free_growth_change,
+)
 from linkage_ros.kinematics.plane import folded
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import facing, State
+from linkage_ros.kinematics.step import State
 
 
 class Carry(NamedTuple):
@@ -73,8 +77,6 @@ class Side:
 
     __slots__ = ('_carries', '_end', '_start')
 
-    _facing = staticmethod(facing)
-
     def __init__(self, start: complex, end: complex, carries: tuple[Carry, ...]) -> None:
         self._start = start
         self._end = end
@@ -85,9 +87,9 @@ class Side:
         z = self._end
         for origin, inner, angle, turn, slide, sign, unit in self._carries:
             if turn >= 0:
-                z = origin + self._facing(angle + sign * x[turn]) * (z - inner)
+                z = origin + facing(angle + sign * x[turn]) * (z - inner)
             else:
-                z = origin + self._facing(angle) * (z - inner) + sign * x[slide] * unit
+                z = origin + facing(angle) * (z - inner) + sign * x[slide] * unit
         return z - self._start
 
     def changes(
@@ -97,7 +99,7 @@ class Side:
         z, rate, change = self._end, 0j, 0j
         for origin, inner, angle, turn, slide, sign, unit in self._carries:
             if turn >= 0:
-                turned = self._facing(angle + sign * x[turn])
+                turned = facing(angle + sign * x[turn])
                 w = sign * v[turn]
                 arm = z - inner
                 if a is not None:
@@ -106,7 +108,7 @@ class Side:
                 rate = turned * (rate + 1j * w * arm)
                 z = origin + turned * arm
             else:
-                held = self._facing(angle)
+                held = facing(angle)
                 if a is not None:
                     change = held * change + sign * a[slide] * unit
                 rate = held * rate + sign * v[slide] * unit
@@ -154,8 +156,8 @@ class DrivenRRRDyad:
 
     def close(self, known: State) -> DrivenRRRPose:
         """Append the angles of the first link of each group."""
-        x, pins = known
-        start, end = (pins[i] for i in self._ends)
+        x = known.coordinates
+        start, end = (known.pins[i] for i in self._ends)
         one, other = (side.at(x) for side in self._sides)
         b, c = abs(one), abs(other)
         diagonal = free_diagonal(
@@ -169,14 +171,14 @@ class DrivenRRRDyad:
 
     def rates(self, pose: DrivenRRRPose, known: State, speeds: State) -> DrivenRRRRates:
         """Append the rates of the first link of each group."""
-        x, pins = known
-        v, velocities = speeds
         start, end = self._ends
-        one, other = (side.changes(x, v)[0] for side in self._sides)
-        units = self._units(pose)
-        between = velocities[end] + other * units[1] - velocities[start] - one * units[0]
-        unit, diagonal = between / (pins[end] - pins[start]), pose.triangle.diagonal
-        growth = Growth(unit, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch)
+        (one, _), (other, _) = (
+            side.changes(known.coordinates, speeds.coordinates) for side in self._sides
+        )
+        unit, other_unit = self._units(pose)
+        between = speeds.pins[end] + other * other_unit - speeds.pins[start] - one * unit
+        vector = known.pins[end] - known.pins[start]
+        growth = free_growth(pose.triangle.diagonal, vector, between)
         triangle_rates(pose.triangle, self._sign, growth, speeds)
         return DrivenRRRRates(growth, (one, other))
 
@@ -189,24 +191,24 @@ class DrivenRRRDyad:
         changes: State,
     ) -> None:
         """Append the accelerations of the first link of each group."""
-        x, pins = known
-        v, (a, pulls) = speeds[0], changes
+        x, v, a = known.coordinates, speeds.coordinates, changes.coordinates
         start, end = self._ends
         growth, triangle = rates.growth, pose.triangle
-        unit, lean = growth.unit, self._sign * growth.lean
+        lean = self._sign * growth.lean
         # The rates of this dyad's own links, as `rates` has appended them.
-        turns = unit.imag + triangle.less * lean, unit.imag + triangle.more * lean
-        one, other = (
-            (side.changes(x, v, a)[1] + 2j * turn * rate) * unit_now
-            for side, turn, rate, unit_now in zip(
-                self._sides, turns, rates.sides, self._units(pose), strict=True
-            )
-        )
-        between = pulls[end] + other - pulls[start] - one
-        square = between / (pins[end] - pins[start]) + unit.imag * (unit.imag - 2j * unit.real)
+        turns = growth.turn + triangle.less * lean, growth.turn + triangle.more * lean
+        pulls = []
+        for side, turn, rate, unit in zip(
+            self._sides, turns, rates.sides, self._units(pose), strict=True
+        ):
+            _, change = side.changes(x, v, a)
+            pulls.append((change + 2j * turn * rate) * unit)
+        one, other = pulls
+        between = changes.pins[end] + other - changes.pins[start] - one
+        growth_change = free_growth_change(growth, known.pins[end] - known.pins[start], between)
         b, c = map(abs, pose.sides)
-        change = GrowthChange(square, 0.0, 0.0, None)
-        triangle_accelerations(triangle, self._sign, (b - c) * (b + c), growth, change, changes)
+        difference = (b - c) * (b + c)
+        triangle_accelerations(triangle, self._sign, difference, growth, growth_change, changes)
 
     def side_of(self, pose: DrivenRRRPose) -> float:
         """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
@@ -218,8 +220,8 @@ class DrivenRRRDyad:
 
     def _units(self, pose: DrivenRRRPose) -> tuple[complex, complex]:
         """Return e^{iθ} of the first link of each group."""
-        triangle = pose.triangle
+        triangle, (one, other) = pose.triangle, pose.sides
         return (
-            facing(triangle.first - phase(pose.sides[0])),
-            facing(triangle.second - phase(pose.sides[1])),
+            facing(triangle.first - phase(one)),
+            facing(triangle.second - phase(other)),
         )

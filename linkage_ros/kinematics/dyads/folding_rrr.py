@@ -41,15 +41,14 @@ which change together, so that the change point stays one.
 from __future__ import annotations
 
 from fractions import Fraction
-from math import copysign
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import copysign
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
 from linkage_ros.kinematics.diagonal import AnyDiagonal
 from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose
 from linkage_ros.kinematics.rounding import margin
 from linkage_ros.kinematics.step import State
-from linkage_ros.tuples import new
 
 
 class FoldingRRRRates(NamedTuple):
@@ -93,8 +92,6 @@ class FoldingRRRDyad(RRRDyad):
 
     diagonal: CrankDiagonal
 
-    _side_of: Any = staticmethod(copysign)
-
     def __init__(self, diagonal: CrankDiagonal, b: float, c: float, sign: int) -> None:
         super().__init__(diagonal, b, c, sign)
         a, d = diagonal.sides
@@ -118,26 +115,27 @@ class FoldingRRRDyad(RRRDyad):
     ) -> FoldingRRRRates:
         """Append the rates of both links."""
         outer, inner, apart, bracket, left, right = self._constants
-        square, _, fold, stretch, _, near, far, _, _ = pose.diagonal
-        fold_ratio, stretch_ratio = self.diagonal.ratios(near, far, fold, stretch)
+        stretch, far = pose.diagonal.stretch, pose.diagonal.far
+        fold_ratio, stretch_ratio = self.diagonal.ratios(pose.diagonal)
         ratio = self._sign * fold_ratio * stretch_ratio
-        side = self._side_of(1.0, ratio)
-        # 1 on one side and 0 on the other one: no branch, so that arrays take it, too.
+        side = copysign(1.0, ratio)
+        # 1 on one side and 0 on the other one.
         same, other = 0.5 + 0.5 * side, 0.5 - 0.5 * side
         constant = same * left + other * right
         more, less, bent = 1.0 + abs(ratio), 0.0, 0.0
         if bracket:
             less = bracket / stretch / stretch / more
             bent = side * apart * (bracket / (stretch * (inner * abs(far) + outer * stretch)))
-        rest = 0.5 * bent + 0.5 * constant / square
-        v = speeds[0]
-        i, j, _ = self.diagonal.arms
+        rest = 0.5 * bent + 0.5 * constant / pose.diagonal.square
+        v = speeds.coordinates
+        i, j = self.diagonal.arms
         base = v[j]
         swing = v[i] - base
         first = 0.5 * (same * less + other * more) - rest
         second = 0.5 * (same * more + other * less) - rest
-        v += (base + swing * first, base + swing * second)
-        return new(FoldingRRRRates, (swing, first, second, side, constant))
+        v.append(base + swing * first)
+        v.append(base + swing * second)
+        return FoldingRRRRates(swing, first, second, side, constant)
 
     def accelerations(  # type: ignore[override]  # of its own rates
         self,
@@ -149,22 +147,20 @@ class FoldingRRRDyad(RRRDyad):
     ) -> None:
         """Append the accelerations of both links."""
         outer, inner, apart, bracket, _, _ = self._constants
-        swing, first, second, side, constant = rates
-        square, _, _, stretch, _, near, far, _, _ = pose.diagonal
-        whirl = 0.5 * constant * (near / square) * (far / square)
+        square, stretch = pose.diagonal.square, pose.diagonal.stretch
+        near, far = pose.diagonal.near, pose.diagonal.far
+        whirl = 0.5 * rates.constant * (near / square) * (far / square)
         turn = 0.0
         if bracket:
             size = abs(far)
             part = inner * size + outer * stretch
-            push = 0.5 * side * bracket * near * self._side_of(1.0, far)
+            push = 0.5 * rates.side * bracket * near * copysign(1.0, far)
             turn = 0.5 * push / stretch / stretch / stretch
             slope = 0.5 * inner * (stretch + size * (size / stretch)) + outer * size
             whirl -= push * apart * (slope / stretch / part) / stretch / part
-        a = changes[0]
-        i, j, _ = self.diagonal.arms
+        a = changes.coordinates
+        i, j = self.diagonal.arms
         base = a[j]
-        pull, square_rate = a[i] - base, swing * swing
-        a += (
-            base + pull * first + square_rate * (whirl + turn),
-            base + pull * second + square_rate * (whirl - turn),
-        )
+        pull, square_rate = a[i] - base, rates.swing * rates.swing
+        a.append(base + pull * rates.first + square_rate * (whirl + turn))
+        a.append(base + pull * rates.second + square_rate * (whirl - turn))

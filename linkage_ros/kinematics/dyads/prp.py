@@ -29,15 +29,14 @@ parallel they do not meet, or lie on each other: open, or indeterminate.
 
 from __future__ import annotations
 
-from cmath import phase, rect
-from math import atan2, pi
+from math import pi
 from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import atan2, facing, phase
 from linkage_ros.kinematics.plane import cross
 from linkage_ros.kinematics.rounding import ROUNDING
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
-from linkage_ros.tuples import new
 
 
 class PRPPose(NamedTuple):
@@ -94,12 +93,11 @@ class PRPDyad:
 
     def close(self, known: State) -> PRPPose:
         """Append both slides."""
-        x, pins = known
-        (i, j), (one, other) = self.arms, self._units
-        start, end = (pins[k] for k in self._starts)
-        units = rect(1.0, x[i]) * one, rect(1.0, x[j]) * other
+        angle, other_angle = (known.coordinates[k] for k in self.arms)
+        start, end = (known.pins[k] for k in self._starts)
+        units = facing(angle) * self._units[0], facing(other_angle) * self._units[1]
         # The angle between the lines first: two directions would cancel where they are parallel.
-        across = rect(1.0, x[j] - x[i]) * self._across
+        across = facing(other_angle - angle) * self._across
         between = end - start
         if abs(across.imag) <= ROUNDING:
             gap = abs(cross(units[0], between))
@@ -107,15 +105,15 @@ class PRPDyad:
             status = Status.OPEN if far else Status.INDETERMINATE
             return PRPPose(status, gap if far else 0.0, 0.0, 0.0, across, units)
         first, second = resolved(between, units, across.imag, known)
-        return new(PRPPose, (Status.CLOSED, 0.0, first, second, across, units))
+        return PRPPose(Status.CLOSED, 0.0, first, second, across, units)
 
     def rates(self, pose: PRPPose, _known: State, speeds: State) -> tuple[float, float]:
         """Append the rates of both slides."""
-        v, velocities = speeds
-        (i, j), (one, other) = self.arms, pose.units
-        start, end = (velocities[k] for k in self._starts)
-        carried = end + 1j * (v[j] * pose.second) * other
-        carried -= start + 1j * (v[i] * pose.first) * one
+        one, other = pose.units
+        turn, other_turn = (speeds.coordinates[k] for k in self.arms)
+        start, end = (speeds.pins[k] for k in self._starts)
+        carried = end + 1j * (other_turn * pose.second) * other
+        carried -= start + 1j * (turn * pose.first) * one
         return resolved(carried, pose.units, pose.across.imag, speeds)
 
     def accelerations(
@@ -127,11 +125,12 @@ class PRPDyad:
         changes: State,
     ) -> None:
         """Append the accelerations of both slides."""
-        v, (a, pulls) = speeds[0], changes
+        v, a = speeds.coordinates, changes.coordinates
         (i, j), (one, other) = self.arms, pose.units
-        start, end = (pulls[k] for k in self._starts)
-        carried = end + _carried(pose.second, rates[1], v[j], a[j]) * other
-        carried -= start + _carried(pose.first, rates[0], v[i], a[i]) * one
+        slide_rate, other_slide_rate = rates
+        start, end = (changes.pins[k] for k in self._starts)
+        carried = end + _carried(pose.second, other_slide_rate, v[j], a[j]) * other
+        carried -= start + _carried(pose.first, slide_rate, v[i], a[i]) * one
         resolved(carried, pose.units, pose.across.imag, changes)
 
     @property
@@ -158,7 +157,8 @@ def resolved(
     between: complex, units: tuple[complex, complex], sine: float, state: State
 ) -> tuple[float, float]:
     """Resolve a vector along both lines, and append its parts."""
-    first, second = cross(between, units[1]) / sine, cross(between, units[0]) / sine
-    state[0].append(first)
-    state[0].append(second)
+    one, other = units
+    first, second = cross(between, other) / sine, cross(between, one) / sine
+    state.coordinates.append(first)
+    state.coordinates.append(second)
     return first, second

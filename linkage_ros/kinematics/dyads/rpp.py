@@ -35,7 +35,6 @@ from linkage_ros.kinematics.plane import cross
 from linkage_ros.kinematics.rail import Rail, Sight
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
-from linkage_ros.tuples import new
 
 _STILL = (0.0, 0.0)
 
@@ -93,12 +92,13 @@ class RPPDyad:
         """Append both slides."""
         sight = self.rail.at(known)
         first, second = self._slides(sight.place, self._offsets, known)
-        return new(RPPPose, (Status.CLOSED, 0.0, first, second, sight))
+        return RPPPose(Status.CLOSED, 0.0, first, second, sight)
 
     def rates(self, pose: RPPPose, known: State, speeds: State) -> tuple[complex, float]:
         """Append the rates of both slides."""
         rates = self.rail.rates(pose.sight, known, speeds)
-        self._slides(rates[0], _STILL, speeds)
+        velocity, _ = rates
+        self._slides(velocity, _STILL, speeds)
         return rates
 
     def accelerations(
@@ -121,8 +121,9 @@ class RPPDyad:
         self, place: complex, offsets: tuple[float, float], state: State
     ) -> tuple[float, float]:
         """Resolve a vector along both lines, and append its parts."""
-        first = (cross(place, self._outer) - offsets[0]) / self._across
-        second = (offsets[1] - cross(place, self._inner)) / self._across
-        state[0].append(first)
-        state[0].append(second)
+        along_outer, along_inner = offsets
+        first = (cross(place, self._outer) - along_outer) / self._across
+        second = (along_inner - cross(place, self._inner)) / self._across
+        state.coordinates.append(first)
+        state.coordinates.append(second)
         return first, second

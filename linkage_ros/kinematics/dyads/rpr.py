@@ -37,15 +37,15 @@ At a change point g, e and r are 0: the diagonal gives both quotients.
 
 from __future__ import annotations
 
-from math import atan2, inf
+from math import inf
 from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import atan2
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.diagonal import AnyDiagonal, Diagonal, Growth
 from linkage_ros.kinematics.rounding import margin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
-from linkage_ros.tuples import new
 
 
 class RPRPose(NamedTuple):
@@ -90,59 +90,52 @@ class RPRDyad:
 
     """
 
-    __slots__ = ('_constants', 'diagonal')
+    __slots__ = ('_sign', 'diagonal', 'offset')
 
     def __init__(self, diagonal: AnyDiagonal, offset: float, sign: int) -> None:
         self.diagonal = diagonal
-        self._constants = (offset, float(sign))
-
-    @property
-    def offset(self) -> float:
-        """Return h; 0 of a straight rail."""
-        return self._constants[0]
+        self.offset = offset
+        self._sign = float(sign)
 
     def close(self, known: State) -> RPRPose:
         """Append the direction of the rail, and the slide."""
-        offset, sign = self._constants
         diagonal = self.diagonal.at(known)
-        _, direction, fold, _, gap, _, _, _, status = diagonal
+        status = diagonal.status
         if not status.has_pose:
-            return RPRPose(status, gap, 0.0, 0.0, diagonal)
-        slide = sign * fold
-        rail = direction - atan2(offset, slide)
-        known[0].append(rail)
-        known[0].append(slide)
-        return new(RPRPose, (status, 0.0, rail, slide, diagonal))
+            return RPRPose(status, diagonal.gap, 0.0, 0.0, diagonal)
+        slide = self._sign * diagonal.fold
+        rail = diagonal.direction - atan2(self.offset, slide)
+        known.coordinates.append(rail)
+        known.coordinates.append(slide)
+        return RPRPose(status, 0.0, rail, slide, diagonal)
 
     def rates(self, pose: RPRPose, known: State, speeds: State) -> Growth:
         """Append the rates of rail and slide."""
-        offset, sign = self._constants
         growth = self.diagonal.rates(pose.diagonal, known, speeds)
-        unit, swing, base, unsigned = growth
-        lean = sign * unsigned
-        speeds[0].append(base + swing * (unit.imag + offset * lean))
-        speeds[0].append(swing * (pose.diagonal.square * lean))
+        lean = self._sign * growth.lean
+        turn = growth.turn + self.offset * lean
+        speeds.coordinates.append(growth.base + growth.swing * turn)
+        speeds.coordinates.append(growth.swing * (pose.diagonal.square * lean))
         return growth
 
     def accelerations(
         self, pose: RPRPose, growth: Growth, known: State, speeds: State, changes: State
     ) -> None:
         """Append the accelerations of rail and slide."""
-        offset, sign = self._constants
-        square, pull, base, known_bend = self.diagonal.accelerations(
-            pose.diagonal, growth, known, speeds, changes
-        )
-        unit, swing, _, unsigned = growth
-        grown, lean = unit.real, sign * unsigned
-        if known_bend is None:
-            slope = offset / pose.slide
-            bend = square.real - grown * slope * (grown * slope)
-            bend = bend / pose.slide
+        change = self.diagonal.accelerations(pose.diagonal, growth, known, speeds, changes)
+        lean = self._sign * growth.lean
+        if change.bend is None:
+            slope = growth.growth * (self.offset / pose.slide)
+            bend = (change.pull - slope * slope) / pose.slide
         else:
-            bend = sign * known_bend
-        bent = square.imag + offset * (bend - 2.0 * grown * lean)
-        changes[0].append(base + pull * (unit.imag + offset * lean) + swing * swing * bent)
-        changes[0].append(pose.diagonal.square * (pull * lean + swing * swing * bend))
+            bend = self._sign * change.bend
+        swirl = change.swirl + self.offset * (bend - 2.0 * growth.growth * lean)
+        turn = growth.turn + self.offset * lean
+        whirl = growth.swing * growth.swing
+        changes.coordinates.append(change.base + change.change * turn + whirl * swirl)
+        changes.coordinates.append(
+            pose.diagonal.square * (change.change * lean + whirl * bend)
+        )
 
     def side_of(self, pose: RPRPose) -> float:
         """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
@@ -150,7 +143,7 @@ class RPRDyad:
 
     def transmission_angle(self, pose: RPRPose) -> float:
         """Return the angle between AD and the normal of the rail, in [0, π/2], in [rad]."""
-        return atan2(abs(pose.slide), abs(self._constants[0]))
+        return atan2(abs(pose.slide), abs(self.offset))
 
 
 def swivel_diagonal(

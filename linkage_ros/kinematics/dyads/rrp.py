@@ -31,16 +31,13 @@ gives ẏ/w and the like. Rates::
 
 from __future__ import annotations
 
-from math import atan2
 from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import atan2
 from linkage_ros.kinematics.rail import Rail, Sight
 from linkage_ros.kinematics.rounding import SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
-from linkage_ros.tuples import new
-
-_CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
 
 
 class RRPPose(NamedTuple):
@@ -102,26 +99,26 @@ class RRPDyad:
     def close(self, known: State) -> RRPPose:
         """Append the direction of the link, as the rail's link has it, and the slide."""
         sight = self.rail.at(known)
-        place, below, above, gap, base, _, _, status = sight
-        if gap:
-            return RRPPose(status, gap, 0.0, 0.0, 0.0, sight)
-        along = self._sign * below * above
-        if status is _CLOSED and -SMALLEST < along < SMALLEST:
-            along, status = 0.0, _TOGGLE
-        link = base + atan2(-place.imag, along)
+        status, place = sight.status, sight.place
+        if sight.gap:
+            return RRPPose(status, sight.gap, 0.0, 0.0, 0.0, sight)
+        along = self._sign * sight.below * sight.above
+        if status is Status.CLOSED and abs(along) < SMALLEST:
+            along, status = 0.0, Status.TOGGLE
+        link = sight.base + atan2(-place.imag, along)
         slide = place.real + along
-        known[0].append(link)
-        known[0].append(slide)
-        return new(RRPPose, (status, 0.0, link, slide, along, sight))
+        known.coordinates.append(link)
+        known.coordinates.append(slide)
+        return RRPPose(status, 0.0, link, slide, along, sight)
 
     def rates(self, pose: RRPPose, known: State, speeds: State) -> RRPRates:
         """Append the rates of link and slide."""
         rail = self.rail.rates(pose.sight, known, speeds)
         velocity, turn = rail
         link = -self._sign * self.rail.climb(pose.sight, velocity.imag, speeds)
-        speeds[0].append(turn + link)
-        speeds[0].append(velocity.real + pose.sight.place.imag * link)
-        return new(RRPRates, (rail, link))
+        speeds.coordinates.append(turn + link)
+        speeds.coordinates.append(velocity.real + pose.sight.place.imag * link)
+        return RRPRates(rail, link)
 
     def accelerations(
         self, pose: RRPPose, rates: RRPRates, known: State, speeds: State, changes: State
@@ -131,8 +128,8 @@ class RRPDyad:
         pull, turn = self.rail.accelerations(pose.sight, rates.rail, known, speeds, changes)
         y = pose.sight.place.imag
         change = -self._sign * self.rail.across(pose.sight, pull, link, speeds, changes)
-        changes[0].append(turn + change)
-        changes[0].append(pull.real + velocity.imag * link + y * change)
+        changes.coordinates.append(turn + change)
+        changes.coordinates.append(pull.real + velocity.imag * link + y * change)
 
     def side_of(self, pose: RRPPose) -> float:
         """Return a number whose sign tells the side of the assembly; 0 where it is singular."""

@@ -48,18 +48,15 @@ u·κ was measured.
 from __future__ import annotations
 
 from fractions import Fraction
-from math import atan2
 from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import atan2
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.diagonal import AnyDiagonal, Diagonal, Growth, GrowthChange
 from linkage_ros.kinematics.plane import folded
 from linkage_ros.kinematics.rounding import margin, SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
-from linkage_ros.tuples import new
-
-_CLOSED, _TOGGLE = Status.CLOSED, Status.TOGGLE
 
 
 class RRRPose(NamedTuple):
@@ -120,8 +117,8 @@ class RRRDyad:
     def close(self, known: State) -> RRRPose:
         """Append the directions of both links."""
         pose = close_triangle(self.diagonal.at(known), *self._sums, self._sign)
-        known[0].append(pose[2])
-        known[0].append(pose[3])
+        known.coordinates.append(pose.first)
+        known.coordinates.append(pose.second)
         return pose
 
     def rates(self, pose: RRRPose, known: State, speeds: State) -> Growth:
@@ -174,24 +171,23 @@ def sums(b: float, c: float, least: Fraction) -> tuple[float, float]:
 
 def close_triangle(diagonal: Diagonal, more: float, less: float, sign: float) -> RRRPose:
     """Return the pose over a diagonal; more and less are the two `sums`."""
-    _, direction, fold, stretch, gap, _, _, excess, status = diagonal
+    status = diagonal.status
     if not status.has_pose:
-        return RRRPose(status, gap, 0.0, 0.0, 0.0, diagonal, 0.0, 0.0)
-    cross = sign * fold * stretch
-    if status is _CLOSED and -SMALLEST < cross < SMALLEST:
-        cross, status = 0.0, _TOGGLE
-    more, less = more + excess, less - excess
-    first = direction + atan2(cross, more)
-    second = direction + atan2(cross, less)
-    return new(RRRPose, (status, 0.0, first, second, cross, diagonal, more, less))
+        return RRRPose(status, diagonal.gap, 0.0, 0.0, 0.0, diagonal, 0.0, 0.0)
+    cross = sign * diagonal.fold * diagonal.stretch
+    if status is Status.CLOSED and abs(cross) < SMALLEST:
+        cross, status = 0.0, Status.TOGGLE
+    more, less = more + diagonal.excess, less - diagonal.excess
+    first = diagonal.direction + atan2(cross, more)
+    second = diagonal.direction + atan2(cross, less)
+    return RRRPose(status, 0.0, first, second, cross, diagonal, more, less)
 
 
 def triangle_rates(pose: RRRPose, sign: float, growth: Growth, speeds: State) -> None:
     """Append ω3 and ω4 of a closed pose."""
-    unit, swing, base, unsigned = growth
-    lean = sign * unsigned
-    speeds[0].append(base + swing * (unit.imag + pose.less * lean))
-    speeds[0].append(base + swing * (unit.imag + pose.more * lean))
+    lean = sign * growth.lean
+    for part in (pose.less, pose.more):
+        speeds.coordinates.append(growth.base + growth.swing * (part * lean + growth.turn))
 
 
 def triangle_accelerations(
@@ -203,15 +199,15 @@ def triangle_accelerations(
     changes: State,
 ) -> None:
     """Append α3 and α4."""
-    unit, swing, _, unsigned = growth
-    turn, pull, base, known_bend = change
-    lean = sign * unsigned
-    if known_bend is None:
-        bend = turn.real - pose.more * lean * (pose.less * lean)
-        bend = bend / pose.cross
+    lean = sign * growth.lean
+    if change.bend is None:
+        bend = (change.pull - pose.more * lean * (pose.less * lean)) / pose.cross
     else:
-        bend = sign * known_bend
-    swirl = turn.imag - 2.0 * unit.real * (lean * difference)
+        bend = sign * change.bend
+    swirl = change.swirl - 2.0 * growth.growth * (lean * difference)
+    whirl = growth.swing * growth.swing
     for part in (pose.less, pose.more):
-        first = unit.imag + part * lean
-        changes[0].append(base + pull * first + swing * swing * (swirl + part * bend))
+        first = part * lean + growth.turn
+        changes.coordinates.append(
+            change.base + change.change * first + whirl * (swirl + part * bend)
+        )

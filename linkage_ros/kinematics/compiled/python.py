@@ -1,0 +1,121 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A path as a Python function: a straight line of arithmetic."""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Callable
+import math
+from typing import Any
+
+from linkage_ros.kinematics.compiled.tape import Operation
+from linkage_ros.kinematics.compiled.trace import Path
+from linkage_ros.kinematics.compiled.writer import Writer
+
+Values = tuple[tuple[float, ...], ...]
+
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    'sin': math.sin,
+    'cos': math.cos,
+    'sqrt': math.sqrt,
+    'atan2': math.atan2,
+    'copysign': math.copysign,
+    'remainder': math.remainder,
+    'phase': cmath.phase,
+    'rect': cmath.rect,
+    'abs': abs,
+    'complex': complex,
+}
+_ATTRIBUTES = frozenset(('real', 'imag'))
+_NEGATIONS = {'<': '>=', '<=': '>', '>': '<=', '>=': '<', '==': '!=', '!=': '=='}
+
+
+def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]:
+    """
+    Return a path as the source of a Python function, and the constants that it needs by name.
+
+    The function takes the inputs and returns the outputs, in groups; None where the path does not
+    hold.
+    """
+    constants: dict[str, Any] = {}
+    conditions = [decision.condition for decision in path.decisions]
+    outputs = [number for group in path.outputs for number in group]
+
+    def constant(value: Any) -> str:
+        if isinstance(value, int | float) and math.isfinite(value):
+            return repr(value)
+        known = f'k{len(constants)}'
+        constants[known] = value
+        return known
+
+    def call(operation: Operation, parts: list[str]) -> str:
+        if operation.name in _ATTRIBUTES:
+            return f'{_atom(parts[0])}.{operation.name}'
+        if operation.name == 'conjugate':
+            return f'{_atom(parts[0])}.conjugate()'
+        if operation.name == 'facing':
+            return f'rect(1.0, {parts[0]})'
+        if operation.name == 'vector':
+            return f'complex({parts[0]}, {parts[1]})'
+        if operation.name == '**':
+            return f'({parts[0]}) ** {parts[1]}'
+        if operation.name == 'item':
+            return f'{_atom(parts[0])}[{parts[1]}]'
+        if operation.name == 'found':
+            return f'({parts[0]} is not None)'
+        if operation.name == 'call':
+            return f'{parts[0]}({", ".join(parts[1:])})'
+        return f'{operation.name}({", ".join(parts)})'
+
+    writer = Writer(
+        [*conditions, *outputs],
+        constant,
+        call,
+        lambda condition, one, other: f'{one} if {condition} else {other}',
+        lambda known, text, _: f'{known} = {text}',
+    )
+    for given in path.inputs:
+        writer.name(given, given.name)
+    if any(condition.name == 'finite' for condition in conditions):
+        # 0 of finite numbers, and NaN of all others; where the sum is too great, it is in doubt.
+        total = ' + '.join(given.name for given in path.inputs)
+        writer.lines += [f'total = {total}', 'if total - total != 0.0:', '    return None']
+    for condition, held in path.decisions:
+        if condition.name != 'finite':
+            text = writer.write(condition)
+            writer.lines += [f'if not ({text}):' if held else f'if {text}:', '    return None']
+    groups = [', '.join(writer.write(number) for number in group) for group in path.outputs]
+    returned = ', '.join(f'({group},)' if group else '()' for group in groups)
+    parameters = ', '.join(given.name for given in path.inputs)
+    lines = [f'def {name}({parameters}):', *(f'    {line}' for line in writer.lines)]
+    return '\n'.join([*lines, f'    return {returned},' if groups else '    return ()', '']), constants
+
+
+def python_function(path: Path) -> Callable[..., Values | None]:
+    """Return a path as a function of its inputs that returns its outputs; None as above."""
+    source, constants = python_source(path)
+    # What a function finds among its own variables it finds faster than a global name.
+    bound = {**_FUNCTIONS, **constants}
+    names = ', '.join(bound)
+    body = ''.join(f'    {line}\n' for line in source.splitlines())
+    namespace: dict[str, Any] = {}
+    exec(f'def bind({names}):\n{body}    return solve\n', namespace)  # noqa: S102 (our own text)
+    solve: Callable[..., Values | None] = namespace['bind'](**bound)
+    return solve
+
+
+def _atom(text: str) -> str:
+    return text if text.isidentifier() else f'({text})'

@@ -1,0 +1,370 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What is done to symbols, written down: the tape of a compiled linkage.
+
+A symbol stands for a number that is not known yet. What the steps of a linkage do to it becomes
+an operation, each once. Where the steps decide by a symbol, they go on as they do at one state of
+the linkage, and the decision stays on the tape: what is compiled holds where all are made alike.
+"""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import math
+import operator
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
+
+Kind: TypeAlias = Literal['real', 'complex', 'truth', 'other']
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Operation:
+    """
+    A number of the tape.
+
+    Attributes
+    ----------
+    name
+        What is done: the name of an input, ``+``, ``sin``, ``where``, ``call``, and so on.
+    arguments
+        Other operations, and constants.
+    kind
+        Of what it gives.
+    number
+        On the tape.
+    value
+        At the state of the linkage at which the tape is written.
+
+    """
+
+    name: str
+    arguments: tuple[Any, ...]
+    kind: Kind
+    number: int
+    value: Any
+
+    @property
+    def is_input(self) -> bool:
+        """Whether it is given from outside."""
+        return not self.arguments
+
+    def operands(self) -> list[Operation]:
+        """Return the operations that it starts from."""
+        return [argument for argument in self.arguments if isinstance(argument, Operation)]
+
+
+class Decision(NamedTuple):
+    """What the steps have decided by: a condition, and whether it held."""
+
+    condition: Operation
+    held: bool
+
+
+def _copysign(size: float, sign: float) -> float:
+    return math.copysign(size, sign)
+
+
+_VALUES: Final[dict[str, Callable[..., Any]]] = {
+    '+': operator.add,
+    '-': operator.sub,
+    '*': operator.mul,
+    '/': operator.truediv,
+    '**': operator.pow,
+    'negative': operator.neg,
+    'abs': abs,
+    'sin': math.sin,
+    'cos': math.cos,
+    'sqrt': math.sqrt,
+    'atan2': math.atan2,
+    'copysign': _copysign,
+    'remainder': math.remainder,
+    'facing': lambda angle: cmath.rect(1.0, angle),
+    'phase': cmath.phase,
+    'vector': complex,
+    'real': lambda vector: vector.real,
+    'imag': lambda vector: vector.imag,
+    'conjugate': lambda vector: vector.conjugate(),
+    'where': lambda condition, one, other: one if condition else other,
+    'item': operator.getitem,
+    '<': operator.lt,
+    '<=': operator.le,
+    '>': operator.gt,
+    '>=': operator.ge,
+    '==': operator.eq,
+    '!=': operator.ne,
+    'finite': lambda *numbers: all(map(math.isfinite, numbers)),
+    'found': lambda found: found is not None,
+}
+
+_TRUTHS = frozenset(('<', '<=', '>', '>=', '==', '!=', 'finite', 'found'))
+_REALS = frozenset(
+    ('abs', 'sin', 'cos', 'sqrt', 'atan2', 'copysign', 'remainder', 'phase', 'real', 'imag')
+)
+_COMPLEX = frozenset(('facing', 'vector', 'conjugate'))
+
+
+class Tape:
+    """
+    All operations on symbols, and the decisions by them.
+
+    Attributes
+    ----------
+    decisions
+        In the order in which the steps have made them, each condition once.
+
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[Any, ...], Operation] = {}
+        self.decisions: list[Decision] = []
+        self._decided: dict[int, bool] = {}
+        self._ahead: Sequence[bool | None] = ()
+
+    def given(self, name: str, value: float) -> Symbol:
+        """Return the symbol of an input."""
+        return Symbol(self, self._new(name, (), 'real', value))
+
+    def begin(self, ahead: Sequence[bool | None] = ()) -> None:
+        """Forget all decisions; those to come are made as is said ahead, then by the values."""
+        self.decisions, self._decided, self._ahead = [], {}, ahead
+
+    def decide(self, condition: Operation) -> bool:
+        """Return whether a condition holds, and note it."""
+        found = self._decided.get(condition.number)
+        if found is None:
+            number = len(self.decisions)
+            said = self._ahead[number] if number < len(self._ahead) else None
+            found = bool(condition.value) if said is None else said
+            self._decided[condition.number] = found
+            self.decisions.append(Decision(condition, found))
+        return found
+
+    def write(self, name: str, *arguments: Any) -> Any:
+        """Return the symbol of an operation on symbols and constants."""
+        given = tuple(a.operation if isinstance(a, Symbol) else a for a in arguments)
+        simple = _simplified(name, given)
+        if simple is not None:
+            return Symbol(self, simple) if isinstance(simple, Operation) else simple
+        if name == '+' and (back := _negated(given[1])) is not None:
+            name, given = '-', (given[0], back)
+        elif name == '+' and (back := _negated(given[0])) is not None:
+            name, given = '-', (given[1], back)
+        return Symbol(self, self._new(name, given, _kind(name, given), None))
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Symbol:
+        """Return the symbol of what a function returns, which no symbol can pass."""
+        given = tuple(a.operation if isinstance(a, Symbol) else a for a in arguments)
+        return Symbol(self, self._new('call', (function, *given), 'other', None))
+
+    def _new(self, name: str, arguments: tuple[Any, ...], kind: Kind, value: Any) -> Operation:
+        key = (name, *(_key(argument) for argument in arguments))
+        found = self._known.get(key)
+        if found is None:
+            if value is None:
+                value = _value(name, arguments)
+            found = Operation(name, arguments, kind, len(self._known), value)
+            self._known[key] = found
+        return found
+
+
+class Symbol:
+    """
+    A number that is not known yet.
+
+    Parameters
+    ----------
+    tape
+        Where it is written down what is done to it.
+    operation
+        What it is.
+
+    """
+
+    __slots__ = ('operation', 'tape')
+
+    def __init__(self, tape: Tape, operation: Operation) -> None:
+        self.tape = tape
+        self.operation = operation
+
+    def apply(self, name: str, *arguments: Any) -> Any:
+        """Return what a function of `arithmetic` makes of its arguments."""
+        return self.tape.write(name, *arguments)
+
+    def __add__(self, other: Any) -> Any:
+        return self.tape.write('+', self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        return self.tape.write('+', other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        return self.tape.write('-', self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return self.tape.write('-', other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        return self.tape.write('*', self, other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return self.tape.write('*', other, self)
+
+    def __truediv__(self, other: Any) -> Any:
+        return self.tape.write('/', self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return self.tape.write('/', other, self)
+
+    def __pow__(self, power: int) -> Any:
+        return self.tape.write('**', self, power)
+
+    def __neg__(self) -> Any:
+        return self.tape.write('negative', self)
+
+    def __abs__(self) -> Any:
+        return self.tape.write('abs', self)
+
+    def __lt__(self, other: Any) -> Any:
+        return self.tape.write('<', self, other)
+
+    def __le__(self, other: Any) -> Any:
+        return self.tape.write('<=', self, other)
+
+    def __gt__(self, other: Any) -> Any:
+        return self.tape.write('>', self, other)
+
+    def __ge__(self, other: Any) -> Any:
+        return self.tape.write('>=', self, other)
+
+    def __eq__(self, other: object) -> Any:
+        return self.tape.write('==', self, other)
+
+    def __ne__(self, other: object) -> Any:
+        return self.tape.write('!=', self, other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __getitem__(self, index: int) -> Any:
+        return self.tape.write('item', self, index)
+
+    def __bool__(self) -> bool:
+        """Decide: what is a number holds where it is not 0."""
+        if self.operation.kind == 'truth':
+            return self.tape.decide(self.operation)
+        return bool(self != 0.0)
+
+    @property
+    def real(self) -> Any:
+        """The part along x; of a real number itself."""
+        return self if self.operation.kind == 'real' else self.tape.write('real', self)
+
+    @property
+    def imag(self) -> Any:
+        """The part along y."""
+        return 0.0 if self.operation.kind == 'real' else self.tape.write('imag', self)
+
+    def conjugate(self) -> Any:
+        """Return the mirror image."""
+        return self if self.operation.kind == 'real' else self.tape.write('conjugate', self)
+
+
+def never_minus_zero(number: Any) -> bool:
+    """Return whether a real number is surely not −0.0, as adding 0.0 would make it 0.0."""
+    if not isinstance(number, Operation):
+        return isinstance(number, float) and math.copysign(1.0, number) > 0.0
+    if number.kind != 'real':
+        return False
+    if number.name == '+':
+        return any(map(never_minus_zero, number.arguments))
+    if number.name == '-':
+        return never_minus_zero(number.arguments[0])
+    return number.name == 'abs'
+
+
+def _simplified(name: str, given: tuple[Any, ...]) -> Any:
+    """Return what an operation comes to without being done, to the last bit; None if it must."""
+    if name in ('+', '-', '*', '/') and not any(
+        isinstance(a, complex) or (isinstance(a, Operation) and a.kind == 'complex') for a in given
+    ):
+        one, other = given
+        if name == '-' and _is(other, 0.0):
+            return one
+        if name in ('*', '/') and _is(other, 1.0):
+            return one
+        if name == '*' and _is(one, 1.0):
+            return other
+        if name == '+' and _is(one, 0.0) and never_minus_zero(other):
+            return other
+        if name == '+' and _is(other, 0.0) and never_minus_zero(one):
+            return one
+    if name == 'negative':
+        (one,) = given
+        return _negated(one)
+    if name == 'abs':
+        (one,) = given
+        if isinstance(one, Operation) and one.name == 'abs':
+            return one
+    return None
+
+
+def _is(given: Any, value: float) -> bool:
+    return (
+        isinstance(given, (int, float))
+        and given == value
+        and math.copysign(1.0, given) == math.copysign(1.0, value)
+    )
+
+
+def _negated(given: Any) -> Any:
+    """Return what an operation is the negative of, if it is one."""
+    if isinstance(given, Operation) and given.name == 'negative' and given.kind == 'real':
+        return given.arguments[0]
+    return None
+
+
+def _kind(name: str, given: tuple[Any, ...]) -> Kind:
+    if name in _TRUTHS:
+        return 'truth'
+    if name in _REALS:
+        return 'real'
+    if name in _COMPLEX:
+        return 'complex'
+    if name == 'item':
+        return 'real'
+    numbers = given[1:] if name == 'where' else given
+    if any(isinstance(a, complex) or getattr(a, 'kind', '') == 'complex' for a in numbers):
+        return 'complex'
+    if any(getattr(a, 'kind', '') == 'truth' for a in numbers):
+        return 'truth'
+    return 'real'
+
+
+def _key(argument: Any) -> Any:
+    if isinstance(argument, Operation):
+        return argument.number
+    return id(argument) if callable(argument) else repr(argument)
+
+
+def _value(name: str, arguments: tuple[Any, ...]) -> Any:
+    """Return the value; NaN where there is none, off the way that the steps take."""
+    values = [a.value if isinstance(a, Operation) else a for a in arguments]
+    try:
+        if name == 'call':
+            return values[0](*values[1:])
+        return _VALUES[name](*values)
+    except (ArithmeticError, ValueError, TypeError):
+        return math.nan
