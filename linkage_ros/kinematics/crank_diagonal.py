@@ -127,20 +127,20 @@ class CrankDiagonal:
             -2.0 * a * half_sine * half_cosine, d - a + 2.0 * a * half_sine * half_sine
         )
         fold_bracket, stretch_bracket = self.brackets
-        fold, stretch = reach(fold_bracket, near, excess), Root(1.0, 0.0, False)
-        if fold.missing:
+        fold, stretch = reach(fold_bracket, near, excess), Root(1.0)
+        if fold.status is Status.OPEN:
             gap = fold.missing / (sqrt(square) + lower)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
         if self.short_pair:
             stretch = root_of(self._whole - excess, abs(self._whole) + excess)
         elif upper != inf:
             stretch = reach(stretch_bracket, far, rest)
-        if stretch.missing:
+        if stretch.status is Status.OPEN:
             gap = stretch.missing / (sqrt(square) + upper)
             return Diagonal(square, direction, 0.0, 0.0, gap, near, far, 0.0, Status.OPEN)
         root_fold, root_stretch = fold.root, stretch.root
         status = Status.CLOSED
-        if fold.at_limit or stretch.at_limit:
+        if Status.TOGGLE in (fold.status, stretch.status):
             status = Status.TOGGLE
         else:
             if upper != inf:

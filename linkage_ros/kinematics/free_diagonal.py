@@ -78,19 +78,18 @@ def free_diagonal(
         status = Status.OPEN if lower else Status.INDETERMINATE
         return Diagonal(0.0, 0.0, 0.0, 0.0, lower, 0.0, 0.0, 0.0, status)
     folding, stretching = (s - lower) * (s + lower), 1.0
-    fold, stretch = root_of(folding, (size + lower) * (s + lower)), Root(1.0, 0.0, False)
-    gap = 0.0
-    if fold.missing:
+    fold, stretch = root_of(folding, (size + lower) * (s + lower)), Root(1.0)
+    if fold.status is Status.OPEN:
         gap = fold.missing / (s + lower)
-    elif bounded:
+        return Diagonal(square, 0.0, 0.0, 0.0, gap, 0.0, 0.0, 0.0, Status.OPEN)
+    if bounded:
         stretching = (upper - s) * (upper + s)
         stretch = root_of(stretching, (size + upper) * (upper + s))
-        if stretch.missing:
-            gap = stretch.missing / (upper + s)
-    if gap:
+    if stretch.status is Status.OPEN:
+        gap = stretch.missing / (upper + s)
         return Diagonal(square, 0.0, 0.0, 0.0, gap, 0.0, 0.0, 0.0, Status.OPEN)
     root_fold, root_stretch, status = fold.root, stretch.root, Status.CLOSED
-    if fold.at_limit or stretch.at_limit:
+    if Status.TOGGLE in (fold.status, stretch.status):
         status = Status.TOGGLE
     elif bounded:
         folds = folding < stretching

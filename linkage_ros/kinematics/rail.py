@@ -173,10 +173,11 @@ class CrankRail:
         sine, cosine = eta.imag, eta.real
         part, other_part = self._root_length * sine, self._root_length * cosine
         square, other_square = (2.0 * self._length * side * side for side in (sine, cosine))
-        below, above = self._root(self._below, part, square, -place.imag), Root(0.0, 0.0, False)
-        if not below.missing:
+        below, above = self._root(self._below, part, square, -place.imag), Root(0.0)
+        if below.status is not Status.OPEN:
             above = self._root(self._above, other_part, other_square, place.imag)
-        if gap := below.missing or above.missing:
+        if Status.OPEN in (below.status, above.status):
+            gap = below.missing + above.missing
             return Sight(place, 0.0, 0.0, gap, base, arm, 0.0, Status.OPEN)
         lean, status = 0.0, Status.CLOSED
         if self._changes_over:
@@ -184,9 +185,9 @@ class CrankRail:
             arm = vector(2.0 * self._length * sine * cosine, arm.imag)
             lean = 1.0
             if self._above:
-                lean = 0.0 if above.at_limit else other_part / above.root
+                lean = 0.0 if above.status is Status.TOGGLE else other_part / above.root
             elif self._below:
-                lean = 0.0 if below.at_limit else part / below.root
+                lean = 0.0 if below.status is Status.TOGGLE else part / below.root
             if (not self._below and passes_zero(sine, 0.5 * swing)) or (
                 not self._above and passes_zero(cosine, 0.5 * swing)
             ):
@@ -321,11 +322,12 @@ class FreeRail:
         if link == inf:
             return Sight(place, inf, inf, 0.0, base, 0j, 0.0, Status.CLOSED)
         size = abs(start) + abs(end) + link
-        below, above = root_of(link - place.imag, size), Root(0.0, 0.0, False)
-        if not below.missing:
+        below, above = root_of(link - place.imag, size), Root(0.0)
+        if below.status is not Status.OPEN:
             above = root_of(link + place.imag, size)
-        gap = below.missing or above.missing
-        status = Status.OPEN if gap else Status.CLOSED
+        gap = below.missing + above.missing
+        is_open = Status.OPEN in (below.status, above.status)
+        status = Status.OPEN if is_open else Status.CLOSED
         return Sight(place, below.root, above.root, gap, base, 0j, 0.0, status)
 
     def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:

@@ -21,6 +21,7 @@ from math import fsum
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import sqrt, where
+from linkage_ros.kinematics.status import Status
 
 UNIT_ROUNDOFF = 2.0**-53
 
@@ -52,14 +53,14 @@ class Root(NamedTuple):
         0 at the limit.
     missing
         0 where the dyad closes, else what is missing of the sum.
-    at_limit
-        Whether the sum is zero but for its rounding error.
+    status
+        A toggle where the sum is zero but for its rounding error, open where it is negative.
 
     """
 
     root: float
-    missing: float
-    at_limit: bool
+    missing: float = 0.0
+    status: Status = Status.CLOSED
 
 
 def reach(constant: float, part: float, square: float) -> Root:
@@ -72,7 +73,7 @@ def reach(constant: float, part: float, square: float) -> Root:
     those are the last few floats on either side of a toggle, where the rate has no correct digit.
     """
     if constant == 0.0:
-        return Root(part, 0.0, False)
+        return Root(part)
     return root_of(constant + square, abs(constant) + square)
 
 
@@ -80,10 +81,10 @@ def root_of(total: float, size: float) -> Root:
     """Return the root as `reach` does, of a sum whose terms are of a size."""
     rounding = ROUNDING * size
     if total > rounding:
-        return Root(sqrt(total), 0.0, False)
+        return Root(sqrt(total))
     if total >= -rounding:
-        return Root(0.0, 0.0, True)
-    return Root(0.0, -total, False)
+        return Root(0.0, 0.0, Status.TOGGLE)
+    return Root(0.0, -total, Status.OPEN)
 
 
 def passes_zero(part: float, half_angle: float) -> bool:

@@ -75,10 +75,6 @@ class Decision(NamedTuple):
     held: bool
 
 
-def _copysign(size: float, sign: float) -> float:
-    return math.copysign(size, sign)
-
-
 _VALUES: Final[dict[str, Callable[..., Any]]] = {
     '+': operator.add,
     '-': operator.sub,
@@ -91,7 +87,8 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
     'cos': math.cos,
     'sqrt': math.sqrt,
     'atan2': math.atan2,
-    'copysign': _copysign,
+    'copysign': math.copysign,
+    'hypot': math.hypot,
     'remainder': math.remainder,
     'facing': lambda angle: cmath.rect(1.0, angle),
     'phase': cmath.phase,
@@ -113,7 +110,10 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
 
 _TRUTHS = frozenset(('<', '<=', '>', '>=', '==', '!=', 'finite', 'found'))
 _REALS = frozenset(
-    ('abs', 'sin', 'cos', 'sqrt', 'atan2', 'copysign', 'remainder', 'phase', 'real', 'imag')
+    (
+        'abs', 'sin', 'cos', 'sqrt', 'atan2', 'copysign', 'hypot', 'remainder', 'phase', 'real',
+        'imag',
+    )  # fmt: skip
 )
 _COMPLEX = frozenset(('facing', 'vector', 'conjugate'))
 

@@ -53,12 +53,15 @@ class Path(NamedTuple):
         In order. Where one falls otherwise the path does not hold.
     outputs
         What it returns, in groups.
+    tape
+        What it is written on.
 
     """
 
     inputs: tuple[Operation, ...]
     decisions: tuple[Decision, ...]
     outputs: tuple[tuple[Number, ...], ...]
+    tape: Tape
 
 
 def joints(motion: Motion) -> Sequence[Sequence[float]]:
@@ -67,7 +70,11 @@ def joints(motion: Motion) -> Sequence[Sequence[float]]:
 
 
 def traced(
-    closure: Closure, at: Sequence[float], derivatives: int, wanted: Wanted = joints
+    closure: Closure,
+    at: Sequence[float],
+    derivatives: int,
+    wanted: Wanted = joints,
+    within_limits: bool = True,
 ) -> Path:
     """
     Return the path that the steps take at one state.
@@ -82,6 +89,8 @@ def traced(
         What is worked out: positions (0), velocities too (1), and accelerations (2).
     wanted
         What of it the path returns.
+    within_limits
+        Whether the path ends where a joint is beyond its limits.
 
     Raises
     ------
@@ -95,7 +104,7 @@ def traced(
         for letter, values in zip('qwa', (at, [1.25] * len(at), [0.75] * len(at)), strict=True)
     ][: 1 + derivatives]
     tape.begin()
-    motion = moved(closure, given)
+    motion = moved(closure, given, within_limits)
     if motion.position.status is not Status.CLOSED:
         raise ValueError(f'{list(at)}: the linkage is {motion.position.status.value} there')
     return Path(
@@ -105,13 +114,16 @@ def traced(
             tuple(n.operation if isinstance(n, Symbol) else n for n in group)
             for group in wanted(motion)
         ),
+        tape,
     )
 
 
-def moved(closure: Closure, given: Sequence[Sequence[Any]]) -> Motion:
+def moved(
+    closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool = True
+) -> Motion:
     """Return the motion of a closure at inputs, rates and accelerations, as far as given."""
     inputs, *more = given
-    position = closure.position(*inputs)
+    position = closure.position(*inputs) if within_limits else closure.posed(*inputs)
     velocity = acceleration = None
     if more and position.status.has_rates:
         velocity = closure.velocity(position, *more[0])

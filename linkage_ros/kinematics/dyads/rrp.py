@@ -100,7 +100,7 @@ class RRPDyad:
         """Append the direction of the link, as the rail's link has it, and the slide."""
         sight = self.rail.at(known)
         status, place = sight.status, sight.place
-        if sight.gap:
+        if status is Status.OPEN:
             return RRPPose(status, sight.gap, 0.0, 0.0, 0.0, sight)
         along = self._sign * sight.below * sight.above
         if status is Status.CLOSED and abs(along) < SMALLEST:

@@ -1,0 +1,206 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A path in real numbers alone, for languages and arrays that have no complex ones.
+
+A complex number becomes its two parts, by the formulas of Python's own complex numbers: the bits
+are the same, but for the sign of a zero.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.arithmetic import atan2, cos, sin, where
+from linkage_ros.kinematics.compiled.fates import Fate, Fork
+from linkage_ros.kinematics.compiled.tape import Decision, Operation, Symbol, Tape
+from linkage_ros.kinematics.compiled.trace import Path
+
+
+class _Parts(NamedTuple):
+    """The parts of a complex number along x and y."""
+
+    x: Any
+    y: Any
+
+
+class Lowered(NamedTuple):
+    """A path in real numbers, and the fates beside it."""
+
+    path: Path
+    fates: tuple[Fate, ...]
+
+
+def lowered(path: Path, fates: tuple[Fate, ...] = ()) -> Lowered:
+    """
+    Return a path in real numbers alone.
+
+    Parameters
+    ----------
+    path
+        The path.
+    fates
+        What becomes of the linkage where its decisions fall otherwise.
+
+    Raises
+    ------
+    DefinitionError
+        Where links are iterated.
+
+    """
+    lower = _Lower()
+    inputs = tuple(lower.operation(given) for given in path.inputs)
+    decisions = tuple(
+        Decision(lower.operation(condition), held) for condition, held in path.decisions
+    )
+    outputs = tuple(
+        tuple(lower.operation(n) if isinstance(n, Operation) else n for n in group)
+        for group in path.outputs
+    )
+    return Lowered(
+        Path(inputs, decisions, outputs, lower.tape), tuple(lower.fate(fate) for fate in fates)
+    )
+
+
+class _Lower:
+    """Writes the operations of one tape on another."""
+
+    def __init__(self) -> None:
+        self.tape = Tape()
+        self._known: dict[Operation, Any] = {}
+
+    def operation(self, operation: Operation) -> Any:
+        """Return a real operation on the new tape, or a constant that it has become."""
+        found = self._number(operation)
+        return found.operation if isinstance(found, Symbol) else found
+
+    def fate(self, fate: Fate) -> Fate:
+        """Return a fate by conditions on the new tape."""
+        if isinstance(fate, Fork):
+            held, failed = self.fate(fate.held), self.fate(fate.failed)
+            return Fork(self.operation(fate.condition), held, failed)
+        return fate
+
+    def _number(self, root: Any) -> Any:
+        """Return a symbol, the parts of one, or a constant."""
+        if isinstance(root, complex):
+            return _Parts(root.real, root.imag)
+        if not isinstance(root, Operation):
+            return root
+        waiting = [root]
+        while waiting:
+            operation = waiting[-1]
+            needed = [one for one in operation.operands() if one not in self._known]
+            if needed:
+                waiting += needed
+                continue
+            waiting.pop()
+            if operation not in self._known:
+                self._known[operation] = self._written(operation)
+        return self._known[root]
+
+    def _written(self, operation: Operation) -> Any:
+        name = operation.name
+        if operation.is_input:
+            return self.tape.given(name, operation.value)
+        if name in ('call', 'item', 'found'):
+            raise DefinitionError(
+                'links',
+                'some are only solved by iteration, which is no straight line',
+                'compile a linkage of dyads',
+            )
+        given = [self._known.get(a) if isinstance(a, Operation) else self._number(a)
+                 for a in operation.arguments]  # fmt: skip
+        if not any(isinstance(one, _Parts) for one in given) and name not in _MAKES_PARTS:
+            return self.tape.write(name, *given)
+        return _FORMULAS[name](self.tape, *given)
+
+
+_MAKES_PARTS = frozenset(('facing', 'vector'))
+
+
+def _times(one: Any, other: Any) -> Any:
+    """Return a product; 0 where a constant is."""
+    if one is None or other is None or _zero(one) or _zero(other):
+        return 0.0
+    return one * other
+
+
+def _zero(number: Any) -> bool:
+    return isinstance(number, int | float) and number == 0.0
+
+
+def _sum(one: Any, other: Any) -> Any:
+    return other if _zero(one) else one if _zero(other) else one + other
+
+
+def _difference(one: Any, other: Any) -> Any:
+    return -other if _zero(one) else one if _zero(other) else one - other
+
+
+def _both(number: Any) -> _Parts:
+    return number if isinstance(number, _Parts) else _Parts(number, 0.0)
+
+
+def _add(_: Tape, one: Any, other: Any) -> _Parts:
+    a, b = _both(one), _both(other)
+    return _Parts(_sum(a.x, b.x), _sum(a.y, b.y))
+
+
+def _subtract(_: Tape, one: Any, other: Any) -> _Parts:
+    a, b = _both(one), _both(other)
+    return _Parts(_difference(a.x, b.x), _difference(a.y, b.y))
+
+
+def _multiply(_: Tape, one: Any, other: Any) -> _Parts:
+    a, b = _both(one), _both(other)
+    return _Parts(
+        _difference(_times(a.x, b.x), _times(a.y, b.y)), _sum(_times(a.x, b.y), _times(a.y, b.x))
+    )
+
+
+def _divide(_: Tape, one: Any, other: Any) -> _Parts:
+    """Return a quotient by Smith's method: R. L. Smith, Algorithm 116, CACM 5 (1962)."""
+    a = _both(one)
+    if not isinstance(other, _Parts):
+        return _Parts(a.x / other, a.y / other)
+    along_x = abs(other.x) >= abs(other.y)
+    great, small = where(along_x, other.x, other.y), where(along_x, other.y, other.x)
+    ratio = small / great
+    scale = great + small * ratio
+    first, second = where(along_x, a.x, a.y), where(along_x, a.y, a.x)
+    across = where(along_x, second - first * ratio, first * ratio - second)
+    return _Parts((first + second * ratio) / scale, across / scale)
+
+
+def _negative(_: Tape, one: _Parts) -> _Parts:
+    return _Parts(-one.x, -one.y)
+
+
+_FORMULAS = {
+    '+': _add,
+    '-': _subtract,
+    '*': _multiply,
+    '/': _divide,
+    'negative': _negative,
+    'conjugate': lambda _, one: _Parts(one.x, -one.y),
+    'real': lambda _, one: one.x,
+    'imag': lambda _, one: one.y,
+    'abs': lambda tape, one: tape.write('hypot', one.x, one.y),
+    'phase': lambda _, one: atan2(one.y, one.x),
+    'facing': lambda _, angle: _Parts(cos(angle), sin(angle)),
+    'vector': lambda _, x, y: _Parts(x, y),
+}
