@@ -22,7 +22,7 @@ so a step that is written once also becomes a line of a compiled linkage.
 from __future__ import annotations
 
 import cmath
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 from typing import Any
 
@@ -65,6 +65,14 @@ def copysign(size: float, sign: float) -> float:
         return math.copysign(size, sign)
     except TypeError:
         return _of(sign, 'copysign', size, sign)
+
+
+def remainder(number: float, period: float) -> float:
+    """Return how far a number is from the nearest multiple of a period."""
+    try:
+        return math.remainder(number, period)
+    except TypeError:
+        return _of(number, 'remainder', number, period)
 
 
 def facing(angle: float) -> complex:
@@ -112,6 +120,23 @@ def where(condition: bool, one: float, other: float) -> float:
     if isinstance(condition, bool):
         return one if condition else other
     return _of(condition, 'where', condition, one, other)
+
+
+def called(function: Callable[..., Any], *arguments: Any) -> Any:
+    """
+    Return what a function returns that takes numbers alone: an iteration, or a library's.
+
+    Of symbols it is a call in the program, whose arguments and results are known only there.
+    """
+    for argument in arguments:
+        if hasattr(argument, 'apply'):
+            return argument.tape.call(function, *arguments)
+    return function(*arguments)
+
+
+def is_found(result: Any) -> bool:
+    """Return whether a function that was `called` has found something, and not None."""
+    return bool(_of(result, 'found')) if hasattr(result, 'apply') else result is not None
 
 
 def _of(symbol: Any, name: str, *arguments: Any) -> Any:

@@ -103,7 +103,9 @@ def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]
     returned = ', '.join(f'({group},)' if group else '()' for group in groups)
     parameters = ', '.join(given.name for given in path.inputs)
     lines = [f'def {name}({parameters}):', *(f'    {line}' for line in writer.lines)]
-    return '\n'.join([*lines, f'    return {returned},' if groups else '    return ()', '']), constants
+    return '\n'.join(
+        [*lines, f'    return {returned},' if groups else '    return ()', '']
+    ), constants
 
 
 def python_function(path: Path) -> Callable[..., Values | None]:

@@ -111,7 +111,16 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
 _TRUTHS = frozenset(('<', '<=', '>', '>=', '==', '!=', 'finite', 'found'))
 _REALS = frozenset(
     (
-        'abs', 'sin', 'cos', 'sqrt', 'atan2', 'copysign', 'hypot', 'remainder', 'phase', 'real',
+        'abs',
+        'sin',
+        'cos',
+        'sqrt',
+        'atan2',
+        'copysign',
+        'hypot',
+        'remainder',
+        'phase',
+        'real',
         'imag',
     )  # fmt: skip
 )
@@ -135,9 +144,10 @@ class Tape:
         self._decided: dict[int, bool] = {}
         self._ahead: Sequence[bool | None] = ()
 
-    def given(self, name: str, value: float) -> Symbol:
-        """Return the symbol of an input."""
-        return Symbol(self, self._new(name, (), 'real', value))
+    def given(self, name: str, value: complex) -> Symbol:
+        """Return the symbol of an input, real or complex as its value is."""
+        kind: Kind = 'complex' if isinstance(value, complex) else 'real'
+        return Symbol(self, self._new(name, (), kind, value))
 
     def begin(self, ahead: Sequence[bool | None] = ()) -> None:
         """Forget all decisions; those to come are made as is said ahead, then by the values."""

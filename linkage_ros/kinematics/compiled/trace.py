@@ -118,9 +118,7 @@ def traced(
     )
 
 
-def moved(
-    closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool = True
-) -> Motion:
+def moved(closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool = True) -> Motion:
     """Return the motion of a closure at inputs, rates and accelerations, as far as given."""
     inputs, *more = given
     position = closure.position(*inputs) if within_limits else closure.posed(*inputs)
