@@ -202,8 +202,8 @@ class Mechanics:
             found = fast(value)
             if found is None:
                 return terms(position(value))
-            numbers, slips = found
-            return Terms(*numbers, slips)
+            (inertia, half_slope, potential_slope, viscous, coulomb), slips = found
+            return Terms(inertia, half_slope, potential_slope, viscous, coulomb, slips)
 
         return equation
 

@@ -157,7 +157,7 @@ class NewtonClosure(Solver):
                     return self._exact(inputs)
                 continue
             pose = part.close(state)
-            if pose[0] is not _CLOSED:
+            if pose.status is not _CLOSED:
                 return self._exact(inputs)
             if self._iterates:
                 poses.append(pose)

@@ -21,8 +21,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from linkage_ros.kinematics.compiled.python import python_function
-from linkage_ros.kinematics.compiled.tape import Symbol, Tape
-from linkage_ros.kinematics.compiled.trace import Path
+from linkage_ros.kinematics.compiled.tape import Tape
+from linkage_ros.kinematics.compiled.trace import number_of, Path
 
 
 def straight(
@@ -44,7 +44,7 @@ def straight(
     found = function(*given)
     if tape.decisions:
         raise ValueError('the function decides by its arguments, and has no straight line')
-    outputs = tuple(n.operation if isinstance(n, Symbol) else n for n in found)
+    outputs = tuple(map(number_of, found))
     path = Path(tuple(one.operation for one in given), (), (outputs,), tape)
     line = python_function(path)
 

@@ -24,9 +24,10 @@ from typing import NamedTuple, TYPE_CHECKING
 from linkage_ros.kinematics.compiled.python import python_function, Values
 from linkage_ros.kinematics.compiled.trace import joints, moved, Path, traced, Wanted
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.survey import usual_inputs
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Closure, Position
+    from linkage_ros.kinematics.closure import Closure
 
 _MOST_PATHS = 8
 """So many a linkage has at most; where none holds, the plain steps answer."""
@@ -90,17 +91,24 @@ class Compiled:
         self._derivatives = derivatives
         self._wanted = wanted
         self.paths: list[Path] = []
-        functions: list[Callable[..., Values | None]] = []
-        more = (1.25,) * self._driven * derivatives
+        self._functions: list[Callable[..., Values | None]] = []
         for inputs in _states(closure):
-            if any(function(*inputs, *more) is not None for function in functions):
-                continue
-            if closure.position(*inputs).status is Status.CLOSED:
-                self.paths.append(traced(closure, inputs, derivatives, wanted))
-                functions.append(python_function(self.paths[-1]))
-                if len(functions) == _MOST_PATHS:
-                    break
-        self.fast: Callable[..., Values | None] = _first_of(functions)
+            self._follow(inputs)
+        if not self.paths:
+            # A search of its own, which takes longer.
+            self._follow(usual_inputs(closure))
+        self.fast: Callable[..., Values | None] = _first_of(self._functions)
+
+    def _follow(self, inputs: tuple[float, ...]) -> None:
+        """Add the path that the steps take at a state, if it is closed and they take a new one."""
+        more = (1.25,) * self._driven * self._derivatives
+        if len(self.paths) == _MOST_PATHS or any(
+            function(*inputs, *more) is not None for function in self._functions
+        ):
+            return
+        if self._closure.position(*inputs).status is Status.CLOSED:
+            self.paths.append(traced(self._closure, inputs, self._derivatives, self._wanted))
+            self._functions.append(python_function(self.paths[-1]))
 
     def __call__(self, *numbers: float) -> Answer:
         """

@@ -118,7 +118,7 @@ def python_function(path: Path) -> Callable[..., Values | None]:
     names = ', '.join(bound)
     body = ''.join(f'    {line}\n' for line in source.splitlines())
     namespace: dict[str, Any] = {}
-    exec(f'def bind({names}):\n{body}    return solve\n', namespace)  # noqa: S102 (our own text)
+    exec(f'def bind({names}):\n{body}    return solve\n', namespace)
     solve: Callable[..., Values | None] = namespace['bind'](**bound)
     return solve
 

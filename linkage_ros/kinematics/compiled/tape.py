@@ -109,22 +109,9 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
 }
 
 _TRUTHS = frozenset(('<', '<=', '>', '>=', '==', '!=', 'finite', 'found'))
-_REALS = frozenset(
-    (
-        'abs',
-        'sin',
-        'cos',
-        'sqrt',
-        'atan2',
-        'copysign',
-        'hypot',
-        'remainder',
-        'phase',
-        'real',
-        'imag',
-    )  # fmt: skip
-)
 _COMPLEX = frozenset(('facing', 'vector', 'conjugate'))
+_OF_EITHER = frozenset(('+', '-', '*', '/', '**', 'negative', 'where'))
+_REALS = frozenset(_VALUES) - _TRUTHS - _COMPLEX - _OF_EITHER
 
 
 class Tape:
@@ -353,8 +340,6 @@ def _kind(name: str, given: tuple[Any, ...]) -> Kind:
         return 'real'
     if name in _COMPLEX:
         return 'complex'
-    if name == 'item':
-        return 'real'
     numbers = given[1:] if name == 'where' else given
     if any(isinstance(a, complex) or getattr(a, 'kind', '') == 'complex' for a in numbers):
         return 'complex'
