@@ -136,7 +136,9 @@ class Compiled:
         given = [numbers[i * n : (i + 1) * n] for i in range(1 + self._derivatives)]
         motion = moved(self._closure, given)
         status, gap = motion.position.status, motion.position.gap
-        return Answer(status, gap, tuple(tuple(group) for group in self._wanted(motion)))
+        found = tuple(tuple(group) for group in self._wanted(motion))
+        groups = len(self.paths[0].outputs) if self.paths else 1 + self._derivatives
+        return Answer(status, gap, (*found, *((),) * (groups - len(found))))
 
 
 def _first_of(
