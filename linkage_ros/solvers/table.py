@@ -48,11 +48,10 @@ from linkage_ros.kinematics.step import State
 from linkage_ros.kinematics.survey import Way
 from linkage_ros.parameters import number, point
 from linkage_ros.solvers.solver import Solver
-from linkage_ros.tuples import new
 import numpy as np
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch.solve import Batch
+    from linkage_ros.kinematics.batch import Batch
     from numpy.typing import ArrayLike, NDArray
 
 Order = Literal['linear', 'hermite']
@@ -219,8 +218,8 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (c[i] + t * c[i + 1],)
         given = x if self._factors is None else x * self._factors[0]
-        state = new(State, ([0.0, given], self._no_pins))
-        return new(Position, (_CLOSED, 0.0, joints, state, [c, t, density]))
+        state = State([0.0, given], self._no_pins)
+        return Position(_CLOSED, 0.0, joints, state, [c, t, density])
 
     def residual(self, position: Position) -> float:
         """
@@ -270,7 +269,7 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (factor * c[i + 1],)
         given = rate if self._factors is None else rate * self._factors[0]
-        return new(Velocity, (joints, new(State, ([0.0, given], self._no_pins)), [factor]))
+        return Velocity(joints, State([0.0, given], self._no_pins), [factor])
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -301,7 +300,7 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (pull * c[i + 1],)
         given = change if self._factors is None else change * self._factors[0]
-        return new(Acceleration, (joints, new(State, ([0.0, given], self._no_pins))))
+        return Acceleration(joints, State([0.0, given], self._no_pins))
 
     def solve(
         self,

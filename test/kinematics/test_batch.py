@@ -27,8 +27,8 @@ import warnings
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.kinematics.batch import arrays
-from linkage_ros.kinematics.batch.arrays import ArrayStep, Block, CODES
+from linkage_ros.kinematics.batch import CODES
+from linkage_ros.kinematics.batch import ArrayStep, Block, CODES
 from linkage_ros.kinematics.batch.crank_rrr import ROWS
 from linkage_ros.kinematics.batch.steps import over_arrays
 from linkage_ros.kinematics.dyads.rrr import crank_diagonal, RRRDyad

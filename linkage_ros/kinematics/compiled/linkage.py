@@ -26,7 +26,7 @@ from linkage_ros.kinematics.compiled.trace import joints, moved, Path, traced, W
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Closure, Position
+    from linkage_ros.kinematics.closure import Closure
 
 _MOST_PATHS = 8
 """So many a linkage has at most; where none holds, the plain steps answer."""
@@ -89,18 +89,9 @@ class Compiled:
         self._driven = len(closure.linkage.inputs)
         self._derivatives = derivatives
         self._wanted = wanted
-        self.paths: list[Path] = []
-        functions: list[Callable[..., Values | None]] = []
-        more = (1.25,) * self._driven * derivatives
-        for inputs in _states(closure):
-            if any(function(*inputs, *more) is not None for function in functions):
-                continue
-            if closure.position(*inputs).status is Status.CLOSED:
-                self.paths.append(traced(closure, inputs, derivatives, wanted))
-                functions.append(python_function(self.paths[-1]))
-                if len(functions) == _MOST_PATHS:
-                    break
-        self.fast: Callable[..., Values | None] = _first_of(functions)
+        found = paths(closure, derivatives, wanted)
+        self.paths = [path for path, _ in found]
+        self.fast: Callable[..., Values | None] = _first_of([function for _, function in found])
 
     def __call__(self, *numbers: float) -> Answer:
         """
@@ -129,6 +120,28 @@ class Compiled:
         motion = moved(self._closure, given)
         status, gap = motion.position.status, motion.position.gap
         return Answer(status, gap, tuple(tuple(group) for group in self._wanted(motion)))
+
+
+def paths(
+    closure: Closure, derivatives: int, wanted: Wanted = joints, within_limits: bool = True
+) -> list[tuple[Path, Callable[..., Values | None]]]:
+    """
+    Return the ways that the steps take where a linkage is closed, each with its function.
+
+    The arguments are those of `traced`, which is called at states that no path has yet.
+    """
+    found: list[tuple[Path, Callable[..., Values | None]]] = []
+    close = closure.position if within_limits else closure.posed
+    more = (1.25,) * len(closure.linkage.inputs) * derivatives
+    for inputs in _states(closure):
+        if any(function(*inputs, *more) is not None for _, function in found):
+            continue
+        if close(*inputs).status is Status.CLOSED:
+            path = traced(closure, inputs, derivatives, wanted, within_limits)
+            found.append((path, python_function(path)))
+            if len(found) == _MOST_PATHS:
+                break
+    return found
 
 
 def _first_of(
