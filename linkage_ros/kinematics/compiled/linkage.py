@@ -133,14 +133,17 @@ def paths(
     found: list[tuple[Path, Callable[..., Values | None]]] = []
     close = closure.position if within_limits else closure.posed
     more = (1.25,) * len(closure.linkage.inputs) * derivatives
-    for inputs in _states(closure):
-        if any(function(*inputs, *more) is not None for _, function in found):
-            continue
-        if close(*inputs).status is Status.CLOSED:
-            path = traced(closure, inputs, derivatives, wanted, within_limits)
-            found.append((path, python_function(path)))
-            if len(found) == _MOST_PATHS:
-                break
+    for states in (_states, _within_ranges):
+        for inputs in states(closure):
+            if any(function(*inputs, *more) is not None for _, function in found):
+                continue
+            if close(*inputs).status is Status.CLOSED:
+                path = traced(closure, inputs, derivatives, wanted, within_limits)
+                found.append((path, python_function(path)))
+                if len(found) == _MOST_PATHS:
+                    break
+        if found:
+            break
     return found
 
 
@@ -181,3 +184,9 @@ def _states(closure: Closure) -> Iterator[tuple[float, ...]]:
         # Not in a middle or at an end, where links may lie in one line.
         ways.append([low + (high - low) * (i + 1.0 / pi) / each for i in range(each)])
     yield from islice(product(*ways), count)
+
+
+def _within_ranges(closure: Closure) -> Iterator[tuple[float, ...]]:
+    """Yield inputs at which a linkage closes that closes nearly nowhere."""
+    for interval in closure.closing_ranges:
+        yield (interval.lowest + (interval.highest - interval.lowest) / pi,)
