@@ -109,9 +109,9 @@ def where(condition: bool, one: float, other: float) -> float:
     Both are worked out, and both must be numbers. It is for two forms of equal standing; a
     condition that decides what becomes of a linkage is an ``if``.
     """
-    if isinstance(condition, bool):
-        return one if condition else other
-    return _of(condition, 'where', condition, one, other)
+    if hasattr(condition, 'apply'):
+        return _of(condition, 'where', condition, one, other)
+    return one if condition else other
 
 
 def _of(symbol: Any, name: str, *arguments: Any) -> Any:
