@@ -289,6 +289,8 @@ class _ClosedForm:
         return coordinates, pins
 
     def _wanted(self, motion: Motion) -> list[list[float]]:
+        if not motion.position.joints:
+            return [[]]
         x, pins = motion.position.state
         places = [part for k in self._pins for part in (pins[k].real, pins[k].imag)]
         return [[*(x[k] for k in self._numbers), *places]]

@@ -219,7 +219,9 @@ class TableClosure(Solver):
                 joints += (c[i] + t * c[i + 1],)
         given = x if self._factors is None else x * self._factors[0]
         state = State([0.0, given], self._no_pins)
-        return Position(_CLOSED, 0.0, joints, state, [c, t, density])
+        # What its own velocity starts from.
+        cell: list[Any] = [c, t, density]
+        return Position(_CLOSED, 0.0, joints, state, cell)
 
     def residual(self, position: Position) -> float:
         """

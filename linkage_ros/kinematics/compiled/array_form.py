@@ -27,7 +27,7 @@ from math import inf, tan
 import operator
 from typing import Any, Final, NamedTuple
 
-from linkage_ros.kinematics.compiled.tape import Operation
+from linkage_ros.kinematics.compiled.tape import Kind, Operation
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 import numpy as np
 
@@ -301,7 +301,7 @@ class ArrayForm:
         key = (name, *(a.number if isinstance(a, Operation) else repr(a) for a in arguments))
         found = self._known.get(key)
         if found is None:
-            kind = 'truth' if name in _COMPARED or name == 'and' else 'real'
+            kind: Kind = 'truth' if name in _COMPARED or name == 'and' else 'real'
             found = Operation(name, arguments, kind, len(self._known), None)
             self._known[key] = found
             self._bounds[found] = bounds
@@ -317,9 +317,8 @@ def _split(number: Number) -> tuple[float, Number]:
     if _constant(number):
         return number, None
     if number.name == '*' and _constant(number.arguments[0]):
-        return number.arguments
-    if number.name == '/' and _constant(number.arguments[0]):
-        return 1.0, number
+        factor, rest = number.arguments
+        return factor, rest
     return 1.0, number
 
 

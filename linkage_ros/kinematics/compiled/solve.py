@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from math import isfinite
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import all_finite
@@ -32,9 +33,9 @@ from linkage_ros.kinematics.batch import Array, Batch, CODES, Codes, Mask
 from linkage_ros.kinematics.compiled.array_form import ArrayForm, Number
 from linkage_ros.kinematics.compiled.blocks import BlockFunction
 from linkage_ros.kinematics.compiled.fates import Fate, fates, Fork
-from linkage_ros.kinematics.compiled.linkage import paths
+from linkage_ros.kinematics.compiled.linkage import Compiled, iterated
 from linkage_ros.kinematics.compiled.lowered import Lowered, lowered
-from linkage_ros.kinematics.compiled.trace import joints, moved, Wanted
+from linkage_ros.kinematics.compiled.trace import joints, Wanted
 from linkage_ros.kinematics.status import Status
 import numpy as np
 from numpy.typing import ArrayLike
@@ -92,8 +93,8 @@ class Solver:
         self._driven = len(closure.linkage.inputs)
         self._width = width
         self._wanted = wanted
-        self._paths = cache(self._found_paths)
-        self._programs = cache(self._made_programs)
+        self._compiled = cache(self._compile)
+        self._programs = cache(self._program)
 
     def solve(
         self,
@@ -139,11 +140,11 @@ class Solver:
                     rows,
                     masks,
                 )
-                self._solve(block, programs)
+                self._solve(block, programs, self._compiled(derivatives))
         return batch
 
-    def _solve(self, block: _Block, programs: Sequence[_Program]) -> None:
-        """Solve a block."""
+    def _solve(self, block: _Block, programs: Sequence[_Program], one: Compiled) -> None:
+        """Solve a block: those states that no program can tell of one by one."""
         left = block.begin(self._driven)
         for program in programs:
             if left is not None and not left.size:
@@ -152,35 +153,23 @@ class Solver:
         if left is None:
             left = np.arange(len(block.status))
         for k in left.tolist():
-            block.status[k] = self._plain(block, k)
+            block.put(k, self._driven, one)
         if self._limited and (bounds := self._closure.bounds):
             beyond = bounds.beyond(block.given, block.values[0])
             block.status[beyond & (block.status < _LIMITED)] = _LIMITED
         block.clear()
 
-    def _plain(self, block: _Block, k: int) -> int:
-        """Solve one state by the plain steps; return the code of its status."""
-        numbers = [float(n[k]) if isinstance(n, np.ndarray) else n for n in block.given]
-        n = self._driven
-        groups = [numbers[i : i + n] for i in range(0, len(numbers), n)]
-        while not all_finite(groups[-1]):
-            groups.pop()
-        motion = moved(self._closure, groups, within_limits=False)
-        if motion.position.status.has_pose:
-            for values, found in zip(block.values, self._wanted(motion), strict=False):
-                values[:, k] = found
-        return CODES[motion.position.status]
+    def _compile(self, derivatives: int) -> Compiled:
+        return Compiled(self._closure, derivatives, self._wanted, within_limits=False)
 
-    def _found_paths(self, derivatives: int) -> list[Lowered]:
-        closure = self._closure
-        if any(hasattr(step, 'branch') for step in closure.steps):
-            # Iterated links: no straight line of arithmetic.
+    def _program(self, derivatives: int, kinds: tuple[Any, ...]) -> list[_Program]:
+        """Return the paths over arrays; none where links are iterated: that is no line."""
+        if iterated(self._closure):
             return []
-        found = paths(closure, derivatives, self._wanted, within_limits=False)
-        return [lowered(path, fates(closure, path)) for path, _ in found]
-
-    def _made_programs(self, derivatives: int, kinds: tuple[Any, ...]) -> list[_Program]:
-        return [_program(path, kinds) for path in self._paths(derivatives)]
+        return [
+            _program(lowered(path, fates(self._closure, path)), kinds)
+            for path in self._compiled(derivatives).paths
+        ]
 
 
 class _Block(NamedTuple):
@@ -237,6 +226,17 @@ class _Block(NamedTuple):
         told = codes != _ASK
         self.status[off[told]] = codes[told]
         return off[~told]
+
+    def put(self, k: int, driven: int, one: Compiled) -> None:
+        """Solve a single state."""
+        numbers = [float(n[k]) if isinstance(n, np.ndarray) else n for n in self.given]
+        # A rate that is none makes none, and the pose is what it is.
+        answer = one(*(number if isfinite(number) else 0.0 for number in numbers))
+        self.status[k] = CODES[answer.status]
+        for order, (values, found) in enumerate(zip(self.values, answer.values, strict=True)):
+            if found:
+                end = (1 + order) * driven
+                values[:, k] = found if all_finite(numbers[:end]) else np.nan
 
     def _of(self, states: Any) -> list[Any]:
         return [n[states] if isinstance(n, np.ndarray) else n for n in self.given]
