@@ -22,7 +22,6 @@ from itertools import islice
 from pathlib import Path
 import random
 import time
-from typing import Any
 
 from bench.in_turn import in_turn
 from bench.processes import ROOT
@@ -31,7 +30,7 @@ from bench.spread import ratios, spread
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
+from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
 
 _RATE, _ACCELERATION = 3.0, 0.5
 _DYADS = (1, 2, 4, 8, 16, 32)
@@ -111,7 +110,7 @@ def measure_chains(plan: CompiledPlan, picture: Path | None = None) -> Table:
     contenders: dict[str, Callable[[], object]] = {}
     compiling = {}
     for dyads in _DYADS:
-        closure = Closure(read_linkage(chain_of(dyads)))
+        closure = Closure(read_linkage(parse_yaml(chain_of(dyads).encode(), 'chain')))
         begun = time.perf_counter()
         compiled = Compiled(closure, 2)
         compiling[str(dyads)] = 1e3 * (time.perf_counter() - begun)
@@ -129,26 +128,25 @@ def measure_chains(plan: CompiledPlan, picture: Path | None = None) -> Table:
     return table
 
 
-def chain_of(dyads: int) -> dict[str, Any]:
+def chain_of(dyads: int) -> str:
     """Return the linkage file of crank-rockers, each of which is driven by the rocker before."""
-    links: dict[str, Any] = {'ground': {'O0': [0, 0]}, 'crank0': {'O0': [0, 0], 'A0': [0.04, 0]}}
-    joints: dict[str, Any] = {}
-    assembly = {}
-    for i in range(dyads):
-        links['ground'][f'O{i + 1}'] = [0.1 * (i + 1), 0]
-        links[f'coupler{i}'] = {f'A{i}': [0, 0], f'B{i}': [0.12, 0]}
-        # The rocker is the crank of the next.
-        links[f'crank{i + 1}'] = {f'O{i + 1}': [0, 0], f'B{i}': [0.08, 0]}
-        if i + 1 < dyads:
-            links[f'crank{i + 1}'][f'A{i + 1}'] = [0.04, 0.01]
-        assembly[f'B{i}'] = 'left'
-        joints[f'joint{i}'] = {'parent': 'ground', 'child': f'crank{i + 1}'}
-    return {
-        'links': links,
-        'input': {'joint': 'crank_joint', 'parent': 'ground', 'child': 'crank0'},
-        'assembly': assembly,
-        'joints': joints,
-    }
+    ground = ', '.join(f'O{i}: [{0.1 * i:g}, 0]' for i in range(dyads + 1))
+    cranks = ['{O0: [0, 0], A0: [0.04, 0]}']
+    for i in range(1, dyads + 1):
+        following = f', A{i}: [0.04, 0.01]' if i < dyads else ''
+        cranks.append(f'{{O{i}: [0, 0], B{i - 1}: [0.08, 0]{following}}}')
+    return '\n'.join(
+        [
+            f'links:\n  ground: {{{ground}}}',
+            *(f'  crank{i}: {crank}' for i, crank in enumerate(cranks)),
+            *(f'  coupler{i}: {{A{i}: [0, 0], B{i}: [0.12, 0]}}' for i in range(dyads)),
+            'input: {joint: crank_joint, parent: ground, child: crank0}',
+            f'assembly: {{{", ".join(f"B{i}: left" for i in range(dyads))}}}',
+            'joints:',
+            *(f'  joint{i}: {{parent: ground, child: crank{i + 1}}}' for i in range(dyads)),
+            '',
+        ]
+    )
 
 
 def _closed_states(closure: Closure) -> Iterator[Numbers]:

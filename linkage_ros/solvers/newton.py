@@ -53,7 +53,7 @@ from linkage_ros.solvers.newton_dyad import NewtonDyad
 from linkage_ros.solvers.solver import Solver
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch.solve import Batch
+    from linkage_ros.kinematics.batch import Batch
     from numpy.typing import ArrayLike
 
 PLACING = (FixedPoint, PointOnLink, PointOnRail)

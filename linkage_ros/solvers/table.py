@@ -51,7 +51,7 @@ from linkage_ros.solvers.solver import Solver
 import numpy as np
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch.solve import Batch
+    from linkage_ros.kinematics.batch import Batch
     from numpy.typing import ArrayLike, NDArray
 
 Order = Literal['linear', 'hermite']
@@ -91,7 +91,7 @@ def build(parameters: TableParameters, linkage: Linkage) -> TableClosure:
 
 
 class _Place(NamedTuple):
-    """Where in a table a position lies: the cell's coefficients, the part of it, cells by input."""
+    """Where a position lies in a table: its cell's coefficients, what part of it, and cells by x."""
 
     coefficients: tuple[float, ...]
     part: float

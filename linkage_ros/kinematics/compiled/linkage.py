@@ -73,6 +73,8 @@ class Compiled:
         What it is asked for: positions (0), velocities too (1), and accelerations (2).
     wanted
         Which numbers of these; all published joints if not given.
+    within_limits
+        Whether a state with a joint beyond its limits is limited.
 
     Attributes
     ----------
@@ -85,8 +87,15 @@ class Compiled:
 
     """
 
-    def __init__(self, closure: Closure, derivatives: int = 0, wanted: Wanted = joints) -> None:
+    def __init__(
+        self,
+        closure: Closure,
+        derivatives: int = 0,
+        wanted: Wanted = joints,
+        within_limits: bool = True,
+    ) -> None:
         self._closure = closure
+        self._within_limits = within_limits
         self._driven = len(closure.linkage.inputs)
         self._derivatives = derivatives
         self._wanted = wanted
@@ -94,7 +103,7 @@ class Compiled:
         self._functions: list[Callable[..., Values | None]] = []
         for inputs in _states(closure):
             self._follow(inputs)
-        if not self.paths:
+        if not self.paths and (self._driven > 1 or closure.input_ranges):
             # A search of its own, which takes longer.
             self._follow(usual_inputs(closure))
         self.fast: Callable[..., Values | None] = _first_of(self._functions)
@@ -106,8 +115,11 @@ class Compiled:
             function(*inputs, *more) is not None for function in self._functions
         ):
             return
-        if self._closure.position(*inputs).status is Status.CLOSED:
-            self.paths.append(traced(self._closure, inputs, self._derivatives, self._wanted))
+        close = self._closure.position if self._within_limits else self._closure.posed
+        if close(*inputs).status is Status.CLOSED:
+            self.paths.append(
+                traced(self._closure, inputs, self._derivatives, self._wanted, self._within_limits)
+            )
             self._functions.append(python_function(self.paths[-1]))
 
     def __call__(self, *numbers: float) -> Answer:
@@ -134,11 +146,16 @@ class Compiled:
         """Return the answer of the plain steps."""
         n = self._driven
         given = [numbers[i * n : (i + 1) * n] for i in range(1 + self._derivatives)]
-        motion = moved(self._closure, given)
+        motion = moved(self._closure, given, self._within_limits)
         status, gap = motion.position.status, motion.position.gap
         found = tuple(tuple(group) for group in self._wanted(motion))
         groups = len(self.paths[0].outputs) if self.paths else 1 + self._derivatives
         return Answer(status, gap, (*found, *((),) * (groups - len(found))))
+
+
+def iterated(closure: Closure) -> bool:
+    """Return whether a linkage has links that only iteration solves."""
+    return any(hasattr(step, 'branch') for step in closure.steps)
 
 
 def _first_of(
@@ -163,8 +180,7 @@ def _states(closure: Closure) -> Iterator[tuple[float, ...]]:
     linkage = closure.linkage
     if linkage.pose is not None:
         yield linkage.pose.inputs
-    iterated = any(hasattr(step, 'branch') for step in closure.steps)
-    count = _TRIED_ITERATED if iterated else _TRIED
+    count = _TRIED_ITERATED if iterated(closure) else _TRIED
     each = max(2, round(count ** (1.0 / len(linkage.inputs))))
     ways = []
     for given in linkage.inputs:
