@@ -21,13 +21,17 @@ value, and the remedy. It is printable, on one line, and not without end, whatev
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from os import PathLike
 from typing import Any
 
 _LONGEST_VALUE = 80
 _LONGEST_PART = 2000
+
+_PYTHON_PACKAGES = {'mcap': 'mcap', 'numpy': 'numpy', 'yaml': 'PyYAML'}
+"""What every installation needs beside ROS: name of the import, and of the package."""
 
 
 class LinkageError(Exception):
@@ -94,6 +98,36 @@ class RecordingError(LinkageError):
 
 class BagError(LinkageError):
     """A bag that cannot be read; ``where`` is its folder or file."""
+
+
+@contextmanager
+def missing_packages_reported() -> Iterator[None]:
+    """
+    Raise an error of one line where a package that cannot be done without is not installed.
+
+    Packages of one kind of work alone are looked for where that work begins, with their own
+    remedies: so what is missing here is one of Python's that all installations need, or ROS.
+
+    Raises
+    ------
+    LinkageError
+        Where an import within finds no such package.
+
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        name = (error.name or '').partition('.')[0]
+        if name in {'', 'linkage_ros'}:
+            raise
+        if package := _PYTHON_PACKAGES.get(name):
+            remedy = (
+                f'python3 -m pip install {package} '
+                "(into the system's Python with --user --break-system-packages)"
+            )
+        else:
+            remedy = "source the setup.bash of ROS 2, or pip install 'linkage_ros[ros]'"
+        raise LinkageError(name, 'is not installed', remedy) from None
 
 
 def did_you_mean(name: str, names: Iterable[str], otherwise: str) -> str:
