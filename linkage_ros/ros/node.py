@@ -145,7 +145,7 @@ class LinkageNode(LifecycleNode):
     # Transitions.
 
     @_reporting
-    def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
+    def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Load the scene and prove that it can be built."""
         file = self.get_parameter('scene').value
         try:
@@ -156,6 +156,10 @@ class LinkageNode(LifecycleNode):
             scene = load_scene(file)
             pipeline = Pipeline(scene)  # what it calls for is proven now, not at the first tick
             self._scene_topics.connect(pipeline)
+            for closure in pipeline.closures:
+                # Found before the first tick, which would wait for it: iterated links are followed
+                # there.
+                _ = closure.singular_inputs
             if scene.robot_description:
                 self._scene_topics.describe(scene, pipeline)
         except LinkageError as error:
@@ -229,10 +233,6 @@ class LinkageNode(LifecycleNode):
         shared = self.crank_topic == self._joint_states.topic_name
         pipeline = Pipeline(scene, self._closures)
         closures, injection = pipeline.closures, pipeline.injection
-        for closure in closures:
-            # Found before the first tick, which would wait for it: iterated links are followed
-            # there.
-            _ = closure.singular_inputs
         crank = self._scene_topics.crank
         return TickLoop(
             partial(Pipeline, scene, closures, injection),
