@@ -151,7 +151,7 @@ class Line:
             loads=member.loads,
             friction=friction.friction(parameters['friction']) if friction else None,
             prefix=member.prefix,
-            dependent=frozenset(scene.joints).difference(*(each.inputs for each in scene.members)),
+            dependent=scene.dependent_joints,
             effects=frozenset(member.effects),
             moves_by_rates=moves_by_rates,
         )

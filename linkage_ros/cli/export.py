@@ -149,6 +149,7 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
     """Return what to write, as it was asked for or as the bag says."""
     types = {each.name: each.type for each in bag.topics}
     readable = {name: kind for name, kind in types.items() if kind in TYPES}
+    run = run_or_blank(bag)
     if topic is not None:
         others = f'name {" or ".join(readable) or "another bag"}'
         if topic not in types:
@@ -159,8 +160,11 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
             raise BagError(
                 bag.path, f'{topic} is of {types[topic]}, which is not about joints', others
             )
-        return Source(bag, {topic: types[topic]}, (), _any)
-    run = run_or_blank(bag)
+        # Commands of a crank may name joints that follow from it, without a number for them.
+        dependent: frozenset[str] = frozenset()
+        if scene is not None and topic == run.crank_topic:
+            dependent = scene.dependent_joints
+        return Source(bag, {topic: types[topic]}, (), _any, dependent)
     joint_states = run.joint_states_topic
     if joint_states not in readable:
         joint_states = _only_joint_states(bag, readable)

@@ -59,6 +59,8 @@ class Source(NamedTuple):
         Topics whose messages end a tick.
     wanted
         Tells by the names in a JointState whether it is one; others of its topic are passed over.
+    dependent
+        Names of joints that nobody can command, as for `MessageValues`.
 
     """
 
@@ -66,6 +68,7 @@ class Source(NamedTuple):
     types: Mapping[str, str]
     closing: Collection[str]
     wanted: Callable[[Sequence[str]], bool]
+    dependent: Collection[str] = ()
 
 
 class Found(NamedTuple):
@@ -177,7 +180,9 @@ def rows_of(source: Source, keys: Sequence[Key], told: Told) -> Iterator[Row]:
 
 def _ticks(source: Source, left_out: Counter[tuple[str, str]], told: Told) -> Iterator[_Tick]:
     """Yield the ticks of a bag; count the messages that are left out."""
-    readers = {topic: MessageValues(kind) for topic, kind in source.types.items()}
+    readers = {
+        topic: MessageValues(kind, source.dependent) for topic, kind in source.types.items()
+    }
     closing, wanted = source.closing, source.wanted
     tick: _Tick | None = None
     read = 0

@@ -359,6 +359,30 @@ def test_any_name_is_a_heading(tmp_path: Path, exported: Any) -> None:
     assert rows[0][4:] == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
 
 
+def test_a_command_has_a_row_though_the_joints_that_follow_have_no_effort(
+    tmp_path: Path, exported: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = ['rocker_joint', 'crank_joint']
+    scene = scene_file(tmp_path, 'rate: 100\n')
+    run = {'scene': 's', 'joint_states_topic': '/js', 'crank_topic': '/crank_commands'}
+    writer = BagWriter(
+        tmp_path / 'bag',
+        [topic('/js', JOINT_STATE), topic('/crank_commands', JOINT_STATE)],
+        {
+            RUN_FILE: ('', json.dumps(run).encode()),
+            'scene.yaml': ('', scene.read_bytes()),
+            'linkage.yaml': ('', (tmp_path / 'l.yaml').read_bytes()),
+        },
+    )
+    for time, efforts in enumerate(([0.5, 1.5], [2.5], [3.5])):
+        writer.write(1, BEGIN + time, BEGIN + time, joint_state(time, names, (), (), efforts))
+    writer.close()
+    heads, rows = exported(tmp_path / 'bag', '--topic', '/crank_commands')
+    assert heads[4:] == ['rocker_joint effort [N·m]', 'crank_joint effort [N·m]']
+    assert [row[4:] for row in rows] == [[0.5, 1.5], [None, 2.5], [None, 3.5]]
+    assert capsys.readouterr().err == ''
+
+
 def test_messages_that_tell_nothing_sure_are_left_out_and_counted(
     tmp_path: Path, exported: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
