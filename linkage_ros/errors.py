@@ -28,6 +28,7 @@ from os import PathLike
 from typing import Any
 
 _LONGEST_VALUE = 80
+_LONGEST_LIST = 800
 _LONGEST_PART = 2000
 
 _PYTHON_PACKAGES = {'mcap': 'mcap', 'numpy': 'numpy', 'yaml': 'PyYAML'}
@@ -143,6 +144,18 @@ def quoted(value: Any) -> str:
     What is too long loses its middle: a path ends with the name that matters.
     """
     return shortened(repr(value), _LONGEST_VALUE)
+
+
+def listed(names: Iterable[str], between: str = ', ') -> str:
+    """Return names as an error message lists them: not without end, whoever has made them."""
+    names, shown, letters = list(names), [], 0
+    for name in names:
+        shown.append(shortened(clean(name), _LONGEST_VALUE))
+        letters += len(shown[-1]) + len(between)
+        if letters > _LONGEST_LIST:
+            break
+    more = len(names) - len(shown)
+    return between.join(shown) + (f' and {more} more' if more else '')
 
 
 def shortened(text: str, most: int) -> str:
