@@ -42,7 +42,7 @@ from linkage_ros.bag.reading.run_events import (
 )
 from linkage_ros.cdr import text_of, TIME_END
 from linkage_ros.errors import BagError
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.joint_state import OwnJointStates
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
@@ -141,7 +141,7 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
     pipeline = Pipeline(scene)
     closures, injection = pipeline.closures, pipeline.injection
     last = 0
-    for event in recorded_events(run_account(bag), own_head(scene), messages):
+    for event in recorded_events(run_account(bag), own_joint_states(scene), messages):
         if event.log_time < last:
             pipeline = Pipeline(scene, closures, injection)
         last = event.log_time
@@ -163,9 +163,9 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
             turn(bag, injection, event.data)
 
 
-def own_head(scene: Scene) -> bytes:
-    """Return what the joint states of a scene have behind their stamp."""
-    return JointStateWriter(scene.joints).names
+def own_joint_states(scene: Scene) -> OwnJointStates:
+    """Return what tells the joint states of a scene from others on their topic."""
+    return OwnJointStates(member.joints for member in scene.members)
 
 
 def change_text(change: Change, kind: str) -> str:

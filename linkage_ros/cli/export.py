@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from itertools import islice
 from pathlib import Path
 import sys
@@ -50,7 +50,7 @@ from linkage_ros.cli.tick_rows import (
     TIME,
 )
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
-from linkage_ros.replay import recorded_scene
+from linkage_ros.replay import own_joint_states, recorded_scene
 from linkage_ros.scene.scene import Scene
 from linkage_ros.stop import StoppedError
 
@@ -164,46 +164,21 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
         dependent: frozenset[str] = frozenset()
         if scene is not None and topic == run.crank_topic:
             dependent = scene.dependent_joints
-        return Source(bag, {topic: types[topic]}, (), _any, dependent)
+        return Source(bag, {topic: types[topic]}, (), {}, dependent)
     joint_states = run.joint_states_topic
     if joint_states not in readable:
         joint_states = _only_joint_states(bag, readable)
-        return Source(bag, {joint_states: JOINT_STATE}, (), _any)
+        return Source(bag, {joint_states: JOINT_STATE}, (), {})
     written = [joint_states, *(name for name in run.extras if name in readable)]
-    own = _Own(scene) if scene is not None and run.crank_topic == joint_states else _any
+    wanted = {}
+    if scene is not None and run.crank_topic == joint_states:
+        wanted[joint_states] = own_joint_states(scene)
     return Source(
         bag,
         {name: types[name] for name in written},
         {run.crank_topic, run.faults_topic, run.withheld_topic, run.resets_topic},
-        own,
+        wanted,
     )
-
-
-def _any(_names: Sequence[str]) -> bool:
-    return True
-
-
-class _Own:
-    """
-    Tells joint states of a scene from crank samples on the same topic, by their joints.
-
-    Parameters
-    ----------
-    scene
-        The scene; of its linkages some may be left out of a message.
-
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        self._members = [member.joints for member in scene.members]
-
-    def __call__(self, names: Sequence[str]) -> bool:
-        left = tuple(names)
-        for joints in self._members:
-            count = len(joints)
-            if left[:count] == joints:
-                left = left[count:]
-        return not left
 
 
 def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:

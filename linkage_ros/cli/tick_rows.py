@@ -58,7 +58,7 @@ class Source(NamedTuple):
     closing
         Topics whose messages end a tick.
     wanted
-        Tells by the names in a JointState whether it is one; others of its topic are passed over.
+        Of a topic with messages of others, what tells which are of the rows.
     dependent
         Names of joints that nobody can command, as for `MessageValues`.
 
@@ -67,7 +67,7 @@ class Source(NamedTuple):
     bag: Bag
     types: Mapping[str, str]
     closing: Collection[str]
-    wanted: Callable[[Sequence[str]], bool]
+    wanted: Mapping[str, Callable[[bytes], bool]]
     dependent: Collection[str] = ()
 
 
@@ -194,7 +194,7 @@ def _ticks(source: Source, left_out: Counter[tuple[str, str]], told: Told) -> It
         values = reader.read(data) if reader is not None else None
         if isinstance(values, str):
             left_out[topic, values] += 1
-        elif values is not None and wanted(values.names):
+        elif values is not None and (topic not in wanted or wanted[topic](data)):
             if tick is not None:
                 if tick.published == published and topic not in tick.messages:
                     tick.messages[topic] = values

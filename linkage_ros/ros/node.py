@@ -33,9 +33,10 @@ from typing import Any, TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticArray
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
+from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import own_joint_states
 from linkage_ros.ros import pacing
 from linkage_ros.ros.bag_topics import bag_topic
 from linkage_ros.ros.diagnostics import CLOCK_PATIENCE, Health, no_clock, Snapshot
@@ -238,7 +239,7 @@ class LinkageNode(LifecycleNode):
             partial(Pipeline, scene, closures, injection),
             self._scene_topics.take,
             self._joint_states.handle.publish_raw,
-            JointStateWriter(scene.joints).names if shared else b'',
+            own_joint_states(scene) if shared else None,
             [extra.handle.publish_raw for extra in self._scene_topics.extras],
             self._scene_topics.publish_change,
             # A queue without bounds is taken from for as long as a tick may.
