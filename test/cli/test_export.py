@@ -245,6 +245,13 @@ def test_a_linkage_without_a_reading_leaves_its_cells_empty(
     assert not any(row[6] is None for row in rows)
 
 
+def test_on_a_shared_topic_the_pin_forces_are_in_the_rows(tmp_path: Path, exported: Any) -> None:
+    scene = scene_file(tmp_path, EVERYTHING, FOUR_BAR)
+    heads, rows = exported(Recorded(tmp_path / 'bag', scene, crank, '/joint_states').run(20))
+    force = heads.index('A force x [N]')
+    assert [row[force] is None for row in rows] == [row[4] is None for row in rows] != []
+
+
 @pytest.mark.parametrize(
     ('said', 'crank'),
     [
