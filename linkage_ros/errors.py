@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from copyreg import __newobj__  # type: ignore[attr-defined]
 from difflib import get_close_matches
 from os import PathLike
 from typing import Any
@@ -56,6 +57,11 @@ class LinkageError(Exception):
             for text in (str(where), reason, remedy)
         )
         super().__init__(f'{self.where}: {self.reason}; {self.remedy}')
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # An exception is else made anew from its text alone, which none of these is: what a
+        # process of workers raises would not come back.
+        return __newobj__, (type(self), *self.args), vars(self)
 
 
 class DefinitionError(LinkageError):
