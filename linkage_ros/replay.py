@@ -41,7 +41,7 @@ from linkage_ros.bag.reading.run_events import (
     VERSIONS,
 )
 from linkage_ros.cdr import text_of, TIME_END
-from linkage_ros.errors import BagError
+from linkage_ros.errors import BagError, listed
 from linkage_ros.joint_state import OwnJointStates
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
@@ -97,7 +97,7 @@ def recorded_scene(bag: Bag, *, trust_effects: bool = False) -> Scene:
     if missing:
         raise BagError(
             bag.path,
-            f'carries no {", ".join(sorted(missing))}',
+            f'carries no {listed(sorted(missing))}',
             'name a bag that linkage_ros has recorded',
         )
     run = run_account(bag)

@@ -23,6 +23,9 @@ from pkgutil import walk_packages
 import linkage_ros
 from linkage_ros.errors import FileError, LinkageError, listed
 from linkage_ros.models.part import PartError
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import parse_yaml
+import pytest
 
 TEXTS = 'where', 'reason', 'remedy'
 ARGUMENTS = {FileError: ('file', 'key', 'reason', 'remedy', 7), PartError: (3, *TEXTS)}
@@ -63,3 +66,20 @@ def test_a_list_of_names_is_short_and_says_how_many_more_there_are() -> None:
     assert shown == names[: len(shown)]
     assert text.endswith(f' and {1000 - len(shown)} more')
     assert len(listed(['x' * 100_000] * 3)) < 1000
+
+
+def test_an_error_that_lists_the_names_of_a_file_can_be_read() -> None:
+    names = [f'{number:04}_{"x" * 60}' for number in range(300)]
+    links = '\n'.join(f'  {name}: {{A: [0, 0], P{name}: [1, 0]}}' for name in names)
+    text = f"""
+links:
+  ground: {{O: [0, 0], Q: [1, 0]}}
+{links}
+input: {{joint: crank, parent: ground, child: unheard of}}
+joints: {{j: {{parent: ground, child: {names[0]}}}}}
+"""
+    with pytest.raises(FileError) as caught:
+        read_linkage(parse_yaml(text.encode(), 'l.yaml'))
+    assert caught.value.remedy.startswith('name one of 0000_xxx')
+    assert caught.value.remedy.endswith(' more')
+    assert len(caught.value.remedy) < 1000

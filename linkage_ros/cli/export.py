@@ -49,7 +49,7 @@ from linkage_ros.cli.tick_rows import (
     survey,
     TIME,
 )
-from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
+from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError, listed
 from linkage_ros.replay import own_joint_states, recorded_scene
 from linkage_ros.scene.scene import Scene
 from linkage_ros.stop import StoppedError
@@ -151,7 +151,7 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
     readable = {name: kind for name, kind in types.items() if kind in TYPES}
     run = run_or_blank(bag)
     if topic is not None:
-        others = f'name {" or ".join(readable) or "another bag"}'
+        others = f'name {listed(readable, " or ") or "another bag"}'
         if topic not in types:
             raise BagError(
                 bag.path, f'holds no topic {topic}', did_you_mean(topic, readable, others)
@@ -186,13 +186,11 @@ def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
     if len(found) == 1:
         return found[0]
     if found:
-        raise BagError(
-            bag.path, f'holds joint states on {", ".join(found)}', 'name one with --topic'
-        )
+        raise BagError(bag.path, f'holds joint states on {listed(found)}', 'name one with --topic')
     raise BagError(
         bag.path,
         f'holds no topic of {JOINT_STATE}',
-        f'name {" or ".join(readable)} with --topic' if readable else 'name another bag',
+        f'name {listed(readable, " or ")} with --topic' if readable else 'name another bag',
     )
 
 
@@ -201,7 +199,7 @@ def _nothing(source: Source, found: Found) -> BagError:
     why = f' ({reasons[0][1]} left out: {reasons[0][0][1]})' if reasons else ''
     return BagError(
         source.bag.path,
-        f'holds no message on {", ".join(source.types)} to write{why}',
+        f'holds no message on {listed(source.types)} to write{why}',
         'name another topic with --topic, or another bag',
     )
 
