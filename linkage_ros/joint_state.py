@@ -304,7 +304,7 @@ class OwnJointStates:
         if message.startswith(self._all, STAMP_END):
             return True
         at = _FIRST_NAME
-        counted = message[at - _COUNT.size : at]
+        counted = message[_COUNT_AT:at]
         if not message.startswith(_NO_FRAME, STAMP_END) or len(counted) < _COUNT.size:
             return False
         (count,) = _COUNT.unpack(counted)
@@ -321,7 +321,8 @@ _COUNT = Struct('<I')
 _NO_FRAME = head_of_joints(())[:8]
 """What stands behind the stamp and before the count of the names: an empty frame_id."""
 
-_FIRST_NAME = STAMP_END + len(_NO_FRAME) + _COUNT.size
+_COUNT_AT = STAMP_END + len(_NO_FRAME)
+_FIRST_NAME = _COUNT_AT + _COUNT.size
 
 
 def _names(joints: Sequence[str]) -> bytes:
