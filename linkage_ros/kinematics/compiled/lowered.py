@@ -61,7 +61,7 @@ def lowered(path: Path, fates: tuple[Fate, ...] = ()) -> Lowered:
         Where links are iterated.
 
     """
-    lower = _Lower()
+    lower = Lowering()
     inputs = tuple(lower.operation(given) for given in path.inputs)
     decisions = tuple(
         Decision(lower.operation(condition), held) for condition, held in path.decisions
@@ -75,7 +75,7 @@ def lowered(path: Path, fates: tuple[Fate, ...] = ()) -> Lowered:
     )
 
 
-class _Lower:
+class Lowering:
     """Writes the operations of one tape on another."""
 
     def __init__(self) -> None:
