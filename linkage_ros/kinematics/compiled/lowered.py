@@ -134,7 +134,7 @@ _MAKES_PARTS = frozenset(('facing', 'vector'))
 
 def _times(one: Any, other: Any) -> Any:
     """Return a product; 0 where a constant is."""
-    if one is None or other is None or _zero(one) or _zero(other):
+    if not _constants(one, other) and (_zero(one) or _zero(other)):
         return 0.0
     return one * other
 
@@ -143,11 +143,20 @@ def _zero(number: Any) -> bool:
     return isinstance(number, int | float) and number == 0.0
 
 
+def _constants(one: Any, other: Any) -> bool:
+    """Return whether both are constants, of which a zero has its right sign, too."""
+    return isinstance(one, int | float) and isinstance(other, int | float)
+
+
 def _sum(one: Any, other: Any) -> Any:
+    if _constants(one, other):
+        return one + other
     return other if _zero(one) else one if _zero(other) else one + other
 
 
 def _difference(one: Any, other: Any) -> Any:
+    if _constants(one, other):
+        return one - other
     return -other if _zero(one) else one if _zero(other) else one - other
 
 
