@@ -27,6 +27,7 @@ from linkage_ros.kinematics.compiled.source import (
     STATUSES,
     Subject,
 )
+from linkage_ros.kinematics.compiled.tape import Operation
 
 _NOTES = (
     '',
@@ -38,6 +39,11 @@ _NOTES = (
 
 _CHECK = ('#include <float.h>', '#include <math.h>', '', '#if DBL_MANT_DIG < 53',
           '#error "double has fewer than 64 bits here"', '#endif')  # fmt: skip
+
+# Compilers make a product of a square, and other last digits than those of linkage_ros, which
+# calls pow().
+_TWO = 'two'
+_DECLARED_TWO = f'    const volatile double {_TWO} = 2.0;  /* pow() is called, as linkage_ros does */'
 
 
 class C(Language):
@@ -59,6 +65,12 @@ class C(Language):
     def __init__(self, name: str, *, header: bool) -> None:
         self._name = name
         self._header = header
+
+    def call(self, operation: Operation, parts: list[str]) -> str:
+        """Write the call of a function."""
+        if operation.name == '**' and parts[1] == '2.0':
+            return f'pow({parts[0]}, {_TWO})'
+        return super().call(operation, parts)
 
     def assigned(self, name: str, text: str, truth: bool = False) -> str:
         """Write a line that gives a name to a number, or to a truth."""
@@ -110,7 +122,8 @@ class C(Language):
         statuses = [f'    {self.status(status)} = {i},' for i, status in enumerate(STATUSES)]
         statuses[-1] = statuses[-1].removesuffix(',')
         listed = [f'{kind} {{', *statuses, '};']
-        definition = [*signature, '{', *body, '}']
+        declared = [_DECLARED_TWO] if any(f'{_TWO})' in line for line in body) else []
+        definition = [*signature, '{', *declared, *body, '}']
         comment = ['/*', *(f' * {_harmless(line)}'.rstrip() for line in (*head, *_NOTES)), ' */']
         if self._header:
             guard = f'{name.upper()}_{function.upper()}_H'
