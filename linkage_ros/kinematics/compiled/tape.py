@@ -90,6 +90,7 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
     'copysign': math.copysign,
     'hypot': math.hypot,
     'remainder': math.remainder,
+    'round': round,
     'facing': lambda angle: cmath.rect(1.0, angle),
     'phase': cmath.phase,
     'vector': complex,
@@ -111,8 +112,8 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
 _TRUTHS = frozenset(('<', '<=', '>', '>=', '==', '!=', 'finite', 'found'))
 _REALS = frozenset(
     (
-        'abs', 'sin', 'cos', 'sqrt', 'atan2', 'copysign', 'hypot', 'remainder', 'phase', 'real',
-        'imag',
+        'abs', 'sin', 'cos', 'sqrt', 'atan2', 'copysign', 'hypot', 'remainder', 'round', 'phase',
+        'real', 'imag',
     )  # fmt: skip
 )
 _COMPLEX = frozenset(('facing', 'vector', 'conjugate'))
@@ -237,6 +238,9 @@ class Symbol:
 
     def __abs__(self) -> Any:
         return self.tape.write('abs', self)
+
+    def __round__(self) -> Any:
+        return self.tape.write('round', self)
 
     def __lt__(self, other: Any) -> Any:
         return self.tape.write('<', self, other)
