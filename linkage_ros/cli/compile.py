@@ -78,10 +78,12 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         )
     content, _ = read_yaml(arguments.file)
     closure = Closure(read_linkage(content))
+    file = Path(arguments.file)
+    in_c = output.suffix in ('.c', '.h')
     subject = Subject(
         closure,
-        _name(arguments.file, arguments.name),
-        Path(arguments.file).name,
+        _name(arguments.file, arguments.name) if in_c else file.stem,
+        file.name,
         arguments.derivatives,
         _joints(closure, arguments.joints),
     )

@@ -31,8 +31,8 @@ from linkage_ros.kinematics.compiled.tape import Operation
 
 _NOTES = (
     '',
-    'Values are written where the status has values; else the arrays stay as they were. Nothing is',
-    'allocated, and nothing is remembered: calls from several threads are safe. The digits are',
+    'Values are written where the status has values; else the arrays stay as they were. Nothing',
+    'is allocated, and nothing is remembered: calls from several threads are safe. The digits are',
     'those of linkage_ros where the compiler keeps to IEEE 754: -ffp-contract=off, and never',
     '-ffast-math, which takes the checks out. It needs doubles of 64 bits and libm (-lm).',
 )
@@ -43,7 +43,9 @@ _CHECK = ('#include <float.h>', '#include <math.h>', '', '#if DBL_MANT_DIG < 53'
 # Compilers make a product of a square, and other last digits than those of linkage_ros, which
 # calls pow().
 _TWO = 'two'
-_DECLARED_TWO = f'    const volatile double {_TWO} = 2.0;  /* pow() is called, as linkage_ros does */'
+_DECLARED_TWO = (
+    f'    const volatile double {_TWO} = 2.0;  /* pow() is called, as linkage_ros does */'
+)
 
 
 class C(Language):
@@ -122,8 +124,8 @@ class C(Language):
         statuses = [f'    {self.status(status)} = {i},' for i, status in enumerate(STATUSES)]
         statuses[-1] = statuses[-1].removesuffix(',')
         listed = [f'{kind} {{', *statuses, '};']
-        declared = [_DECLARED_TWO] if any(f'{_TWO})' in line for line in body) else []
-        definition = [*signature, '{', *declared, *body, '}']
+        two = [_DECLARED_TWO] if any(f'{_TWO})' in line for line in body) else []
+        definition = [*signature, '{', *two, *body, '}']
         comment = ['/*', *(f' * {_harmless(line)}'.rstrip() for line in (*head, *_NOTES)), ' */']
         if self._header:
             guard = f'{name.upper()}_{function.upper()}_H'
@@ -133,11 +135,10 @@ class C(Language):
                 '', f'#endif  /* {guard} */',
             ]  # fmt: skip
         else:
-            lines = [
-                *_CHECK, '', '/* To declare, where the function is called: */', '#ifdef __cplusplus',
-                'extern "C" {', '#endif', *listed, *signature[:-1], f'{signature[-1]};',
-                '#ifdef __cplusplus', '}', '#endif', '', *definition,
-            ]  # fmt: skip
+            declared = ['#ifdef __cplusplus', 'extern "C" {', '#endif', *listed, *signature[:-1]]
+            declared += [f'{signature[-1]};', '#ifdef __cplusplus', '}', '#endif']
+            told = '/* What a caller declares: */'
+            lines = [*_CHECK, '', told, *declared, '', *definition]
         return '\n'.join([*comment, '', *lines, ''])
 
 

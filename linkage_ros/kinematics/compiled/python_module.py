@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+
 from linkage_ros.kinematics.compiled.source import (
     FUNCTIONS,
     GIVEN,

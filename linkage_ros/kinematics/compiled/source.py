@@ -270,10 +270,8 @@ class _Body:
     def _solved(self, leaf: Solved) -> None:
         language, writer = self._language, self._writer
         *groups, bounded = leaf.outputs
-        beyond = []
         bounds = self._subject.closure.bounds
-        for bound in bounds.inputs:
-            beyond.append(self._beyond(bound, f'q{bound.number}'))
+        beyond = [self._beyond(bound, f'q{bound.number}') for bound in bounds.inputs]
         for number, (bound, value) in enumerate(zip(bounds.joints, bounded, strict=True)):
             name = f'limited{number}'
             writer.lines.append(language.assigned(name, writer.write(value)))
@@ -355,7 +353,7 @@ def _head(subject: Subject) -> Iterator[str]:
     """Yield the lines of the head."""
     closure = subject.closure
     linkage = closure.linkage
-    yield f'{subject.name}: a planar linkage, written by linkage_ros {__version__}'
+    yield f'{clean(subject.name)}: a planar linkage, written by linkage_ros {__version__}'
     yield f'from {clean(subject.file)}. Change that file, and compile it again.'
     yield ''
     yield f'The function {FUNCTIONS[subject.derivatives]} takes:'

@@ -110,11 +110,15 @@ def traced(
     return Path(
         tuple(symbol.operation for group in given for symbol in group),
         tuple(tape.decisions),
-        tuple(
-            tuple(n.operation if isinstance(n, Symbol) else n for n in group)
-            for group in wanted(motion)
-        ),
+        operations(wanted(motion)),
         tape,
+    )
+
+
+def operations(groups: Sequence[Sequence[Any]]) -> tuple[tuple[Number, ...], ...]:
+    """Return symbols in groups as the operations that they are; constants stay."""
+    return tuple(
+        tuple(n.operation if isinstance(n, Symbol) else n for n in group) for group in groups
     )
 
 

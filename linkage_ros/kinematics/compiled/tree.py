@@ -24,13 +24,13 @@ None, and what is written from the tree gives no numbers there.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple, TypeAlias, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.kinematics.compiled.lowered import Lowering
-from linkage_ros.kinematics.compiled.tape import Operation, Symbol, Tape
-from linkage_ros.kinematics.compiled.trace import joints, moved, Number, traced, Wanted
+from linkage_ros.kinematics.compiled.tape import Operation, Tape
+from linkage_ros.kinematics.compiled.trace import joints, moved, Number, operations, traced, Wanted
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Iterated
 
@@ -158,7 +158,7 @@ class _Growth:
         self,
         closure: Closure,
         tape: Tape,
-        given: Sequence[Sequence[Symbol]],
+        given: Sequence[Sequence[Any]],
         wanted: Wanted,
         taken: Sequence[tuple[bool, ...]],
     ) -> None:
@@ -203,13 +203,7 @@ class _Growth:
         self._solved += 1
         tape.begin(ahead)
         motion = moved(closure, self._given, within_limits=False)
-        return Solved(
-            motion.position.status,
-            tuple(
-                tuple(n.operation if isinstance(n, Symbol) else n for n in group)
-                for group in self._wanted(motion)
-            ),
-        )
+        return Solved(motion.position.status, operations(self._wanted(motion)))
 
 
 def _lowered(tree: Tree, lowering: Lowering) -> Tree:

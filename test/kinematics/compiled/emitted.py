@@ -19,7 +19,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Sequence
 import ctypes
-from math import inf, nan, nextafter, pi, tau
+from math import inf, isnan, nan, nextafter, pi, tau
 import os
 from pathlib import Path
 import random
@@ -150,15 +150,14 @@ void run(long count, const double *given, int *statuses, double *values)
     taken = array('d', (number for state in given for number in state[: n * groups]))
     statuses = array('i', [-1]) * len(given)
     values = array('d', [nan]) * (len(given) * joints * groups)
-    ctypes.CDLL(str(library)).run(
-        ctypes.c_long(len(given)), *(ctypes.c_void_p(a.buffer_info()[0]) for a in (taken, statuses, values))
-    )  # fmt: skip
+    places = (ctypes.c_void_p(each.buffer_info()[0]) for each in (taken, statuses, values))
+    ctypes.CDLL(str(library)).run(ctypes.c_long(len(given)), *places)
     width = joints * groups
     told = []
     for number, status in enumerate(statuses):
         found = values[number * width : (number + 1) * width]
-        # What was not written is still NaN, and NaN is not itself.
-        told.append(Told(NUMBERS[status], tuple(v for v in found if v == v)))  # noqa: PLR0124
+        # What was not written is still NaN.
+        told.append(Told(NUMBERS[status], tuple(v for v in found if not isnan(v))))
     return told
 
 

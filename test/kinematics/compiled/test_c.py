@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A linkage in C says what the plain steps say, to the last bit, and compiles without a warning."""
+"""A linkage in C says what the plain steps say, to the last bit, and compiles in silence."""
 
 from __future__ import annotations
 
@@ -29,7 +29,6 @@ from linkage_ros.kinematics.compiled.source import source
 from linkage_ros.kinematics.linkage import Limits
 import pytest
 
-from ..test_gallery import closure_of, KINDS
 from .emitted import (
     alike,
     build,
@@ -43,6 +42,7 @@ from .emitted import (
     subject,
     Told,
 )
+from ..test_gallery import closure_of, KINDS  # noqa: TID252
 
 GALLERY = [name for name, kinds in KINDS.items() if kinds != 'iterated']
 DYADS = [family for family in FAMILIES if not family.startswith('class III')]

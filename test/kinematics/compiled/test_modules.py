@@ -30,9 +30,9 @@ from linkage_ros.kinematics.compiled.python_module import PythonModule
 from linkage_ros.kinematics.compiled.source import FUNCTIONS, source, Subject
 import pytest
 
-from ..test_gallery import closure_of
 from .emitted import alike, COUNT, needs, NUMBERS, plain, State, states, subject, Told
 from .test_c import GALLERY, limited
+from ..test_gallery import closure_of  # noqa: TID252
 
 _ULPS = 4
 """So many units in the last place may a function of JavaScript be off."""
@@ -118,7 +118,9 @@ def run_javascript(what: Subject, given: Sequence[State], folder: Path) -> list[
     (folder / 'given').write_bytes(array('d', (v for state in given for v in state)).tobytes())
     typed = ['node', 'run.js', str(len(what.closure.linkage.inputs))]
     subprocess.run(typed, cwd=folder, check=True, timeout=60)
-    return [Told(name, tuple(values)) for name, values in json.loads((folder / 'told').read_text())]
+    return [
+        Told(name, tuple(values)) for name, values in json.loads((folder / 'told').read_text())
+    ]
 
 
 def carried(what: Subject, given: Sequence[State]) -> list[list[float]]:
