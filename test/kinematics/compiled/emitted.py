@@ -98,10 +98,14 @@ def states(closure: Closure, count: int, seed: str, start: State = ()) -> list[S
     return found
 
 
+def parts(numbers: Sequence[float], size: int) -> list[tuple[float, ...]]:
+    """Return numbers in groups of a size."""
+    return list(zip(*[iter(numbers)] * size, strict=True))
+
+
 def plain(closure: Closure, state: State) -> Told:
     """Return what the plain steps say."""
-    n = len(closure.linkage.inputs)
-    motion = moved(closure, [state[i : i + n] for i in range(0, len(state), n)])
+    motion = moved(closure, parts(state, len(closure.linkage.inputs)))
     status = motion.position.status
     if not status.has_rates:
         return Told(status.name, ())
@@ -152,13 +156,11 @@ void run(long count, const double *given, int *statuses, double *values)
     values = array('d', [nan]) * (len(given) * joints * groups)
     places = (ctypes.c_void_p(each.buffer_info()[0]) for each in (taken, statuses, values))
     ctypes.CDLL(str(library)).run(ctypes.c_long(len(given)), *places)
-    width = joints * groups
-    told = []
-    for number, status in enumerate(statuses):
-        found = values[number * width : (number + 1) * width]
+    return [
         # What was not written is still NaN.
-        told.append(Told(NUMBERS[status], tuple(v for v in found if not isnan(v))))
-    return told
+        Told(NUMBERS[status], tuple(value for value in found if not isnan(value)))
+        for status, found in zip(statuses, parts(values, joints * groups), strict=True)
+    ]
 
 
 def build(command: Sequence[str], file: Path, output: Path) -> None:

@@ -30,7 +30,7 @@ from linkage_ros.kinematics.compiled.python_module import PythonModule
 from linkage_ros.kinematics.compiled.source import FUNCTIONS, source, Subject
 import pytest
 
-from .emitted import alike, COUNT, needs, NUMBERS, plain, State, states, subject, Told
+from .emitted import alike, COUNT, needs, NUMBERS, parts, plain, State, states, subject, Told
 from .test_c import GALLERY, limited
 from ..test_gallery import closure_of  # noqa: TID252
 
@@ -55,11 +55,11 @@ def python_of(what: Subject) -> dict[str, Any]:
 
 def told_by(solve: Solve, state: State) -> Told:
     """Return what a function of Python says."""
-    n = len(state) // 3
-    status, *groups = solve(*(state[i * n : (i + 1) * n] for i in range(3)))
+    status, *groups = solve(*parts(state, len(state) // 3))
     return Told(NUMBERS[status], tuple(value for group in groups for value in group))
 
 
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
 def test_python_has_the_bits_of_the_steps(name: str) -> None:
     closure = closure_of(name)
@@ -184,6 +184,7 @@ def off(what: Subject, told: Sequence[Told], given: Sequence[State]) -> float:
 
 
 @needs['JavaScript']
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize('name', GALLERY)
 def test_javascript_is_as_near_as_its_functions(name: str, tmp_path: Path) -> None:
     what = subject(closure_of(name))
