@@ -51,6 +51,7 @@ the recording.
 **A disk that fills.** tmpfs, and ext4 on a loop device, filled by the recording and by another
 process; of *reserved* blocks only root may take, and the recording is not root's there. Besides
 the above, with a floor of {FLOOR:,} bytes there must never be less free by the recording's doing.
+These are single recordings: a node begins another file when there is space again.
 
 **A disk that stalls.** A node ticks at 1 kHz and records to an ext4 that is frozen in the kernel
 (FIFREEZE), so that every write and fsync waits. Lateness is that of the ticks in the bag, against

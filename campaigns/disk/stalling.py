@@ -194,7 +194,8 @@ def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
             node.end()
             done.said = done.said or _said(log)
         if plan.comes_back:
-            node.check_end()
+            # A run that lost messages is no success.
+            node.check_end(*((1,) if _drops(plan) else ()))
     except BenchError as error:
         done.faults.append(str(error))
         return done

@@ -37,7 +37,6 @@ from linkage_ros.joint_state import NANOSECONDS, Rejection
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.parameters import choice, number
-from linkage_ros.tuples import new
 
 TOPIC = 'crank_commands'
 
@@ -116,9 +115,8 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         raise DefinitionError(
             'drive.torque.brake', 'a brake that is never set', 'add on_timeout: brake'
         )
-    terms, position = context.mechanics.terms, closure.position
     motion = OneFreedom(
-        lambda value: terms(position(value)),
+        context.mechanics.equation,
         import_module(METHODS[parameters.method]).step,
         _stops(closure, parameters.start, parameters.stop_margin),
         parameters.restitution,
@@ -268,7 +266,7 @@ class TorqueDrive:
         if now > self._time:
             motion = self._mechanism.advance(motion, (now - self._time) * 1e-9, *force)
         acceleration = self._mechanism.acceleration(motion, *force)
-        return new(CrankState, ((motion.value,), (motion.rate,), (acceleration,), 0))
+        return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
 
     def _advance(self, now: int) -> None:
         """Do all steps that end by now."""

@@ -172,7 +172,7 @@ class Continuation:
         unknowns = node.place[:-1]
         still = State([0.0] * len(known[0]), [0j] * len(known[1]))
         try:
-            inverse = np.linalg.inv(equations(self._constraints, unknowns, known)[1])
+            inverse = np.linalg.inv(self._jacobian(unknowns, known))
         except np.linalg.LinAlgError:
             return False
         change = spread(self._constraints, unknowns, known, away, still)
@@ -371,12 +371,16 @@ class Continuation:
         found = self._rates_at(float(place[-1]))
         return None if found is None else self._slopes(place, *found)
 
+    def _jacobian(self, unknowns: Array, known: State) -> Array:
+        _, jacobian = equations(self._constraints, unknowns.tolist(), known)
+        return np.array(jacobian)
+
     def _slopes(self, place: Array, known: State, speeds: State) -> tuple[Array, Array]:
-        unknowns = place[:-1]
+        unknowns = place[:-1].tolist()
         errors, jacobian = equations(self._constraints, unknowns, known)
-        still = np.zeros_like(unknowns)
+        still = [0.0] * len(unknowns)
         drift = derivative(self._constraints, unknowns, known, speeds, still, None, still)
-        return errors, np.column_stack([jacobian, drift])
+        return np.array(errors), np.column_stack([jacobian, drift])
 
 
 def _apart(one: State, other: State) -> tuple[list[float], list[float]]:

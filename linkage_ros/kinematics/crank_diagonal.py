@@ -156,9 +156,7 @@ class CrankDiagonal:
                 not stretch_bracket and passes_zero(half_cosine, half)
             ):
                 status = self._at_change_point
-        return Diagonal(
-            square, direction, root_fold, root_stretch, 0.0, near, far, excess, status
-        )
+        return Diagonal(square, direction, root_fold, root_stretch, 0.0, near, far, excess, status)
 
     def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> Growth:
         """

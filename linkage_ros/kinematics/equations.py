@@ -23,11 +23,11 @@ derivative by time for given rates and accelerations.
 
 from __future__ import annotations
 
-from cmath import rect
 from collections.abc import Sequence
-from math import hypot, remainder, tau
+from math import hypot, tau
 from typing import Any, NamedTuple
 
+from linkage_ros.kinematics.arithmetic import facing, remainder, vector
 from linkage_ros.kinematics.step import State
 import numpy as np
 from numpy.typing import NDArray
@@ -80,16 +80,16 @@ Constraint = Meeting | Parallel | OnLine
 
 
 def equations(
-    constraints: Sequence[Constraint], unknowns: Array, known: State
-) -> tuple[Array, Array]:
-    """Return what the constraints are off by, and their derivatives by the unknowns."""
+    constraints: Sequence[Constraint], unknowns: Sequence[float], known: State
+) -> tuple[list[float], list[list[float]]]:
+    """Return what the constraints are off by, and their derivatives by the unknowns, as rows."""
     n = len(unknowns)
-    errors, rows = [], []
-    x = known[0]
-    values = unknowns.tolist()
+    errors: list[float] = []
+    rows: list[list[float]] = []
+    x = known.coordinates
     for constraint in constraints:
         if isinstance(constraint, Meeting):
-            (one, turn), (other, back) = (_place(e, values, known) for e in constraint)
+            (one, turn), (other, back) = (_place(e, unknowns, known) for e in constraint)
             errors += [one.real - other.real, one.imag - other.imag]
             across, along = [0.0] * n, [0.0] * n
             for end, arm, sign in (
@@ -105,18 +105,18 @@ def equations(
             rows += [across, along]
         elif isinstance(constraint, Parallel):
             turned = x[constraint.turn] if constraint.turn else 0.0
-            angle = _angle(constraint.one, values, x) - _angle(constraint.other, values, x)
+            angle = _angle(constraint.one, unknowns, x) - _angle(constraint.other, unknowns, x)
             errors.append(remainder(angle - constraint.angle - turned, tau))
             row = [0.0] * n
-            for facing, sign in ((constraint.one, 1.0), (constraint.other, -1.0)):
-                if facing.body >= 0:
-                    row[3 * facing.body] += sign
+            for end_facing, sign in ((constraint.one, 1.0), (constraint.other, -1.0)):
+                if end_facing.body >= 0:
+                    row[3 * end_facing.body] += sign
             rows.append(row)
         else:
-            error, row = _line_equation(constraint, values, known, n)
+            error, row = _line_equation(constraint, unknowns, known, n)
             errors.append(error)
             rows.append(row)
-    return np.array(errors), np.array(rows)
+    return errors, rows
 
 
 def spread(
@@ -165,12 +165,12 @@ def _line_spread(
     line: OnLine, values: Sequence[float], known: State, ways: Sequence[float], moved: State
 ) -> list[float]:
     row = [0.0] * len(values)
-    facing = line.line
-    turn = ways[3 * facing.body] if facing.body >= 0 else moved[0][facing.coordinate]
+    rail = line.line
+    turn = ways[3 * rail.body] if rail.body >= 0 else moved.coordinates[rail.coordinate]
     far = 0.0
     for end in (line.point, line.through):
         if end.body < 0:
-            far += float(abs(moved[1][end.pin]))
+            far += float(abs(moved.pins[end.pin]))
             continue
         k = 3 * end.body
         reach = abs(end.arm)
@@ -178,20 +178,20 @@ def _line_spread(
         row[k] += reach * (ways[k] + turn)
         row[k + 1] += turn
         row[k + 2] += turn
-    if facing.body >= 0:
-        row[3 * facing.body] += abs(along(line, known, values)) * turn + far
+    if rail.body >= 0:
+        row[3 * rail.body] += abs(along(line, known, values)) * turn + far
     return row
 
 
 def derivative(
     constraints: Sequence[Constraint],
-    unknowns: Array,
+    unknowns: Sequence[float],
     known: State,
     speeds: State,
-    rates: Array,
+    rates: Sequence[float],
     changes: State | None,
-    accelerations: Array,
-) -> Array:
+    accelerations: Sequence[float],
+) -> list[float]:
     """Return the first derivative of the constraints; the second, where changes are given."""
     order = 1 if changes is None else 2
     found: list[float] = []
@@ -206,7 +206,7 @@ def derivative(
             state = speeds if changes is None else changes
             values = rates if changes is None else accelerations
             one, other = (_turn(f, values, state) for f in (constraint.one, constraint.other))
-            driven = state[0][constraint.turn] if constraint.turn else 0.0
+            driven = state.coordinates[constraint.turn] if constraint.turn else 0.0
             found.append(one - other - driven)
         else:
             moved = line_motion(
@@ -214,40 +214,40 @@ def derivative(
             )[order]
             if constraint.slide:
                 state = speeds if changes is None else changes
-                found.append(moved.real - state[0][constraint.slide])
+                found.append(moved.real - state.coordinates[constraint.slide])
             else:
                 found.append(moved.imag)
-    return np.array(found)
+    return found
 
 
-def _angle(facing: Facing, unknowns: Sequence[float], x: Sequence[float]) -> float:
-    base = unknowns[3 * facing.body] if facing.body >= 0 else x[facing.coordinate]
-    return float(base + facing.direction)
+def _angle(of: Facing, unknowns: Sequence[float], x: Sequence[float]) -> float:
+    base = unknowns[3 * of.body] if of.body >= 0 else x[of.coordinate]
+    return base + of.direction
 
 
-def _turn(facing: Facing, values: Any, state: State) -> float:
-    return float(values[3 * facing.body] if facing.body >= 0 else state[0][facing.coordinate])
+def _turn(of: Facing, values: Sequence[float], state: State) -> float:
+    return values[3 * of.body] if of.body >= 0 else state.coordinates[of.coordinate]
 
 
 def _place(end: End, unknowns: Sequence[float], known: State) -> tuple[complex, complex]:
     """Return a point, and its arm as it lies now."""
     if end.body < 0:
-        return known[1][end.pin], 0j
+        return known.pins[end.pin], 0j
     k = 3 * end.body
-    arm = end.arm * rect(1.0, unknowns[k])
-    return complex(unknowns[k + 1], unknowns[k + 2]) + arm, arm
+    arm = end.arm * facing(unknowns[k])
+    return vector(unknowns[k + 1], unknowns[k + 2]) + arm, arm
 
 
 def along(line: OnLine, known: State, unknowns: Any) -> complex:
     """Return a point in the frame of the line that it is to be on."""
     point, through = (_place(e, unknowns, known)[0] for e in (line.point, line.through))
-    return (point - through) * rect(1.0, -_angle(line.line, unknowns, known[0]))
+    return (point - through) * facing(-_angle(line.line, unknowns, known.coordinates))
 
 
 def _line_equation(
     line: OnLine, unknowns: Sequence[float], known: State, n: int
 ) -> tuple[float, list[float]]:
-    back = rect(1.0, -_angle(line.line, unknowns, known[0]))
+    back = facing(-_angle(line.line, unknowns, known.coordinates))
     place = along(line, known, unknowns)
     columns: dict[int, complex] = {}
     for end, sign in ((line.point, 1.0), (line.through, -1.0)):
@@ -262,50 +262,50 @@ def _line_equation(
     row = [0.0] * n
     for column, slope in columns.items():
         row[column] = slope.real if line.slide else slope.imag
-    error = place.real - known[0][line.slide] if line.slide else place.imag
+    error = place.real - known.coordinates[line.slide] if line.slide else place.imag
     return error, row
 
 
 def _point_motion(
     end: End,
-    unknowns: Array,
+    unknowns: Sequence[float],
     known: State,
     speeds: State,
-    rates: Array,
+    rates: Sequence[float],
     changes: State | None,
-    accelerations: Array,
+    accelerations: Sequence[float],
 ) -> tuple[complex, complex, complex]:
     """Return place, velocity and acceleration of a point."""
     if end.body < 0:
-        pull = changes[1][end.pin] if changes is not None else 0j
-        return known[1][end.pin], speeds[1][end.pin], pull
+        pull = changes.pins[end.pin] if changes is not None else 0j
+        return known.pins[end.pin], speeds.pins[end.pin], pull
     k = 3 * end.body
-    place, arm = _place(end, unknowns.tolist(), known)
-    turn = float(rates[k])
-    velocity = complex(rates[k + 1], rates[k + 2]) + complex(0.0, turn) * arm
-    pull = complex(accelerations[k + 1], accelerations[k + 2])
-    return place, velocity, pull + complex(-turn * turn, float(accelerations[k])) * arm
+    place, arm = _place(end, unknowns, known)
+    turn = rates[k]
+    velocity = vector(rates[k + 1], rates[k + 2]) + vector(0.0, turn) * arm
+    pull = vector(accelerations[k + 1], accelerations[k + 2])
+    return place, velocity, pull + vector(-turn * turn, accelerations[k]) * arm
 
 
 def line_motion(
     line: OnLine,
-    unknowns: Array,
+    unknowns: Sequence[float],
     known: State,
     speeds: State,
-    rates: Array,
+    rates: Sequence[float],
     changes: State | None,
-    accelerations: Array,
+    accelerations: Sequence[float],
 ) -> tuple[complex, complex, complex]:
     """Return place, velocity and acceleration of a point in the frame of its line."""
     point, through = (
         _point_motion(e, unknowns, known, speeds, rates, changes, accelerations)
         for e in (line.point, line.through)
     )
-    back = rect(1.0, -_angle(line.line, unknowns.tolist(), known[0]))
+    back = facing(-_angle(line.line, unknowns, known.coordinates))
     turn = _turn(line.line, rates, speeds)
     change = _turn(line.line, accelerations, changes) if changes is not None else 0.0
     place = (point[0] - through[0]) * back
-    velocity = (point[1] - through[1]) * back - complex(0.0, turn) * place
+    velocity = (point[1] - through[1]) * back - vector(0.0, turn) * place
     pull = (point[2] - through[2]) * back
-    pull -= complex(0.0, 2.0 * turn) * velocity + complex(-turn * turn, change) * place
+    pull -= vector(0.0, 2.0 * turn) * velocity + vector(-turn * turn, change) * place
     return place, velocity, pull

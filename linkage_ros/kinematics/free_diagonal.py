@@ -95,17 +95,13 @@ def free_diagonal(
         folds = folding < stretching
         root_fold = sqrt(where(folds, folding, span - stretching))
         root_stretch = sqrt(where(folds, span - folding, stretching))
-    return Diagonal(
-        square, phase(vector), root_fold, root_stretch, 0.0, 0.0, 0.0, square, status
-    )
+    return Diagonal(square, phase(vector), root_fold, root_stretch, 0.0, 0.0, 0.0, square, status)
 
 
 def free_growth(diagonal: Diagonal, vector: complex, velocity: complex) -> Growth:
     """Return how a diagonal grows that changes at a velocity."""
     unit = velocity / vector
-    return Growth(
-        unit.real, unit.imag, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch
-    )
+    return Growth(unit.real, unit.imag, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch)
 
 
 def free_growth_change(growth: Growth, vector: complex, pull: complex) -> GrowthChange:

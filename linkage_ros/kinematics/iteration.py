@@ -31,10 +31,13 @@ inputs is followed anew for each state, with the same proof that no other assemb
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, inf
-from typing import NamedTuple
+from math import hypot, inf, isnan, nan
+from operator import add, sub
+from typing import Any, NamedTuple
 
+from linkage_ros.kinematics.arithmetic import called, is_found
 from linkage_ros.kinematics.branch import Branch, Start
+from linkage_ros.kinematics.compiled.function import straight
 from linkage_ros.kinematics.continuation import Continuation
 from linkage_ros.kinematics.equations import (
     along,
@@ -81,7 +84,7 @@ class IteratedPose(NamedTuple):
 
     status: Status
     gap: float
-    unknowns: Array
+    unknowns: list[float]
     jacobian: Array
 
 
@@ -107,7 +110,7 @@ class Iteration:
     """
 
     __slots__ = ('_before', '_branch', '_constraints', '_far', '_inputs', '_slides', '_sliding',
-                 '_solution', '_start')  # fmt: skip
+                 '_solution', '_start', '_straight')  # fmt: skip
 
     def __init__(
         self,
@@ -133,6 +136,7 @@ class Iteration:
         )
         self._branch: Branch | None = None
         self._solution: Array | None = None
+        self._straight: _StraightSystem | None = None
 
     @property
     def equation_count(self) -> int:
@@ -146,25 +150,59 @@ class Iteration:
 
     def close(self, known: State) -> IteratedPose:
         """Append the angles of the bodies, the slides, and the places of the bodies."""
-        end = 1 + len(self._inputs)
-        inputs = known[0][1:end]
+        solved = called(self._closed_at, len(known.coordinates), *known.coordinates, *known.pins)
+        if not is_found(solved):
+            return self._not_closed(known)
+        n, bodies = self.equation_count, self.equation_count // 3
+        unknowns = [solved[i] for i in range(n)]
+        self._place(known, unknowns, [solved[n + i] for i in range(bodies)])
+        return IteratedPose(Status.CLOSED, 0.0, unknowns, solved[n + bodies])
+
+    def _closed_at(self, count: int, *numbers: Any) -> tuple[Any, ...] | None:
+        """
+        Return a closed solution: unknowns, angles with their turns, and the Jacobian.
+
+        Parameters
+        ----------
+        count
+            How many of the numbers are coordinates.
+        *numbers
+            The coordinates and the pins that are known before.
+
+        """
+        known = State(list(numbers[:count]), list(numbers[count:]))
+        inputs = self._inputs_of(known)
+        start = self._start_at(inputs)
+        if start is None or start.ends:
+            return None
+        found = self._correct(known, start.unknowns, start.farthest)
+        if found is None:
+            return None
+        unknowns, jacobian = found
+        if len(inputs) > 1 and _conditioning(jacobian) <= _SINGULAR:
+            return None
+        return (*unknowns.tolist(), *(unknowns + start.turned)[0::3].tolist(), jacobian)
+
+    def _not_closed(self, known: State) -> IteratedPose:
+        """Return the pose at a toggle, or what of it there is where links are open."""
+        inputs = self._inputs_of(known)
         start = self._start_at(inputs)
         if start is None:
             return self._open(known, inputs)
-        found = self._correct(known, start.unknowns, start.farthest)
         if start.ends:
             # Where the Jacobian is singular, what Newton's method finds is no nearer.
-            found = start.unknowns, equations(self._constraints, start.unknowns, known)[1]
-        if found is None:
-            return self._open(known, inputs)
-        unknowns, jacobian = found
-        self._place(known, unknowns, start.turned)
-        pose = IteratedPose(
-            Status.TOGGLE if start.ends else Status.CLOSED, 0.0, unknowns, jacobian
-        )
-        if len(inputs) > 1 and self.conditioning(pose) <= _SINGULAR:
-            return pose._replace(status=Status.TOGGLE)
-        return pose
+            unknowns, jacobian = start.unknowns, self._system(known, start.unknowns)[1]
+        else:
+            found = self._correct(known, start.unknowns, start.farthest)
+            if found is None:
+                return self._open(known, inputs)
+            unknowns, jacobian = found
+        values = unknowns.tolist()
+        self._place(known, values, (unknowns + start.turned)[0::3].tolist())
+        return IteratedPose(Status.TOGGLE, 0.0, values, jacobian)
+
+    def _inputs_of(self, known: State) -> list[float]:
+        return known.coordinates[1 : 1 + len(self._inputs)]
 
     def branch(self) -> Branch | None:
         """
@@ -194,33 +232,32 @@ class Iteration:
             self._solution = found[0] if found is not None else None
         return self._solution
 
-    def rates(self, pose: IteratedPose, known: State, speeds: State) -> Array:
+    def rates(self, pose: IteratedPose, known: State, speeds: State) -> list[float]:
         """Append the rates of what `close` has appended."""
-        still = np.zeros_like(pose.unknowns)
+        still = [0.0] * len(pose.unknowns)
         drift = derivative(self._constraints, pose.unknowns, known, speeds, still, None, still)
-        rates = np.linalg.solve(pose.jacobian, -drift)
+        rates = _solved(pose, drift)
         self._append(speeds, rates)
         for slide in self._slides:
-            motion = line_motion(slide, pose.unknowns, known, speeds, rates, None, still)
-            speeds[0].append(motion[1].real)
+            _, rate, _ = line_motion(slide, pose.unknowns, known, speeds, rates, None, still)
+            speeds.coordinates.append(rate.real)
         return rates
 
     def accelerations(
-        self, pose: IteratedPose, rates: Array, known: State, speeds: State, changes: State
+        self, pose: IteratedPose, rates: list[float], known: State, speeds: State, changes: State
     ) -> None:
         """Append the accelerations of what `close` has appended."""
-        still = np.zeros_like(rates)
+        still = [0.0] * len(rates)
         drift = derivative(self._constraints, pose.unknowns, known, speeds, rates, changes, still)
-        solved = np.linalg.solve(pose.jacobian, -drift)
+        solved = _solved(pose, drift)
         self._append(changes, solved)
         for slide in self._slides:
-            motion = line_motion(slide, pose.unknowns, known, speeds, rates, changes, solved)
-            changes[0].append(motion[2].real)
+            _, _, change = line_motion(slide, pose.unknowns, known, speeds, rates, changes, solved)
+            changes.coordinates.append(change.real)
 
     def conditioning(self, pose: IteratedPose) -> float:
         """Return the smallest singular value of the constraints' Jacobian, of the largest."""
-        values = np.linalg.svd(pose.jacobian, compute_uv=False)
-        return float(values[-1] / values[0])
+        return _conditioning(pose.jacobian)
 
     def solution_from(self, angles: Array) -> Array | None:
         """
@@ -233,7 +270,7 @@ class Iteration:
             return None
         start = np.zeros_like(self._start)
         start[0::3] = angles
-        errors, jacobian = equations(self._constraints, start, known)
+        errors, jacobian = self._system(known, start)
         places = np.arange(len(start)) % 3 > 0
         start[places] = np.linalg.lstsq(jacobian[:, places], -errors, rcond=None)[0]
         found = self._correct(known, start, _AROUND)
@@ -247,17 +284,31 @@ class Iteration:
         found = self._correct(known, start.unknowns, start.farthest)
         return None if found is None else found[0]
 
-    def _place(self, known: State, unknowns: Array, turned: Array) -> None:
-        """Append a solution."""
-        x, pins = known
-        x.extend((unknowns[0::3] + turned[0::3]).tolist())
-        pins.extend((unknowns[1::3] + 1j * unknowns[2::3]).tolist())
+    def _place(self, known: State, unknowns: list[float], angles: list[float]) -> None:
+        """Append a solution, with the angles as the turns before have left them."""
+        known.coordinates.extend(angles)
+        known.pins.extend(_places(unknowns))
         for slide in self._slides:
-            x.append(along(slide, known, unknowns).real)
+            known.coordinates.append(along(slide, known, unknowns).real)
 
-    def _append(self, state: State, values: Array) -> None:
-        state[0].extend(values[0::3].tolist())
-        state[1].extend((values[1::3] + 1j * values[2::3]).tolist())
+    def _append(self, state: State, values: list[float]) -> None:
+        state.coordinates.extend(values[0::3])
+        state.pins.extend(_places(values))
+
+    def _system(self, known: State, unknowns: Array) -> tuple[Array, Array]:
+        """Return what the constraints are off by, and their derivatives by the unknowns."""
+        errors, jacobian = self._listed_system(known, unknowns.tolist())
+        return np.array(errors), jacobian
+
+    def _listed_system(
+        self, known: State, unknowns: Sequence[float]
+    ) -> tuple[tuple[float, ...], Array]:
+        numbers = [*known.coordinates, *known.pins, *unknowns]
+        if self._straight is None:
+            self._straight = _StraightSystem(
+                self._constraints, numbers, len(known.coordinates), len(unknowns)
+            )
+        return self._straight.at(numbers)
 
     def _known_at(self, inputs: Sequence[float]) -> State | None:
         """Return what is known before this step, at any inputs."""
@@ -326,20 +377,22 @@ class Iteration:
 
     def _correct(self, known: State, start: Array, farthest: float) -> tuple[Array, Array] | None:
         """Return the solution within a distance of a start, and its Jacobian."""
-        unknowns, last = start, inf
-        size = 1.0 + float(np.abs(start).max())
+        # In lists: of so few numbers an array's own overhead is greater than the arithmetic.
+        begin = start.tolist()
+        unknowns, last = begin, inf
+        size = 1.0 + _greatest(begin)
         for _ in range(30):
-            errors, jacobian = equations(self._constraints, unknowns, known)
+            errors, jacobian = self._listed_system(known, unknowns)
             try:
-                step = np.linalg.solve(jacobian, -errors)
+                step = np.linalg.solve(jacobian, np.negative(errors)).tolist()
             except np.linalg.LinAlgError:
                 return None
-            length = float(np.abs(step).max())
+            length = _greatest(step)
             if length >= last or length <= 4.0 * UNIT_ROUNDOFF * size:
-                good = float(np.abs(errors).max()) <= _ACCEPTED * size
-                return (unknowns, jacobian) if good else None
-            unknowns, last = unknowns + step, length
-            if not float(np.abs(unknowns - start).max()) <= farthest:
+                good = _greatest(errors) <= _ACCEPTED * size
+                return (np.array(unknowns), jacobian) if good else None
+            unknowns, last = list(map(add, unknowns, step)), length
+            if not _greatest(list(map(sub, unknowns, begin))) <= farthest:
                 return None
         return None
 
@@ -352,14 +405,84 @@ class Iteration:
         """
         end = self._branch.nearest_end(inputs[0]) if self._branch is not None else None
         unknowns = self._start if end is None else end
-        errors, jacobian = equations(self._constraints, unknowns, known)
+        errors, jacobian = self._system(known, unknowns)
         first = float(np.abs(errors).max())
         for _ in range(20):
             step = np.linalg.lstsq(jacobian, -errors, rcond=1e-6)[0]
             step *= min(1.0, 0.1 / max(float(np.abs(step).max()), 1e-300))
-            trial, slope = equations(self._constraints, unknowns + step, known)
+            trial, slope = self._system(known, unknowns + step)
             if np.abs(trial).max() >= np.abs(errors).max():
                 break
             unknowns, errors, jacobian = unknowns + step, trial, slope
         gap = float(np.abs(errors).max())
-        return IteratedPose(Status.OPEN, gap if gap > _MOVED else first, unknowns, jacobian)
+        return IteratedPose(
+            Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist(), jacobian
+        )
+
+
+class _StraightSystem:
+    """
+    The constraints and their derivatives as a straight line.
+
+    Most derivatives are constants, such as 0 and 1: only the others are worked out.
+
+    Parameters
+    ----------
+    constraints
+        The constraints.
+    numbers
+        Coordinates, pins and unknowns, one after the other, for which they can be worked out.
+    coordinates, unknowns
+        How many there are of each.
+
+    """
+
+    def __init__(
+        self,
+        constraints: Sequence[Constraint],
+        numbers: Sequence[complex],
+        coordinates: int,
+        unknowns: int,
+    ) -> None:
+        def listed(*values: Any) -> list[float]:
+            state = State(list(values[:coordinates]), list(values[coordinates:-unknowns]))
+            errors, rows = equations(constraints, values[-unknowns:], state)
+            return [*errors, *(slope for row in rows for slope in row)]
+
+        self._line = straight(listed, numbers)
+        self._count = unknowns
+        self._constants = np.array(self._line.results[unknowns:])
+        self._places = np.array([place - unknowns for place in self._line.places[unknowns:]])
+
+    def at(self, numbers: Sequence[complex]) -> tuple[tuple[float, ...], Array]:
+        """Return what the constraints are off by, each of which varies, and the Jacobian."""
+        n = self._count
+        found = self._line.varying(*numbers)
+        jacobian = self._constants.copy()
+        jacobian[self._places] = found[n:]
+        return found[:n], jacobian.reshape(n, n)
+
+
+def _greatest(values: Sequence[float]) -> float:
+    """Return the greatest size; NaN where one is."""
+    return nan if isnan(sum(values)) else max(map(abs, values))
+
+
+def _places(values: Sequence[float]) -> list[complex]:
+    return [x + 1j * y for x, y in zip(values[1::3], values[2::3], strict=True)]
+
+
+def _conditioning(jacobian: Array) -> float:
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    return float(values[-1] / values[0])
+
+
+def _solved(pose: IteratedPose, drift: Sequence[float]) -> list[float]:
+    """Return the derivatives of the unknowns that make up for the constraints' own."""
+    found = called(_solve, pose.jacobian, *drift)
+    return [found[i] for i in range(len(drift))]
+
+
+def _solve(jacobian: Array, *drift: float) -> list[float]:
+    found: list[float] = np.linalg.solve(jacobian, np.negative(drift)).tolist()
+    return found

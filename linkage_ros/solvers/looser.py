@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from typing import cast
 
-from linkage_ros.kinematics.equations import equations
 from linkage_ros.kinematics.iteration import IteratedPose, Iteration
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State, Step
@@ -41,13 +40,13 @@ class _Looser(Iteration):
     def close(self, known: State) -> IteratedPose:
         """Append as `Iteration.close`; where the first steps do not contract, it does."""
         end = 1 + len(self._inputs)
-        inputs = known[0][1:end]
+        inputs = known.coordinates[1:end]
         start = self._start_at(inputs) if len(inputs) == 1 else None
         if start is None or start.ends:
             return super().close(known)
         unknowns, last = start.unknowns, start.farthest
         for _ in range(_STEPS):
-            errors, jacobian = equations(self._constraints, unknowns, known)
+            errors, jacobian = self._system(known, unknowns)
             try:
                 step = np.linalg.solve(jacobian, -errors)
             except np.linalg.LinAlgError:
@@ -57,10 +56,10 @@ class _Looser(Iteration):
                 break
             unknowns, last = unknowns + step, length
             if length <= self._tolerance:
-                pose = IteratedPose(Status.CLOSED, 0.0, unknowns, jacobian)
+                pose = IteratedPose(Status.CLOSED, 0.0, unknowns.tolist(), jacobian)
                 if self.conditioning(pose) <= _SINGULAR:
                     break
-                self._place(known, unknowns, start.turned)
+                self._place(known, pose.unknowns, start.turned.tolist())
                 return pose
         return super().close(known)
 

@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from linkage_ros.kinematics.compiled.source import (
-    FUNCTIONS,
     GIVEN,
     Language,
     RETURNED,
@@ -68,6 +67,10 @@ class C(Language):
         self._name = name
         self._header = header
 
+    def function(self, derivatives: int) -> str:
+        """Return the name of the function that gives so many derivatives."""
+        return f'{self._name}_{super().function(derivatives)}'
+
     def call(self, operation: Operation, parts: list[str]) -> str:
         """Write the call of a function."""
         if operation.name == '**' and parts[1] == '2.0':
@@ -109,7 +112,7 @@ class C(Language):
 
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
         """Write the source."""
-        name, function = self._name, FUNCTIONS[subject.derivatives]
+        name, function = self._name, self.function(subject.derivatives)
         driven, joints = len(subject.closure.linkage.inputs), len(subject.joints)
         kind = f'enum {name}_status'
         parameters = [
@@ -118,7 +121,7 @@ class C(Language):
         ]
         last = len(parameters) - 1
         signature = [
-            f'{kind} {name}_{function}(',
+            f'{kind} {function}(',
             *(f'    {each}{")" if i == last else ","}' for i, each in enumerate(parameters)),
         ]
         statuses = [f'    {self.status(status)} = {i},' for i, status in enumerate(STATUSES)]
@@ -128,7 +131,7 @@ class C(Language):
         definition = [*signature, '{', *two, *body, '}']
         comment = ['/*', *(f' * {_harmless(line)}'.rstrip() for line in (*head, *_NOTES)), ' */']
         if self._header:
-            guard = f'{name.upper()}_{function.upper()}_H'
+            guard = f'{function.upper()}_H'
             definition[0] = f'static inline {definition[0]}'
             lines = [
                 f'#ifndef {guard}', f'#define {guard}', '', *_CHECK, '', *listed, '', *definition,

@@ -20,7 +20,6 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from linkage_ros.kinematics.compiled.source import (
-    FUNCTIONS,
     GIVEN,
     Language,
     RETURNED,
@@ -88,10 +87,11 @@ class JavaScript(Language):
         empty = ', '.join(f'{name}: []' for name in returned)
         comment = (f' * {line.replace("*/", "* /")}'.rstrip() for line in (*head, *_NOTES))
         statuses = (f'    {status}: {number},' for number, status in enumerate(STATUSES))
+        name = self.function(subject.derivatives)
         lines = [
             '/*', *comment, ' */', '', 'export const Status = Object.freeze({', *statuses, '});',
             '', 'function nothing(status) {', f'    return {{status, {empty}}};', '}',
             *(_COPYSIGN.splitlines() if any('copysign(' in line for line in body) else ()), '',
-            f'export function {FUNCTIONS[subject.derivatives]}({", ".join(given)}) {{', *body, '}',
+            f'export function {name}({", ".join(given)}) {{', *body, '}',
         ]  # fmt: skip
         return '\n'.join([*lines, ''])

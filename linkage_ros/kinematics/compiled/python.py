@@ -76,6 +76,8 @@ def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]
             return f'({parts[0]}) ** {parts[1]}'
         if operation.name == 'item':
             return f'{_atom(parts[0])}[{parts[1]}]'
+        if operation.name == 'finite':
+            return '(' + ' and '.join(f'{_atom(p)} - {_atom(p)} == 0.0' for p in parts) + ')'
         if operation.name == 'found':
             return f'({parts[0]} is not None)'
         if operation.name == 'call':
@@ -91,19 +93,21 @@ def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]
     )
     for given in path.inputs:
         writer.name(given, given.name)
-    if any(condition.name == 'finite' for condition in conditions):
+    if any(map(_of_inputs, conditions)):
         # 0 of finite numbers, and NaN of all others; where the sum is too great, it is in doubt.
         total = ' + '.join(given.name for given in path.inputs)
         writer.lines += [f'total = {total}', 'if total - total != 0.0:', '    return None']
     for condition, held in path.decisions:
-        if condition.name != 'finite':
+        if not _of_inputs(condition):
             text = writer.write(condition)
             writer.lines += [f'if not ({text}):' if held else f'if {text}:', '    return None']
     groups = [', '.join(writer.write(number) for number in group) for group in path.outputs]
     returned = ', '.join(f'({group},)' if group else '()' for group in groups)
     parameters = ', '.join(given.name for given in path.inputs)
     lines = [f'def {name}({parameters}):', *(f'    {line}' for line in writer.lines)]
-    return '\n'.join([*lines, f'    return {returned},' if groups else '    return ()', '']), constants
+    return '\n'.join(
+        [*lines, f'    return {returned},' if groups else '    return ()', '']
+    ), constants
 
 
 def python_function(path: Path) -> Callable[..., Values | None]:
@@ -114,9 +118,14 @@ def python_function(path: Path) -> Callable[..., Values | None]:
     names = ', '.join(bound)
     body = ''.join(f'    {line}\n' for line in source.splitlines())
     namespace: dict[str, Any] = {}
-    exec(f'def bind({names}):\n{body}    return solve\n', namespace)  # noqa: S102 (our own text)
+    exec(f'def bind({names}):\n{body}    return solve\n', namespace)
     solve: Callable[..., Values | None] = namespace['bind'](**bound)
     return solve
+
+
+def _of_inputs(condition: Operation) -> bool:
+    """Return whether a condition is that inputs are finite numbers."""
+    return condition.name == 'finite' and all(one.is_input for one in condition.operands())
 
 
 def _atom(text: str) -> str:

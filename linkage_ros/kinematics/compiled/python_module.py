@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from linkage_ros.kinematics.compiled.source import (
-    FUNCTIONS,
     GIVEN,
     Language,
     STATUSES,
@@ -117,9 +116,10 @@ class PythonModule(Language):
 
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
         """Write the source."""
+        name = self.function(subject.derivatives)
         lines = [
             *(f'# {line}'.rstrip() for line in (*head, *_NOTES)), '', _IMPORTS, '',
             *(f'{status} = {number}' for number, status in enumerate(STATUSES)), '', '',
-            f'def {FUNCTIONS[subject.derivatives]}({", ".join(GIVEN[: self._groups])}):', *body,
+            f'def {name}({", ".join(GIVEN[: self._groups])}):', *body,
         ]  # fmt: skip
         return '\n'.join([*lines, ''])

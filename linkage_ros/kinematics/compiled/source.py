@@ -139,6 +139,10 @@ class Language(ABC):
             break_long_words=False, break_on_hyphens=False,
         )  # fmt: skip
 
+    def function(self, derivatives: int) -> str:
+        """Return the name of the function that gives so many derivatives."""
+        return FUNCTIONS[derivatives]
+
     @abstractmethod
     def assigned(self, name: str, text: str, truth: bool = False) -> str:
         """Write a line that gives a name to a number, or to a truth."""
@@ -200,7 +204,8 @@ def source(subject: Subject, language: Language) -> str:
 
     found = program(closure, subject.derivatives, wanted)
     body = _Body(subject, language, found)
-    return language.whole(subject, list(_head(subject)), body.lines())
+    head = _head(subject, language.function(subject.derivatives))
+    return language.whole(subject, list(head), body.lines())
 
 
 class _Body:
@@ -349,14 +354,14 @@ def _lengths(closure: Closure) -> dict[float, str]:
     }
 
 
-def _head(subject: Subject) -> Iterator[str]:
+def _head(subject: Subject, function: str) -> Iterator[str]:
     """Yield the lines of the head."""
     closure = subject.closure
     linkage = closure.linkage
     yield f'{clean(subject.name)}: a planar linkage, written by linkage_ros {__version__}'
     yield f'from {clean(subject.file)}. Change that file, and compile it again.'
     yield ''
-    yield f'The function {FUNCTIONS[subject.derivatives]} takes:'
+    yield f'The function {function} takes:'
     for number, given in enumerate(linkage.inputs):
         unit = 'm' if given.slider else 'rad'
         yield f'  {GIVEN[0]}[{number}]  {clean(given.joint)} [{unit}]'
@@ -388,7 +393,8 @@ def _head(subject: Subject) -> Iterator[str]:
             f'  {clean(link)}: {text}', WIDTH - 4, subsequent_indent='      ',
             break_on_hyphens=False,
         )  # fmt: skip
-    yield f'Lengths in the code are in units of {closure.scale:.9g} m.'
+    yield f'Lengths in the code are in units of {closure.scale:.9g} m. The constants k0, k1 and so'
+    yield 'on are what the solution makes of them.'
 
 
 def _derived(subject: Subject, names: Sequence[str]) -> Iterator[str]:

@@ -110,13 +110,9 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
 }
 
 _TRUTHS = frozenset(('<', '<=', '>', '>=', '==', '!=', 'finite', 'found'))
-_REALS = frozenset(
-    (
-        'abs', 'sin', 'cos', 'sqrt', 'atan2', 'copysign', 'hypot', 'remainder', 'round', 'phase',
-        'real', 'imag',
-    )  # fmt: skip
-)
 _COMPLEX = frozenset(('facing', 'vector', 'conjugate'))
+_OF_EITHER = frozenset(('+', '-', '*', '/', '**', 'negative', 'where'))
+_REALS = frozenset(_VALUES) - _TRUTHS - _COMPLEX - _OF_EITHER
 
 
 class Tape:
@@ -136,9 +132,10 @@ class Tape:
         self._decided: dict[int, bool] = {}
         self._ahead: Sequence[bool | None] = ()
 
-    def given(self, name: str, value: float) -> Symbol:
-        """Return the symbol of an input."""
-        return Symbol(self, self._new(name, (), 'real', value))
+    def given(self, name: str, value: complex) -> Symbol:
+        """Return the symbol of an input, real or complex as its value is."""
+        kind: Kind = 'complex' if isinstance(value, complex) else 'real'
+        return Symbol(self, self._new(name, (), kind, value))
 
     def begin(self, ahead: Sequence[bool | None] = ()) -> None:
         """Forget all decisions; those to come are made as is said ahead, then by the values."""
@@ -347,8 +344,6 @@ def _kind(name: str, given: tuple[Any, ...]) -> Kind:
         return 'real'
     if name in _COMPLEX:
         return 'complex'
-    if name == 'item':
-        return 'real'
     numbers = given[1:] if name == 'where' else given
     if any(isinstance(a, complex) or getattr(a, 'kind', '') == 'complex' for a in numbers):
         return 'complex'

@@ -110,21 +110,12 @@ def traced(
     return Path(
         tuple(symbol.operation for group in given for symbol in group),
         tuple(tape.decisions),
-        operations(wanted(motion)),
+        tuple(tuple(number_of(n) for n in group) for group in wanted(motion)),
         tape,
     )
 
 
-def operations(groups: Sequence[Sequence[Any]]) -> tuple[tuple[Number, ...], ...]:
-    """Return symbols in groups as the operations that they are; constants stay."""
-    return tuple(
-        tuple(n.operation if isinstance(n, Symbol) else n for n in group) for group in groups
-    )
-
-
-def moved(
-    closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool = True
-) -> Motion:
+def moved(closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool = True) -> Motion:
     """Return the motion of a closure at inputs, rates and accelerations, as far as given."""
     inputs, *more = given
     position = closure.position(*inputs) if within_limits else closure.posed(*inputs)
@@ -134,3 +125,8 @@ def moved(
         if len(more) > 1:
             acceleration = closure.acceleration(position, velocity, *more[1])
     return Motion(position, velocity, acceleration)
+
+
+def number_of(found: Any) -> Number:
+    """Return the operation of a symbol, or the constant that a number is."""
+    return found.operation if isinstance(found, Symbol) else found

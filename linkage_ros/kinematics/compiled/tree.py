@@ -30,7 +30,7 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.kinematics.compiled.lowered import Lowering
 from linkage_ros.kinematics.compiled.tape import Operation, Tape
-from linkage_ros.kinematics.compiled.trace import joints, moved, Number, operations, traced, Wanted
+from linkage_ros.kinematics.compiled.trace import joints, moved, Number, number_of, traced, Wanted
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Iterated
 
@@ -203,7 +203,8 @@ class _Growth:
         self._solved += 1
         tape.begin(ahead)
         motion = moved(closure, self._given, within_limits=False)
-        return Solved(motion.position.status, operations(self._wanted(motion)))
+        numbers = tuple(tuple(map(number_of, group)) for group in self._wanted(motion))
+        return Solved(motion.position.status, numbers)
 
 
 def _lowered(tree: Tree, lowering: Lowering) -> Tree:

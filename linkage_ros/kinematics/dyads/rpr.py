@@ -133,9 +133,7 @@ class RPRDyad:
         turn = growth.turn + self.offset * lean
         whirl = growth.swing * growth.swing
         changes.coordinates.append(change.base + change.change * turn + whirl * swirl)
-        changes.coordinates.append(
-            pose.diagonal.square * (change.change * lean + whirl * bend)
-        )
+        changes.coordinates.append(pose.diagonal.square * (change.change * lean + whirl * bend))
 
     def side_of(self, pose: RPRPose) -> float:
         """Return a number whose sign tells the side of the assembly; 0 where it is singular."""

@@ -70,16 +70,17 @@ class VelocityEquations:
 
     def rates(self, unknowns: Any, inputs: Sequence[float], swept: Sequence[float]) -> Any:
         """Return the derivatives of the unknowns where the inputs have the rates ``swept``."""
-        known, still = State([0.0, *inputs], self._pins), np.zeros_like(unknowns)
+        known, values = State([0.0, *inputs], self._pins), unknowns.tolist()
+        still = [0.0] * len(values)
         speeds = State([0.0, *swept], [0j] * len(self._pins))
-        _, jacobian = equations(self._constraints, unknowns, known)
-        drift = derivative(self._constraints, unknowns, known, speeds, still, None, still)
-        return np.linalg.solve(jacobian, -drift)
+        _, jacobian = equations(self._constraints, values, known)
+        drift = derivative(self._constraints, values, known, speeds, still, None, still)
+        return np.linalg.solve(jacobian, np.negative(drift))
 
     def corrected(self, unknowns: Any, inputs: Sequence[float]) -> Any:
         """Return the unknowns after one step of Newton's method."""
         known = State([0.0, *inputs], self._pins)
-        errors, jacobian = equations(self._constraints, unknowns, known)
+        errors, jacobian = equations(self._constraints, unknowns.tolist(), known)
         return unknowns - np.linalg.solve(jacobian, errors)
 
     def joints(self, unknowns: Any, inputs: Sequence[float]) -> tuple[float, ...]:
