@@ -33,7 +33,7 @@ help:
 	@echo 'make timing    measure clients that come and go, and ticks under load, into docs/timing (35 min)'
 	@echo 'make accuracy  prove the kinematics on 11 million cases, then as topologies (35 min)'
 	@echo 'make topologies  try random linkages of every topology, into docs/accuracy (8 min)'
-	@echo 'make compiled  compare linkages in C, Python and JavaScript with the steps, by the 100,000 (5 min)'
+	@echo 'make compiled  compare linkages in C, Python and JavaScript with the steps, by the 100,000 (8 min)'
 	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (9 min)'
 	@echo 'make synthesis compute and draw what docs/synthesis.md says'
 	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
