@@ -44,6 +44,7 @@ _LINKAGE = {
     'check': [],
     'solve': ['--steps', '8', '--rate', '1', '--points'],
     'draw': ['-o', 'x.svg'],
+    'compile': ['-o', 'x.c'],
     'urdf': [],
     'mjcf': [],
     'scene': [],
