@@ -107,7 +107,7 @@ def program(closure: Closure, derivatives: int, wanted: Wanted = joints) -> Prog
         raise DefinitionError(
             'pose',
             'no state is found at which the linkage is closed',
-            'write one: pose: {inputs: [VALUE]}',
+            'write one at which it is: pose: {inputs: [VALUE, VALUE]}',
         )
     tape = Tape()
     count = len(closure.linkage.inputs)

@@ -157,6 +157,14 @@ def test_it_compiles_without_a_warning(name, header, kind, tmp_path: Path) -> No
     build([*COMPILERS[kind], '-c'], file, tmp_path / 'linkage.o')
 
 
+@pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
+def test_headers_of_one_linkage_go_together(kind: str, tmp_path: Path) -> None:
+    closure = closure_of('four_bar')
+    texts = [source(subject(closure, i), C('four_bar', header=True)) for i in range(3)]
+    (tmp_path / 'all.c').write_text('\n'.join(texts))
+    build([*COMPILERS[kind], '-Wno-unused-function', '-c'], tmp_path / 'all.c', tmp_path / 'all.o')
+
+
 def test_links_that_are_iterated_are_refused() -> None:
     closure = closure_of('class_3')
     with pytest.raises(DefinitionError, match='links: some are only solved by iteration'):
