@@ -23,7 +23,7 @@ is not asked. Results may differ from those of the path in their last digits.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import inf, tan
+from math import inf, nan, tan
 import operator
 from typing import Any, Final, NamedTuple
 
@@ -229,6 +229,9 @@ class ArrayForm:
 
     def _divide(self, one: Number, other: Number) -> Number:
         (factor, one), (divisor, other) = _split(one), _split(other)
+        if divisor == 0.0:
+            # Off the way that the steps take.
+            return nan
         factor /= divisor
         if factor == 0.0 or other is None:
             return 0.0 if factor == 0.0 else self._scaled(factor, one)
@@ -248,6 +251,7 @@ class ArrayForm:
         return self._new('*', factor, one, bounds=Bounds(min(ends), max(ends)))
 
     def _power(self, one: Number, power: int) -> Number:
+        """Return a whole power, as products."""
         if power == 1:
             return one
         half = self._power(one, power // 2)

@@ -47,6 +47,7 @@ _FUNCTIONS: Final[dict[str, Any]] = {
     '==': np.equal,
     '!=': np.not_equal,
     'and': np.logical_and,
+    'where': np.where,
 }
 
 
