@@ -191,7 +191,7 @@ class NewtonClosure(Solver):
         found = []
         for part in self._plan:
             if isinstance(part, NewtonDyad):
-                part.rates(x, pins, v, speeds[1])
+                part.rates(x, pins, v, speeds.pins)
             else:
                 found.append(part.rates(next(others, PLACED), state, speeds))
         return Velocity(self._joints(v), speeds, found)
@@ -221,7 +221,7 @@ class NewtonClosure(Solver):
         others, moving = iter(poses), iter(rates)
         for part in self._plan:
             if isinstance(part, NewtonDyad):
-                part.accelerations(state[0], speeds[0], a, changes[1])
+                part.accelerations(state.coordinates, speeds.coordinates, a, changes.pins)
             else:
                 pose, rate = next(others, PLACED), next(moving)
                 part.accelerations(pose, rate, state, speeds, changes)

@@ -90,6 +90,14 @@ def build(parameters: TableParameters, linkage: Linkage) -> TableClosure:
     return TableClosure(linkage, parameters.tolerance, span=parameters.span or None)
 
 
+class _Place(NamedTuple):
+    """Where a position lies in a table: its cell's coefficients, what part of it, and cells by x."""
+
+    coefficients: tuple[float, ...]
+    part: float
+    density: float
+
+
 class _Part(NamedTuple):
     """An interval of the table: the number of its first cell, and cells by the unit of input."""
 
@@ -219,9 +227,7 @@ class TableClosure(Solver):
                 joints += (c[i] + t * c[i + 1],)
         given = x if self._factors is None else x * self._factors[0]
         state = State([0.0, given], self._no_pins)
-        # What its own velocity starts from.
-        cell: list[Any] = [c, t, density]
-        return Position(_CLOSED, 0.0, joints, state, cell)
+        return Position(_CLOSED, 0.0, joints, state, cast('Any', _Place(c, t, density)))
 
     def residual(self, position: Position) -> float:
         """
@@ -257,10 +263,9 @@ class TableClosure(Solver):
             Of the driven joint, in [rad/s] or [m/s].
 
         """
-        _, _, _, state, poses = position
-        if state[1] is not self._no_pins:
+        if position.state.pins is not self._no_pins:
             return self.closed.velocity(position, *rates)
-        c, t, density = cast('list[Any]', poses)
+        c, t, density = cast('_Place', position.poses)
         (rate,) = rates
         factor = rate * density
         joints: tuple[float, ...] = ()
@@ -287,11 +292,10 @@ class TableClosure(Solver):
             Of the driven joint, in [rad/s²] or [m/s²].
 
         """
-        _, _, _, state, poses = position
-        if state[1] is not self._no_pins:
+        if position.state.pins is not self._no_pins:
             return self.closed.acceleration(position, velocity, *accelerations)
-        c, t, density = cast('list[Any]', poses)
-        (factor,), (change,) = velocity[2], accelerations
+        c, t, density = cast('_Place', position.poses)
+        (factor,), (change,) = velocity.rates, accelerations
         square, pull = factor * factor, change * density
         joints: tuple[float, ...] = ()
         if self._degree == 3:

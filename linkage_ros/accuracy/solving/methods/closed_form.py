@@ -54,11 +54,13 @@ def closed_form(linkage: Linkage) -> Method:
         return joints
 
     def motion(*inputs: float) -> Motion:
-        found = fast_motion(*inputs, *more)
-        if found is None:
+        values = fast_motion(*inputs, *more)
+        if values is None:
             answer = motions.plain(*inputs, *more)
-            found = answer.values if answer.status is _CLOSED else NOTHING
-        joints, rates, accelerations = found
+            if answer.status is not _CLOSED:
+                return NOTHING
+            values = answer.values
+        joints, rates, accelerations = values
         return joints, rates, accelerations
 
     of_closure = closure_method(closure, ITERATED if iterated else NAME)
