@@ -44,8 +44,6 @@ class Bounds(NamedTuple):
 
 _ANY = Bounds()
 
-_INVERSE: Final = {'<': '>=', '<=': '>', '>': '<=', '>=': '<', '==': '!=', '!=': '=='}
-
 _COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
     '<': operator.lt,
     '<=': operator.le,
@@ -54,6 +52,8 @@ _COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
     '==': operator.eq,
     '!=': operator.ne,
 }
+
+_TRUTHS: Final = frozenset((*_COMPARED, 'and', 'or', 'not'))
 
 _CLEAR: Final = 1e-9
 """Numbers this far apart, as a part of themselves, are so however they are rounded."""
@@ -108,22 +108,27 @@ class ArrayForm:
                 self._written[operation] = self._write(operation)
         return self._written[root]
 
-    def holds(self, condition: Number, held: bool) -> Number:
-        """Return the condition that a condition falls as is said."""
-        found = self.number(condition)
-        if not isinstance(found, Operation):
-            return found is held
-        return found if held else self._compare(_INVERSE[found.name], *found.arguments)
+    def opposite(self, condition: Number) -> Number:
+        """Return the condition that one does not hold."""
+        return (not condition) if _constant(condition) else self._new('not', condition)
 
     def both(self, one: Number, other: Number) -> Number:
         """Return the condition that two hold."""
-        if isinstance(one, bool) or isinstance(other, bool):
-            return (other if one is True else one) if one and other else False
+        for first, second in ((one, other), (other, one)):
+            if _constant(first):
+                return second if first else False
         return self._new('and', one, other)
+
+    def either(self, one: Number, other: Number) -> Number:
+        """Return the condition that one of two holds."""
+        for first, second in ((one, other), (other, one)):
+            if _constant(first):
+                return True if first else second
+        return self._new('or', one, other)
 
     def where(self, condition: Number, one: Number, other: Number) -> Number:
         """Return the one number where a condition holds, the other where not."""
-        if isinstance(condition, bool):
+        if _constant(condition):
             return one if condition else other
         if one is other:
             return one
@@ -305,7 +310,7 @@ class ArrayForm:
         key = (name, *(a.number if isinstance(a, Operation) else repr(a) for a in arguments))
         found = self._known.get(key)
         if found is None:
-            kind: Kind = 'truth' if name in _COMPARED or name == 'and' else 'real'
+            kind: Kind = 'truth' if name in _TRUTHS else 'real'
             found = Operation(name, arguments, kind, len(self._known), None)
             self._known[key] = found
             self._bounds[found] = bounds
