@@ -73,7 +73,7 @@ def measure_gallery(plan: CompiledPlan) -> Table:
         compiled = Compiled(closure, 2)
         took = 1e3 * (time.perf_counter() - begun)
         found = in_turn(
-            {'compiled': _over(compiled, states), 'plain': _over(compiled.plain, states)},
+            {'compiled': _over(compiled.fast, states), 'plain': _over(compiled.plain, states)},
             plan.rounds,
         )
         fast, plain = ([1e6 * s / count for s in found[name]] for name in ('compiled', 'plain'))
@@ -115,7 +115,7 @@ def measure_chains(plan: CompiledPlan, picture: Path | None = None) -> Table:
         compiled = Compiled(closure, 2)
         compiling[str(dyads)] = 1e3 * (time.perf_counter() - begun)
         states = list(islice(_closed_states(closure), max(1, plan.states // dyads)))
-        contenders[str(dyads)] = _over(compiled, states)
+        contenders[str(dyads)] = _over(compiled.fast, states)
     found = {}
     for name, seconds in in_turn(contenders, plan.rounds).items():
         states_of = max(1, plan.states // int(name))

@@ -91,7 +91,7 @@ def build(parameters: TableParameters, linkage: Linkage) -> TableClosure:
 
 
 class _Place(NamedTuple):
-    """Where a position lies in a table: its cell's coefficients, what part of it, and cells by x."""
+    """Where a position lies in a table: its cell's coefficients, what part of it, cells by x."""
 
     coefficients: tuple[float, ...]
     part: float

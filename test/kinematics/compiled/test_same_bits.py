@@ -189,11 +189,13 @@ def test_simplified_operations_keep_their_bits() -> None:
             (x + y) + 0.0, 0.0 + (x - y), 0.0 + (0.5 + x), abs(abs(x)), x - y, x * y,
         ]  # fmt: skip
 
-    values = (0.0, -0.0, 1.0, -1.5, 5e-324, -1e300, 3.0)
     line = straight(done, (1.0, 2.0))
+    assert line.places == tuple(range(len(line.results)))
+    values = (0.0, -0.0, 1.0, -1.5, 5e-324, -1e300, 3.0)
     for x in values:
         for y in values:
-            assert repr(list(line(x, y))) == repr(done(x, y))
+            expected = done(x, y)
+            assert repr(list(line.varying(x, y))) == repr(expected)
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'watt_1', 'excavator_bucket'])
