@@ -43,6 +43,7 @@ COMMANDS = {
     'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
     'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
     'draw': 'draw a linkage, and its joints over its range',
+    'compile': 'write a linkage as source in C, JavaScript or Python that needs nothing else',
     'urdf': 'write a linkage or a scene as URDF, for robot_state_publisher and RViz',
     'mjcf': 'write a linkage or a scene as MJCF, for MuJoCo, with its closed loops',
     'import': 'make a linkage file of a URDF and the pins that close it',

@@ -62,7 +62,7 @@ def lowered(path: Path, fates: tuple[Fate, ...] = ()) -> Lowered:
         Where links are iterated.
 
     """
-    lower = _Lower()
+    lower = Lowering()
     inputs = tuple(lower.operation(given) for given in path.inputs)
     decisions = tuple(
         Decision(lower.operation(condition), held) for condition, held in path.decisions
@@ -76,7 +76,7 @@ def lowered(path: Path, fates: tuple[Fate, ...] = ()) -> Lowered:
     )
 
 
-class _Lower:
+class Lowering:
     """Writes the operations of one tape on another."""
 
     def __init__(self) -> None:
@@ -135,7 +135,7 @@ _MAKES_PARTS = frozenset(('facing', 'vector'))
 
 def _times(one: Any, other: Any) -> Any:
     """Return a product; 0 where a constant is."""
-    if one is None or other is None or _zero(one) or _zero(other):
+    if not _constants(one, other) and (_zero(one) or _zero(other)):
         return 0.0
     return one * other
 
@@ -144,11 +144,20 @@ def _zero(number: Any) -> bool:
     return isinstance(number, int | float) and number == 0.0
 
 
+def _constants(one: Any, other: Any) -> bool:
+    """Return whether both are constants, of which a zero has its right sign, too."""
+    return isinstance(one, int | float) and isinstance(other, int | float)
+
+
 def _sum(one: Any, other: Any) -> Any:
+    if _constants(one, other):
+        return one + other
     return other if _zero(one) else one if _zero(other) else one + other
 
 
 def _difference(one: Any, other: Any) -> Any:
+    if _constants(one, other):
+        return one - other
     return -other if _zero(one) else one if _zero(other) else one - other
 
 

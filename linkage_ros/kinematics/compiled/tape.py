@@ -90,6 +90,7 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
     'copysign': math.copysign,
     'hypot': math.hypot,
     'remainder': math.remainder,
+    'round': round,
     'facing': lambda angle: cmath.rect(1.0, angle),
     'phase': cmath.phase,
     'vector': complex,
@@ -234,6 +235,9 @@ class Symbol:
 
     def __abs__(self) -> Any:
         return self.tape.write('abs', self)
+
+    def __round__(self) -> Any:
+        return self.tape.write('round', self)
 
     def __lt__(self, other: Any) -> Any:
         return self.tape.write('<', self, other)
