@@ -82,11 +82,11 @@ class ArrayForm:
     Parameters
     ----------
     given
-        Inputs by name that are constants.
+        Rates and accelerations by name that are 0 or 1.
 
     """
 
-    def __init__(self, given: Mapping[str, float]) -> None:
+    def __init__(self, given: Mapping[str, int]) -> None:
         self._given = given
         self._known: dict[tuple[Any, ...], Operation] = {}
         self._bounds: dict[Operation, Bounds] = {}
@@ -169,11 +169,10 @@ class ArrayForm:
                 return self.where(*given)
             case 'abs':
                 return self._absolute(*given)
+            case 'hypot':
+                return self._length(*given)
             case 'sqrt':
-                low, high = self._between(given[0])
-                return self._new(
-                    name, *given, bounds=Bounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5)
-                )
+                return self._root(*given)
         if name in _COMPARED:
             return self._compare(name, *given)
         return self._new(name, *given)
@@ -214,10 +213,9 @@ class ArrayForm:
 
     def _multiply(self, one: Number, other: Number) -> Number:
         (factor, one), (more, other) = _split(one), _split(other)
-        factor *= more
-        if factor == 0.0:
-            return 0.0
-        return self._scaled(factor, self._product(one, other))
+        if _nothing(factor) or _nothing(more):
+            return 0
+        return self._scaled(factor * more, self._product(one, other))
 
     def _product(self, one: Number, other: Number) -> Number:
         if one is None or other is None:
@@ -234,12 +232,14 @@ class ArrayForm:
 
     def _divide(self, one: Number, other: Number) -> Number:
         (factor, one), (divisor, other) = _split(one), _split(other)
+        if _nothing(factor):
+            return 0
         if divisor == 0.0:
             # Off the way that the steps take.
             return nan
         factor /= divisor
-        if factor == 0.0 or other is None:
-            return 0.0 if factor == 0.0 else self._scaled(factor, one)
+        if other is None:
+            return self._scaled(factor, one)
         if one is None:
             return self._new('/', factor, other)
         return self._scaled(factor, self._new('/', one, other))
@@ -291,6 +291,22 @@ class ArrayForm:
             return self._negative(one)
         return self._new('abs', one, bounds=Bounds(0.0, max(-low, high)))
 
+    def _root(self, one: Number) -> Number:
+        low, high = self._between(one)
+        return self._new('sqrt', one, bounds=Bounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5))
+
+    def _length(self, x: Number, y: Number) -> Number:
+        """
+        Return the length of a vector.
+
+        By squares: no length of a linkage is so small or so great that they are lost, and hypot()
+        takes as long as twenty of them.
+        """
+        for along, across in ((x, y), (y, x)):
+            if _constant(across) and across == 0.0:
+                return self._absolute(along)
+        return self._root(self._add(self._multiply(x, x), self._multiply(y, y)))
+
     def _compare(self, name: str, one: Number, other: Number) -> Number:
         if _constant(one) and _constant(other):
             return _COMPARED[name](one, other)
@@ -319,6 +335,11 @@ class ArrayForm:
 
 def _constant(number: Number) -> bool:
     return not isinstance(number, Operation)
+
+
+def _nothing(number: Number) -> bool:
+    """Return whether a number is the 0 of what is given, whose sign does not matter."""
+    return isinstance(number, int) and number == 0
 
 
 def _split(number: Number) -> tuple[float, Number]:

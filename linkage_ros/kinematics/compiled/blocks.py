@@ -37,7 +37,6 @@ _FUNCTIONS: Final[dict[str, Any]] = {
     'sqrt': np.sqrt,
     'atan2': np.arctan2,
     'copysign': np.copysign,
-    'hypot': np.hypot,
     'maximum': np.maximum,
     'minimum': np.minimum,
     '<': np.less,

@@ -124,7 +124,7 @@ class Solver:
         batch = _room(self._width, count, derivatives, out)
         numbers: list[Any] = [value if value.ndim else float(value) for value in given]
         # Nothing is worked out of what is 0, and nothing multiplied by 1.
-        kinds = [n if isinstance(n, float) and n in (0.0, 1.0) else type(n) for n in numbers]
+        kinds = [int(n) if isinstance(n, float) and n in (0.0, 1.0) else type(n) for n in numbers]
         programs = self._programs(derivatives, tuple(kinds))
         functions = [function for program in programs for function in program]
         longest = min(count, BLOCK)
@@ -263,7 +263,7 @@ def _program(path: Lowered, kinds: Sequence[Any]) -> _Program:
     (inputs, decisions, outputs, _), ends = path
     names = [given.name for given in inputs]
     each = list(zip(names, kinds, strict=True))
-    form = ArrayForm({name: kind for name, kind in each if isinstance(kind, float)})
+    form = ArrayForm({name: kind for name, kind in each if isinstance(kind, int)})
     arrays = [name for name, kind in each if kind is np.ndarray]
     holds: Number = True
     lost: list[Number] = [False] * len(_LOST)
