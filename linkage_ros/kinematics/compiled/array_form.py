@@ -169,8 +169,6 @@ class ArrayForm:
                 return self.where(*given)
             case 'abs':
                 return self._absolute(*given)
-            case 'hypot':
-                return self._length(*given)
             case 'sqrt':
                 return self._root(*given)
         if name in _COMPARED:
@@ -292,20 +290,10 @@ class ArrayForm:
         return self._new('abs', one, bounds=Bounds(0.0, max(-low, high)))
 
     def _root(self, one: Number) -> Number:
+        if not _constant(one) and one.name == '*' and one.arguments[0] is one.arguments[1]:
+            return self._absolute(one.arguments[0])
         low, high = self._between(one)
         return self._new('sqrt', one, bounds=Bounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5))
-
-    def _length(self, x: Number, y: Number) -> Number:
-        """
-        Return the length of a vector.
-
-        By squares: no length of a linkage is so small or so great that they are lost, and hypot()
-        takes as long as twenty of them.
-        """
-        for along, across in ((x, y), (y, x)):
-            if _constant(across) and across == 0.0:
-                return self._absolute(along)
-        return self._root(self._add(self._multiply(x, x), self._multiply(y, y)))
 
     def _compare(self, name: str, one: Number, other: Number) -> Number:
         if _constant(one) and _constant(other):

@@ -167,7 +167,7 @@ class Solver:
         if iterated(self._closure):
             return []
         return [
-            _program(lowered(path, fates(self._closure, path)), kinds)
+            _program(lowered(path, fates(self._closure, path), by_squares=True), kinds)
             for path in self._compiled(derivatives).paths
         ]
 
