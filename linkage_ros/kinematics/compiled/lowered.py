@@ -234,7 +234,7 @@ _FORMULAS: dict[str, Callable[..., Any]] = {
     'vector': lambda _, x, y: _Parts(x, y),
 }
 
-_BY_SQUARES = {
+_BY_SQUARES: dict[str, Callable[..., Any]] = {
     **_FORMULAS,
     '/': _divide_by_squares,
     'abs': _length_by_squares,
