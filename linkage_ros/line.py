@@ -37,7 +37,7 @@ from linkage_ros.effects.stage import (
     Sensor,
     Writer,
 )
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.look import (
@@ -151,7 +151,7 @@ class Line:
             loads=member.loads,
             friction=friction.friction(parameters['friction']) if friction else None,
             prefix=member.prefix,
-            dependent=frozenset(scene.joints).difference(*(each.inputs for each in scene.members)),
+            dependent=scene.dependent_joints,
             effects=frozenset(member.effects),
             moves_by_rates=moves_by_rates,
         )
@@ -282,7 +282,7 @@ def _refuse_idle(member: Member, forced: bool) -> None:
             raise DefinitionError(
                 key,
                 'acts on nothing here: no effect and no drive asks for forces',
-                f'leave it out, drive by torque, or name one of {", ".join(LOADED)}',
+                f'leave it out, drive by torque, or name one of {listed(LOADED)}',
             )
 
 
@@ -292,7 +292,7 @@ def _refuse_solver(member: Member, forced: bool) -> None:
         raise DefinitionError(
             'solver',
             f'{member.solver[0]} finds no forces, and an effect or the drive asks for them',
-            f'write closed_form, or leave {", ".join(LOADED)} and torque out',
+            f'write closed_form, or leave {listed(LOADED)} and torque out',
         )
 
 

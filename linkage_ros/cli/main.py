@@ -24,7 +24,7 @@ from threading import Event
 
 from linkage_ros import __version__
 from linkage_ros.cli.outlet import clean_output
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import LinkageError, missing_packages_reported
 from linkage_ros.stop import end_soon, raising, stop_on_signals, StoppedError
 
 COMMANDS = {
@@ -94,11 +94,12 @@ def _run(arguments: list[str], stop: Event) -> int:
     parser.add_argument('command', choices=COMMANDS, metavar='COMMAND')
     name = parser.parse_args(arguments[:1]).command
 
-    module = import_module(module_of(name))
-    subparser = argparse.ArgumentParser(prog=f'linkage {name}', description=module.__doc__)
-    module.add_arguments(subparser)
     try:
-        return int(module.run(subparser.parse_args(arguments[1:]), stop))
+        with missing_packages_reported():
+            module = import_module(module_of(name))
+            subparser = argparse.ArgumentParser(prog=f'linkage {name}', description=module.__doc__)
+            module.add_arguments(subparser)
+            return int(module.run(subparser.parse_args(arguments[1:]), stop))
     except LinkageError as error:
         print(f'linkage {name}: {error}', file=sys.stderr)
         return 2

@@ -141,6 +141,13 @@ def test_a_command_ends_while_it_reads(folder, command, number) -> None:
 
 
 @pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('at', [PARSE, 'linkage_ros.kinematics.closure:singular_inputs'])
+def test_a_run_ends_before_its_first_tick(folder, at, number) -> None:
+    found = ended_by(stuck_at(folder, at, 'run', 'four.yaml', '--plain'), number)
+    assert found == (1, 'linkage run: stopped\n')
+
+
+@pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('command', COMPUTE)
 def test_a_command_ends_while_it_computes(folder, command, number) -> None:
     before = sorted(folder.iterdir())
