@@ -23,7 +23,6 @@ import re
 import subprocess
 import sys
 
-from bench.kinematics_compiled import compiler
 from bench.kinematics_pylinkage import AVAILABLE
 from bench.report import Table
 from bench.spread import percentile, ratios, spread
@@ -136,13 +135,11 @@ def test_compiled_linkages_are_measured_beside_their_plain_steps_and_by_their_dy
 
 
 @pytest.mark.timeout(90)
-def test_solving_is_measured_against_straight_line_c_and_pylinkage(tmp_path):
+def test_solving_is_measured_against_straight_line_and_pylinkage(tmp_path):
     kept = _bench(tmp_path, '--only', 'kinematics')
     names = ['µs a state: four-bar / straight line', 'µs a state: Jansen leg / four-bar']
     if AVAILABLE:
         names += ['µs a state: pylinkage / four-bar', 'Mstates/s: numpy / pylinkage']
-    if compiler():
-        names += [f'{name}, Mstates/s: numpy / C' for name in ('four_bar', 'jansen_leg')]
     for name in names:
         cells = _row(kept, name)
         assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))
