@@ -32,7 +32,6 @@ from typing import NamedTuple
 
 from linkage_ros.cdr import STAMP_END
 from linkage_ros.joint_state import arrays_of, NANOSECONDS, Rejection
-from linkage_ros.tuples import new
 
 
 class EffortCommand(NamedTuple):
@@ -91,7 +90,7 @@ class JointEffortReader:
                     data
                 )
                 if (order, names, rates, efforts) == fixed:
-                    return new(EffortCommand, (seconds * NANOSECONDS + nanoseconds, effort))
+                    return EffortCommand(seconds * NANOSECONDS + nanoseconds, effort)
         found = _find(data, self._joint, self._dependent)
         if isinstance(found, Rejection):
             return found

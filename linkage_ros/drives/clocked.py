@@ -25,10 +25,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
-from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.drives.limits import refuse_beyond
 from linkage_ros.errors import DefinitionError
-from linkage_ros.tuples import new
 
 LARGEST = 1e10
 """No value or rate of a machine's input is beyond this, in [rad], [m], [rad/s] or [m/s]."""
@@ -44,7 +43,7 @@ derivative by time of the one before it.
 P = TypeVar('P')
 
 
-class ClockedDrive:
+class ClockedDrive(Drive):
     """
     Inputs that follow curves, from the first tick on.
 
@@ -71,10 +70,10 @@ class ClockedDrive:
             self._start = now
         if self._curve is not None:  # zip over one takes twice as long, in every tick
             value, rate, acceleration = self._curve(now - self._start)
-            return new(CrankState, ((value,), (rate,), (acceleration,), 0))
+            return CrankState((value,), (rate,), (acceleration,), 0)
         elapsed = now - self._start
         values, rates, accelerations = zip(*[c(elapsed) for c in self._curves], strict=True)
-        return new(CrankState, (values, rates, accelerations, 0))
+        return CrankState(values, rates, accelerations, 0)
 
 
 def build_clocked(

@@ -40,6 +40,7 @@ from random import Random
 from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.written import Lines
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.loads import Friction, Loads
@@ -109,6 +110,14 @@ class Drive(Protocol):
 
     def state(self, now: int, /) -> CrankState | None:
         """Return the crank at a time, in [ns]; nothing where there is none."""
+
+    def straight(self, _inputs: int) -> Lines:
+        """
+        Return `state` as lines that make ``crank`` of ``now``, for so many inputs.
+
+        The lines may make named tuples by ``new``, which is ``tuple.__new__``.
+        """
+        return Lines(['crank = state(now)'], {'state': self.state})
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from math import copysign, inf, isfinite
 
-from linkage_ros.drives.drive import Context, CrankState, Reader
+from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators.method import METHODS
 from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError
@@ -37,7 +37,6 @@ from linkage_ros.joint_state import NANOSECONDS, Rejection
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.parameters import choice, number
-from linkage_ros.tuples import new
 
 TOPIC = 'crank_commands'
 
@@ -161,7 +160,7 @@ def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]
     )
 
 
-class TorqueDrive:
+class TorqueDrive(Drive):
     """
     A mechanism that commands move.
 
@@ -268,7 +267,7 @@ class TorqueDrive:
         if now > self._time:
             motion = self._mechanism.advance(motion, (now - self._time) * 1e-9, *force)
         acceleration = self._mechanism.acceleration(motion, *force)
-        return new(CrankState, ((motion.value,), (motion.rate,), (acceleration,), 0))
+        return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
 
     def _advance(self, now: int) -> None:
         """Do all steps that end by now."""

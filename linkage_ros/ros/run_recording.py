@@ -42,7 +42,7 @@ from linkage_ros.bag.writing.snapshot import SnapshotMemory
 from linkage_ros.bag.writing.storage import Storage
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
-from linkage_ros.line import Line
+from linkage_ros.pipeline import Line
 from linkage_ros.replay import own_effects_here
 from linkage_ros.ros.run_snapshots import (
     Answer,

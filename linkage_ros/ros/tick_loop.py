@@ -35,6 +35,7 @@ from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline, Tick
+from linkage_ros.straight_tick import Seen
 from linkage_ros.ros.duration_histogram import DurationHistogram
 
 if TYPE_CHECKING:
@@ -45,8 +46,6 @@ JOINT_STATES, DIAGNOSTICS = range(2)
 The recorder's first topics. Where there are such, the crank's follows, those of the faults and of
 the ticks without a message, and those of the pipeline's extras. The last is that of the resets.
 """
-
-_CLOSED = Status.CLOSED
 
 _LONGEST_DRAIN = 20_000_000
 """How long a tick takes messages at most, in [ns]: huge ones, each read for the first time."""
@@ -310,7 +309,7 @@ class TickLoop:
         """Solve now for a time, both in [ns]; publish, record and count."""
         counts = self.counts
         counts.last = tick = self._pipeline.tick(at)
-        looks, message, extras = tick
+        message, extras = tick.message, tick.extras
         recorder = self.recorder
         if message:
             self._publish(message)
@@ -329,13 +328,18 @@ class TickLoop:
         elif self._withholds and self._pipeline.remembers(tick):
             recorder.offer(self._withheld_number, now, at, time_message(at))
         counts.ticks += 1
-        for number, (_, position, _, reading) in enumerate(looks):
+        for number, one in enumerate(tick.seen):
+            if isinstance(one, Seen):
+                counts.withheld += one.reading is None
+                continue
+            position = one.position
             if position is None:
                 counts.silent += 1
-            elif position[0] is not _CLOSED:
-                counts.unclosed[position[0]] += 1
-                counts.last_unclosed[position[0]] = number, position
-            if reading is None and position is not None and position[2]:
+                continue
+            if position.status is not Status.CLOSED:
+                counts.unclosed[position.status] += 1
+                counts.last_unclosed[position.status] = number, position
+            if one.reading is None and position.joints:
                 counts.withheld += 1
 
     def _guarded(self, pace: Pace) -> None:

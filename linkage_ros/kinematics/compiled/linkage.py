@@ -26,7 +26,7 @@ from linkage_ros.kinematics.compiled.trace import joints, moved, Path, traced, W
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Closure, Position
+    from linkage_ros.kinematics.closure import Closure
 
 _MOST_PATHS = 8
 """So many a linkage has at most; where none holds, the plain steps answer."""
@@ -75,6 +75,10 @@ class Compiled:
 
     Attributes
     ----------
+    driven
+        How many inputs it has.
+    derivatives
+        As given.
     paths
         The ways that the steps take where the linkage is closed. There is more than one where they
         take different forms in different regions.
@@ -86,12 +90,12 @@ class Compiled:
 
     def __init__(self, closure: Closure, derivatives: int = 0, wanted: Wanted = joints) -> None:
         self._closure = closure
-        self._driven = len(closure.linkage.inputs)
-        self._derivatives = derivatives
+        self.driven = len(closure.linkage.inputs)
+        self.derivatives = derivatives
         self._wanted = wanted
         self.paths: list[Path] = []
         functions: list[Callable[..., Values | None]] = []
-        more = (1.25,) * self._driven * derivatives
+        more = (1.25,) * self.driven * derivatives
         for inputs in _states(closure):
             if any(function(*inputs, *more) is not None for function in functions):
                 continue
@@ -124,8 +128,8 @@ class Compiled:
 
     def plain(self, *numbers: float) -> Answer:
         """Return the answer of the plain steps."""
-        n = self._driven
-        given = [numbers[i * n : (i + 1) * n] for i in range(1 + self._derivatives)]
+        n = self.driven
+        given = [numbers[i * n : (i + 1) * n] for i in range(1 + self.derivatives)]
         motion = moved(self._closure, given)
         status, gap = motion.position.status, motion.position.gap
         return Answer(status, gap, tuple(tuple(group) for group in self._wanted(motion)))
