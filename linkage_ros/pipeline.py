@@ -49,7 +49,14 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.routes import Routes
 from linkage_ros.scene.scene import Member, Scene
 from linkage_ros.solvers.registry import SOLVERS
-from linkage_ros.straight_tick import Seen, Straight, straight, straight_look, straight_tick
+from linkage_ros.straight_tick import (
+    Numbers,
+    Seen,
+    Straight,
+    straight,
+    straight_look,
+    straight_tick,
+)
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Injection
@@ -109,7 +116,7 @@ class Tick(NamedTuple):
 
     message: bytes
     extras: tuple[bytes, ...]
-    seen: Sequence[Look | Seen]
+    seen: Sequence[Look | Seen | Numbers]
     lines: Sequence[Line]
 
     @property
@@ -339,12 +346,15 @@ class Line:
                 reading = sensor.gap(now)
         return reading
 
-    def looked(self, seen: Look | Seen) -> Look:
+    def looked(self, seen: Look | Seen | Numbers) -> Look:
         """Return all that a linkage came to: of a straight tick it is worked out here."""
         if isinstance(seen, Look):
             return seen
-        position = self._close(*seen.crank.angles)
-        return Look(seen.crank, position, self._moved(seen.crank, position), seen.reading)
+        crank_numbers, numbers = seen
+        crank = CrankState(*crank_numbers)
+        position = self._close(*crank.angles)
+        reading = None if numbers is None else Reading(*numbers)
+        return Look(crank, position, self._moved(crank, position), reading)
 
     def write_extras(self, now: int, seen: Look | Seen) -> list[bytes]:
         """Return the messages beside the joint states at a time, in [ns]; b'' for none."""
@@ -613,7 +623,7 @@ class Pipeline:
     def remembers(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes what comes after it."""
         return any(
-            isinstance(seen, Seen)
+            not isinstance(seen, Look)
             or line.gap_begins
             or (seen.position is not None and (bool(seen.position.joints) or self._goes_on))
             for line, seen in zip(self.lines, tick.seen, strict=True)

@@ -30,11 +30,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import chain
 from math import pi
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.effects.stage import Reading
-from linkage_ros.kinematics.compiled.python import python_body
 from linkage_ros.written import written
 
 if TYPE_CHECKING:
@@ -44,7 +43,8 @@ if TYPE_CHECKING:
     from linkage_ros.joint_state import JointStateWriter
     from linkage_ros.kinematics.compiled.linkage import Compiled
 
-_LEAVE = 'return plain(now, crank)'
+_CRANK = ', '.join(CrankState._fields)
+_LEAVE = f'return plain(now, CrankState({_CRANK}))'
 """Leaves a tick that is not the usual one."""
 
 Plain = Callable[[int, CrankState | None], Any]
@@ -68,6 +68,10 @@ class Seen(NamedTuple):
     reading: Reading | None
 
 
+Numbers: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...]]
+"""The same as plain tuples."""
+
+
 class Straight(NamedTuple):
     """
     A usual tick up to its reading, in lines of Python.
@@ -75,7 +79,8 @@ class Straight(NamedTuple):
     Attributes
     ----------
     lines, bound
-        They make ``crank`` of ``now`` and what follows, or leave by ``plain``.
+        They make what follows of ``now``, the fields of a `CrankState` by their names among it, or
+        leave by ``plain``.
     joints, rates, accelerations
         Of the reading, as expressions; none where they are not called for.
 
@@ -109,23 +114,20 @@ def straight(
         Lets the published angles run on; None where they need not.
 
     """
-    crank = drive.straight(compiled.driven)
+    crank = drive.straight(compiled.driven, 'return plain(now, None)')
     lines, bound = [*crank.lines], {**crank.bound}
 
     def leave_unless(condition: str) -> None:
         lines.extend((f'if not ({condition}):', f'    {_LEAVE}'))
 
-    leave_unless('crank is not None')
     for number, stage in enumerate(drive_stages):
         bound[f'stage{number}'] = stage
-        lines.append(f'crank = stage{number}(crank)')
-
+        lines.append(f'{_CRANK} = stage{number}(CrankState({_CRANK}))')
     path, *more_paths = compiled.paths
     inputs = [given.name for given in path.inputs]
     n = compiled.driven
-    fields = ('angles', 'rates', 'accelerations')[: 1 + compiled.derivatives]
-    for order, field in enumerate(fields):
-        lines.append(f'{", ".join(inputs[n * order : n * order + n])}, = crank.{field}')
+    for order, field in enumerate(CrankState._fields[: 1 + compiled.derivatives]):
+        lines.append(f'{", ".join(inputs[n * order : n * order + n])}, = {field}')
     groups = [
         [f'{letter}{i}' for i in range(len(group))]
         for letter, group in zip('xyz', path.outputs, strict=False)
@@ -137,7 +139,7 @@ def straight(
         leave_unless('values is not None')
         lines.append(f'{", ".join(numbers)}, = chain(*values)')
     else:
-        body = python_body(path, _LEAVE)
+        body = compiled.body(_LEAVE)
         bound |= body.bound
         lines += body.lines
         outputs = chain(*body.outputs)
@@ -153,7 +155,7 @@ def straight(
         lines.append('last = running.raw')
         leave_unless('last')
         for i in angles.places:
-            leave_unless(f'{-pi!r} < last[{i}] - x{i} < {pi!r}')
+            leave_unless(f'{-pi!r} < last[{i}] - {joints[i]} < {pi!r}')
         lines.append(f'running.raw = {_tuple(joints)}')
         turns = [f'n{i}' for i in range(len(joints))]
         lines.append(f'{", ".join(turns)}, = running.added')
@@ -177,8 +179,10 @@ def straight_look(
         What does the other ticks.
 
     """
-    reading = 'reading' if read is None else 'read(now, reading)'
-    lines = [f'reading = {_reading(usual)}', f'return new(Seen, (crank, {reading}))']
+    lines = [f'crank = new(CrankState, ({_CRANK}))', f'reading = new(Reading, {_reading(usual)})']
+    if read is not None:
+        lines.append('reading = read(now, reading)')
+    lines.append('return new(Seen, (crank, reading))')
     return _function(usual, lines, {'read': read, 'plain': plain})
 
 
@@ -210,12 +214,12 @@ def straight_tick(
     bound: dict[str, Any] = {'Tick': tick, 'linkages': linkages, 'plain': plain}
     bound |= {f'write{number}': write for number, write in enumerate(extras)}
     packed = writer.straight('now', usual.joints, usual.rates)
+    lines = [f'reading = {_reading(usual)}', *packed.lines]
+    if extras:
+        lines.append('reading = new(Reading, reading)')
     messages = _tuple([f'write{number}(now, None, reading)' for number in range(len(extras))])
-    lines = [
-        f'reading = {_reading(usual)}',
-        *packed.lines,
-        f'return new(Tick, (message, {messages}, (new(Seen, (crank, reading)),), linkages))',
-    ]
+    seen = f'((({_CRANK}), reading),)'
+    lines.append(f'return new(Tick, (message, {messages}, {seen}, linkages))')
     return _function(usual, lines, bound | packed.bound)
 
 
@@ -223,7 +227,8 @@ def _function(
     usual: Straight, lines: Sequence[str], bound: dict[str, Any]
 ) -> Callable[[int], Any]:
     # The constructor of a named tuple is a function of Python's; this is one of C's.
-    types = {'new': tuple.__new__, 'Seen': Seen, 'Reading': Reading}
+    new = tuple.__new__
+    types = {'new': new, 'CrankState': CrankState, 'Reading': Reading, 'Seen': Seen}
     source = '\n    '.join(['def tick(now):', *usual.lines, *lines])
     function: Callable[[int], Any] = written(source, 'tick', usual.bound | types | bound)
     return function
@@ -231,7 +236,7 @@ def _function(
 
 def _reading(usual: Straight) -> str:
     parts = ', '.join(map(_tuple, (usual.joints, usual.rates, usual.accelerations)))
-    return f'new(Reading, (now, {parts}, ()))'
+    return f'(now, {parts}, ())'
 
 
 def _tuple(parts: Sequence[str]) -> str:

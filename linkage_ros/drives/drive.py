@@ -82,6 +82,9 @@ class CrankState(NamedTuple):
     age: int
 
 
+_CRANK = ', '.join(CrankState._fields)
+
+
 class CrankBehindPlay(CrankState):
     """
     The crank at a tick, behind the play between it and its motor.
@@ -111,13 +114,20 @@ class Drive(Protocol):
     def state(self, now: int, /) -> CrankState | None:
         """Return the crank at a time, in [ns]; nothing where there is none."""
 
-    def straight(self, _inputs: int) -> Lines:
+    def straight(self, _inputs: int, leave: str) -> Lines:
         """
-        Return `state` as lines that make ``crank`` of ``now``, for so many inputs.
+        Return `state` as lines that make what a `CrankState` has, by its names, of ``now``.
 
-        The lines may make named tuples by ``new``, which is ``tuple.__new__``.
+        Parameters
+        ----------
+        inputs
+            How many the linkage has.
+        leave
+            The statement that leaves the lines where there is no crank.
+
         """
-        return Lines(['crank = state(now)'], {'state': self.state})
+        lines = ['crank = state(now)', 'if crank is None:', f'    {leave}', f'{_CRANK} = crank']
+        return Lines(lines, {'state': self.state})
 
 
 @dataclass(frozen=True)

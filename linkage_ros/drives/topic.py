@@ -151,18 +151,17 @@ class TopicDrive(Drive):
                 angles = tuple([angle + rate * seconds for angle, rate in pairs])
         return CrankState(angles, rates, zeros, age)
 
-    def straight(self, inputs: int) -> Lines:
+    def straight(self, inputs: int, leave: str) -> Lines:
         """Return `state` as lines: without a frame of its own."""
-        angles = 'angles'
-        if self._carry_forward:
-            angles = ' '.join(f'angles[{i}] + rates[{i}] * seconds,' for i in range(inputs))
         lines = [
-            'crank = None',
-            'if drive.sample is not None:',
-            '    stamp, angles, rates, zeros = drive.sample',
-            '    age = now - stamp',
-            f'    if age <= {self.max_age}:',
-            '        seconds = age * 1e-9',
-            f'        crank = new(CrankState, (({angles}), rates, zeros, age))',
+            'if drive.sample is None:',
+            f'    {leave}',
+            'stamp, angles, rates, accelerations = drive.sample',
+            'age = now - stamp',
+            f'if age > {self.max_age}:',
+            f'    {leave}',
         ]
-        return Lines(lines, {'drive': self, 'CrankState': CrankState})
+        if self._carry_forward:
+            carried = [f'angles[{i}] + rates[{i}] * seconds,' for i in range(inputs)]
+            lines += ['seconds = age * 1e-9', f'angles = ({" ".join(carried)})']
+        return Lines(lines, {'drive': self})

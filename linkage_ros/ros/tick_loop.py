@@ -34,8 +34,7 @@ from linkage_ros.cdr import time_message
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.status import Status
-from linkage_ros.pipeline import Pipeline, Tick
-from linkage_ros.straight_tick import Seen
+from linkage_ros.pipeline import Look, Pipeline, Tick
 from linkage_ros.ros.duration_histogram import DurationHistogram
 
 if TYPE_CHECKING:
@@ -329,8 +328,9 @@ class TickLoop:
             recorder.offer(self._withheld_number, now, at, time_message(at))
         counts.ticks += 1
         for number, one in enumerate(tick.seen):
-            if isinstance(one, Seen):
-                counts.withheld += one.reading is None
+            if not isinstance(one, Look):
+                _, reading = one
+                counts.withheld += reading is None
                 continue
             position = one.position
             if position is None:

@@ -21,7 +21,7 @@ from itertools import islice, product
 from math import inf, pi, tau
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.compiled.python import python_function, Values
+from linkage_ros.kinematics.compiled.python import Body, python_body, python_function, Values
 from linkage_ros.kinematics.compiled.trace import joints, moved, Path, traced, Wanted
 from linkage_ros.kinematics.status import Status
 
@@ -94,6 +94,7 @@ class Compiled:
         self.derivatives = derivatives
         self._wanted = wanted
         self.paths: list[Path] = []
+        self._bodies: dict[str, Body] = {}
         functions: list[Callable[..., Values | None]] = []
         more = (1.25,) * self.driven * derivatives
         for inputs in _states(closure):
@@ -105,6 +106,20 @@ class Compiled:
                 if len(functions) == _MOST_PATHS:
                     break
         self.fast: Callable[..., Values | None] = _first_of(functions)
+
+    def body(self, leave: str) -> Body:
+        """
+        Return its first path as lines of Python; they are written once.
+
+        Parameters
+        ----------
+        leave
+            The statement that leaves the lines where the path does not hold.
+
+        """
+        if leave not in self._bodies:
+            self._bodies[leave] = python_body(self.paths[0], leave)
+        return self._bodies[leave]
 
     def __call__(self, *numbers: float) -> Answer:
         """
