@@ -26,10 +26,11 @@ from tempfile import TemporaryDirectory
 import time
 
 from bench.coming import ComersPlan, measure_comers
+from bench.compiled_steps import CompiledPlan, measure_chains, measure_gallery
 from bench.empty_scene import EmptyPlan, measure_empty_scene
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
-from bench.pages import PAGES, write_page
+from bench.pages import FOLDER, PAGES, write_page
 from bench.processes import BenchError, Graph
 from bench.report import say, show, Table
 from bench.tick_tables import cost_table, lateness_table
@@ -47,6 +48,8 @@ _EMPTY_QUICK = EmptyPlan(rounds=3, ticks=1000)
 _SPEED = SpeedPlan(rounds=11, states=5000, batch=1_000_000)
 _COMERS = ComersPlan(comers=200, listens=0.05, busy=2)
 _COMERS_QUICK = ComersPlan(comers=2, listens=0.05, busy=0)
+_COMPILED = CompiledPlan(rounds=11, states=2000)
+_COMPILED_QUICK = CompiledPlan(rounds=1, states=100)
 _SPEED_QUICK = SpeedPlan(rounds=3, states=1000, batch=100_000)
 
 
@@ -56,7 +59,7 @@ def main() -> int:
     parser.add_argument('--quick', action='store_true', help='less than half a minute, rougher')
     parser.add_argument(
         '--only',
-        choices=('a', 'b', 'c', 'many', 'empty', 'kinematics', 'real_time', 'comers'),
+        choices=('a', 'b', 'c', 'many', 'empty', 'kinematics', 'compiled', 'real_time', 'comers'),
         help='only one of the comparisons',
     )
     parser.add_argument(
@@ -68,7 +71,7 @@ def main() -> int:
     arguments = parser.parse_args()
     if arguments.write and arguments.only not in PAGES:
         parser.error(f'--write needs --only {" or ".join(PAGES)}')
-    parts = dict.fromkeys(('kinematics', 'empty', 'many', 'real_time', 'comers'), '')
+    parts = dict.fromkeys(('kinematics', 'compiled', 'empty', 'many', 'real_time', 'comers'), '')
     wanted = parts.get(arguments.only, arguments.only or 'abc')
     started = time.monotonic()
     begin = datetime.now().astimezone()
@@ -98,6 +101,11 @@ def main() -> int:
             if arguments.only in (None, 'kinematics'):
                 say('kinematics: linkages solved with acceleration')
                 tables.append(measure_speed(folder, _SPEED_QUICK if arguments.quick else _SPEED))
+            if arguments.only in (None, 'compiled'):
+                say('compiled linkages beside their plain steps')
+                compiled_plan = _COMPILED_QUICK if arguments.quick else _COMPILED
+                picture = FOLDER / 'chains.svg' if arguments.write else None
+                tables += [measure_gallery(compiled_plan), measure_chains(compiled_plan, picture)]
     except BenchError as error:
         print(f'bench: {error}', file=sys.stderr)
         return 1

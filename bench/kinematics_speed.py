@@ -28,7 +28,7 @@ from bench.kinematics_pylinkage import AVAILABLE, HAS_NUMBA, stepping
 from bench.kinematics_straight import straight_line
 from bench.processes import BenchError, ROOT
 from bench.report import say, Table
-from linkage_ros.kinematics.batch.solve import Batch
+from linkage_ros.kinematics.batch import Batch
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.rounding import margin
 from linkage_ros.scene.linkage_file import read_linkage

@@ -233,7 +233,7 @@ def _compare_arrays(
     findings: Findings,
 ) -> None:
     """Compare what is solved over arrays with what is solved one by one."""
-    from linkage_ros.kinematics.batch.arrays import CODES  # local import: with numpy only
+    from linkage_ros.kinematics.batch import CODES  # local import: with numpy only
 
     motion = {'rates': rates.astype(float), 'accelerations': pulls.astype(float)}
     try:

@@ -115,9 +115,8 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
         raise DefinitionError(
             'drive.torque.brake', 'a brake that is never set', 'add on_timeout: brake'
         )
-    terms, position = context.mechanics.terms, closure.position
     motion = OneFreedom(
-        lambda value: terms(position(value)),
+        context.mechanics.equation,
         import_module(METHODS[parameters.method]).step,
         _stops(closure, parameters.start, parameters.stop_margin),
         parameters.restitution,

@@ -37,14 +37,16 @@ and friction over the velocities that its input alone would give at a rate of 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from math import copysign, isfinite
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 from linkage_ros.dynamics.loads import check_loads, check_masses, Friction, Loads
+from linkage_ros.kinematics.arithmetic import all_finite, copysign, where
 from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
+from linkage_ros.kinematics.compiled.linkage import Compiled
+from linkage_ros.kinematics.compiled.trace import Motion as CompiledMotion
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.tuples import new
 
 _ROUNDING = 1e-9
 """A slip below this part of the rates that it comes from is none."""
@@ -152,14 +154,14 @@ class Mechanics:
         There is none where no rates exist, as at a toggle, where the linkage does not close, and
         within floats of a toggle, where the terms are beyond a double.
         """
-        if not position[0].has_rates:
+        if not position.status.has_rates:
             return None
         velocity = self.closure.velocity(position, 1.0)
         acceleration = self.closure.acceleration(position, velocity, 0.0)
         places = self._follower.places(position)
         velocities = self._follower.velocities(position, velocity, places)
         accelerations = self._follower.accelerations(position, velocity, acceleration, places)
-        v, a = velocity[1][0], acceleration[1][0]
+        v, a = velocity.state.coordinates, acceleration.state.coordinates
         inertia, half_slope, momentum = self.loads.drive_inertia, 0.0, 0j
         for mass, gyration, point, turn in self._bodies:
             speed, pull, spin = velocities[point], accelerations[point], v[turn]
@@ -181,10 +183,33 @@ class Mechanics:
             viscous += drag * slip * slip
             coulomb += limit * abs(slip)
             if limit:
-                slips += (0.0 if _stands(v, one, other) else limit * slip,)
-        if not (isfinite(inertia) and isfinite(half_slope)):
+                slips += (where(_stands(v, one, other), 0.0, limit * slip),)
+        if not all_finite((inertia, half_slope)):
             return None
-        return new(Terms, (inertia, half_slope, slope, viscous, coulomb, slips))
+        return Terms(inertia, half_slope, slope, viscous, coulomb, slips)
+
+    @cached_property
+    def equation(self) -> Callable[[float], Terms | None]:
+        """
+        Return what gives the equation of motion of a linkage with one input, by the input.
+
+        It gives what `terms` gives of the position, to the last bit, in a straight line.
+        """
+        compiled = Compiled(self.closure, 0, self._wanted_terms)
+        fast, position, terms = compiled.fast, self.closure.position, self.terms
+
+        def equation(value: float) -> Terms | None:
+            found = fast(value)
+            if found is None:
+                return terms(position(value))
+            (inertia, half_slope, potential_slope, viscous, coulomb), slips = found
+            return Terms(inertia, half_slope, potential_slope, viscous, coulomb, slips)
+
+        return equation
+
+    def _wanted_terms(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
+        terms = self.terms(motion.position)
+        return [terms[:-1], terms.slips] if terms else []
 
     def potential(self, position: Position) -> float:
         """Return V at a closed position, in [J]; weight is 0 at the height of the origin."""
@@ -304,7 +329,7 @@ def resistance(rubbing: Rubbing, v: list[float]) -> float:
     """
     _, viscous, coulomb, one, other, factor = rubbing
     slip = factor * (v[one] - v[other])
-    dry = copysign(coulomb, slip) if coulomb and not _stands(v, one, other) else 0.0
+    dry = where(_stands(v, one, other), 0.0, copysign(coulomb, slip)) if coulomb else 0.0
     return viscous * slip + dry
 
 

@@ -49,7 +49,6 @@ from typing import NamedTuple
 from linkage_ros.dynamics.instants import last_before, NARROW
 from linkage_ros.dynamics.integrators.method import Step
 from linkage_ros.dynamics.mechanics import Terms
-from linkage_ros.tuples import new
 
 LARGEST = 1e10
 """
@@ -230,7 +229,7 @@ class OneFreedom:
             if not (-LARGEST <= q <= LARGEST and -LARGEST <= w <= LARGEST):
                 return None
             found = terms(q)
-            if found is None or found[0] < _LEAST:
+            if found is None or found.inertia < _LEAST:
                 return None
             return _acceleration(
                 found, w, force, braking, sense, _turned(found, slips) if slips else 0.0
@@ -246,9 +245,9 @@ class OneFreedom:
         if not (-LARGEST <= value <= LARGEST and -LARGEST <= rate <= LARGEST):
             return None
         terms = self._terms(value)
-        if terms is None or terms[0] < _LEAST:
+        if terms is None or terms.inertia < _LEAST:
             return None
-        return new(Motion, (value, rate, terms))
+        return Motion(value, rate, terms)
 
     def _event(
         self, motion: Motion, sense: float, sticks: bool, slips: tuple[float, ...]
@@ -290,11 +289,11 @@ class OneFreedom:
 
     def _bounced(self, motion: Motion) -> Motion:
         value, rate, terms = motion
-        return new(Motion, (value, 0.0 - self._restitution * rate, terms))
+        return Motion(value, 0.0 - self._restitution * rate, terms)
 
 
 def _at_rest(motion: Motion) -> Motion:
-    return new(Motion, (motion.value, 0.0, motion.terms))
+    return Motion(motion.value, 0.0, motion.terms)
 
 
 def _turned(terms: Terms, before: tuple[float, ...]) -> float:

@@ -43,7 +43,6 @@ from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Joint
-from linkage_ros.tuples import new
 import numpy as np
 
 _SOLVED = (Status.CLOSED, Status.LIMITED)
@@ -166,9 +165,9 @@ class Reactions:
             resisting = resistances[number]
             if number in lines:
                 force = complex(-resisting, one) * lines[number].direction(x)
-                reaction = new(Reaction, (force.real, force.imag, other * self._scale))
+                reaction = Reaction(force.real, force.imag, other * self._scale)
             else:
-                reaction = new(Reaction, (one, other, 0.0 - resisting))
+                reaction = Reaction(one, other, 0.0 - resisting)
             reactions += (reaction,)
         return reactions
 

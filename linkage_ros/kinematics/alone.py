@@ -51,7 +51,7 @@ def pose_alone(closure: Closure, number: int, *inputs: float) -> Callable[..., P
 
     def pose(*values: float) -> Pose:
         state = closure.known(*values)
-        found: Pose = ()
+        found: Pose = PLACED
         for close, coordinates, pins in plan:
             # What is left out has its places all the same, which nobody asks for.
             state.coordinates.extend([0.0] * (coordinates - len(state.coordinates)))

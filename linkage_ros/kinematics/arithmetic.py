@@ -32,7 +32,7 @@ def sin(angle: float) -> float:
     try:
         return math.sin(angle)
     except TypeError:
-        return _of(angle, 'sin')
+        return _real(angle, 'sin')
 
 
 def cos(angle: float) -> float:
@@ -40,7 +40,7 @@ def cos(angle: float) -> float:
     try:
         return math.cos(angle)
     except TypeError:
-        return _of(angle, 'cos')
+        return _real(angle, 'cos')
 
 
 def sqrt(square: float) -> float:
@@ -48,7 +48,7 @@ def sqrt(square: float) -> float:
     try:
         return math.sqrt(square)
     except TypeError:
-        return _of(square, 'sqrt')
+        return _real(square, 'sqrt')
 
 
 def atan2(y: float, x: float) -> float:
@@ -56,7 +56,7 @@ def atan2(y: float, x: float) -> float:
     try:
         return math.atan2(y, x)
     except TypeError:
-        return _of(y if hasattr(y, 'apply') else x, 'atan2', y, x)
+        return _real(y if hasattr(y, 'apply') else x, 'atan2', y, x)
 
 
 def copysign(size: float, sign: float) -> float:
@@ -64,7 +64,7 @@ def copysign(size: float, sign: float) -> float:
     try:
         return math.copysign(size, sign)
     except TypeError:
-        return _of(sign, 'copysign', size, sign)
+        return _real(sign, 'copysign', size, sign)
 
 
 def remainder(number: float, period: float) -> float:
@@ -72,7 +72,7 @@ def remainder(number: float, period: float) -> float:
     try:
         return math.remainder(number, period)
     except TypeError:
-        return _of(number, 'remainder', number, period)
+        return _real(number, 'remainder', number, period)
 
 
 def facing(angle: float) -> complex:
@@ -80,7 +80,7 @@ def facing(angle: float) -> complex:
     try:
         return cmath.rect(1.0, angle)
     except TypeError:
-        return _of(angle, 'facing')
+        return _complex(angle, 'facing')
 
 
 def phase(vector: complex) -> float:
@@ -88,7 +88,7 @@ def phase(vector: complex) -> float:
     try:
         return cmath.phase(vector)
     except TypeError:
-        return _of(vector, 'phase')
+        return _real(vector, 'phase')
 
 
 def vector(x: float, y: float) -> complex:
@@ -96,7 +96,7 @@ def vector(x: float, y: float) -> complex:
     try:
         return complex(x, y)
     except TypeError:
-        return _of(x if hasattr(x, 'apply') else y, 'vector', x, y)
+        return _complex(x if hasattr(x, 'apply') else y, 'vector', x, y)
 
 
 def all_finite(numbers: Sequence[float]) -> bool:
@@ -107,7 +107,7 @@ def all_finite(numbers: Sequence[float]) -> bool:
         symbols = [number for number in numbers if hasattr(number, 'apply')]
         if not symbols:
             raise
-        return bool(_of(symbols[0], 'finite', *numbers))
+        return bool(_real(symbols[0], 'finite', *numbers))
 
 
 def where(condition: bool, one: float, other: float) -> float:
@@ -117,9 +117,9 @@ def where(condition: bool, one: float, other: float) -> float:
     Both are worked out, and both must be numbers. It is for two forms of equal standing; a
     condition that decides what becomes of a linkage is an ``if``.
     """
-    if isinstance(condition, bool):
-        return one if condition else other
-    return _of(condition, 'where', condition, one, other)
+    if hasattr(condition, 'apply'):
+        return _real(condition, 'where', condition, one, other)
+    return one if condition else other
 
 
 def called(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -136,8 +136,15 @@ def called(function: Callable[..., Any], *arguments: Any) -> Any:
 
 def is_found(result: Any) -> bool:
     """Return whether a function that was `called` has found something, and not None."""
-    return bool(_of(result, 'found')) if hasattr(result, 'apply') else result is not None
+    return bool(_real(result, 'found')) if hasattr(result, 'apply') else result is not None
 
 
-def _of(symbol: Any, name: str, *arguments: Any) -> Any:
-    return symbol.apply(name, *(arguments or (symbol,)))
+def _real(symbol: Any, name: str, *arguments: Any) -> float:
+    """Return what a symbol writes down; it stands for the number that it will be."""
+    found: float = symbol.apply(name, *(arguments or (symbol,)))
+    return found
+
+
+def _complex(symbol: Any, name: str, *arguments: Any) -> complex:
+    found: complex = symbol.apply(name, *(arguments or (symbol,)))
+    return found

@@ -47,8 +47,9 @@ from linkage_ros.kinematics.step import Pose, State
 from linkage_ros.kinematics.structure import Structure
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch.solve import Batch, Solver
+    from linkage_ros.kinematics.batch import Batch
     from linkage_ros.kinematics.compiled.linkage import Compiled
+    from linkage_ros.kinematics.compiled.solve import Solver
     from linkage_ros.kinematics.follower import Follower
     from numpy.typing import ArrayLike
 
@@ -338,20 +339,13 @@ class Closure:
             Where the arrays do not fit each other, the linkage or ``out``.
 
         """
-        batch = self._solver.solve(inputs, rates, accelerations, derivatives, out)
-        if self.bounds:
-            from linkage_ros.kinematics.batch.limits import (  # local import: needs numpy
-                mark_limited,
-            )
-
-            mark_limited(self.bounds, inputs, batch)
-        return batch
+        return self._solver.solve(inputs, rates, accelerations, derivatives, out)
 
     @cached_property
     def _solver(self) -> Solver:
-        from linkage_ros.kinematics.batch.solve import Solver  # local import: needs numpy
+        from linkage_ros.kinematics.compiled.solve import Solver  # local import: needs numpy
 
-        return Solver(self.steps, self._terms, self._factors or [1.0] * len(self.linkage.inputs))
+        return Solver(self, len(self.linkage.joints))
 
     def points(self, position: Position) -> dict[tuple[str, str], complex]:
         """Return every point of every link, by link and name, in the ground's frame, in [m]."""

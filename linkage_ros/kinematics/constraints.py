@@ -85,7 +85,7 @@ class Constraints:
         ) -> tuple[dict[str, complex], dict[str, float]]:
             known = State([0.0, *inputs], [])
             for step in before:
-                if not step.close(known)[0].has_pose:
+                if not step.close(known).status.has_pose:
                     raise DefinitionError(
                         'pose.inputs',
                         'what comes before the iterated links does not close there',

@@ -26,18 +26,24 @@ slip and Coriolis' acceleration).
 
 from __future__ import annotations
 
-from cmath import rect
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import NamedTuple, TYPE_CHECKING
 
+from linkage_ros.kinematics.arithmetic import facing, vector
 from linkage_ros.kinematics.known_links import KnownLinks
 from linkage_ros.kinematics.linkage import GROUND
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
 
-_Node = tuple[int, int, complex, int]
-"""Where it starts, the coordinate that turns it, its vector, and its slide's coordinate or −1."""
+
+class _Node(NamedTuple):
+    """A point: where its way starts, what turns the way, the way, and its slide or −1."""
+
+    base: int
+    arm: int
+    way: complex
+    slide: int
 
 
 class Follower:
@@ -71,30 +77,30 @@ class Follower:
         self._still = [0j] * len(walk.fixed)
         self._pins = tuple(walk.pins)
         self._nodes = tuple(
-            (walk.number(base), arm, vector * known.scale, slide)
-            for base, arm, vector, slide in walk.nodes
+            _Node(walk.number(base), arm, way * known.scale, slide)
+            for base, arm, way, slide in walk.nodes
         )
         self.indices = tuple(walk.number(place) for place in found)
 
     def places(self, position: Position) -> list[complex]:
         """Return where the points are in the frame of the ground, in [m]."""
-        x, pins = position.state
-        places = self._started(self._fixed, pins)
-        for base, arm, vector, slide in self._nodes:
-            way = rect(1.0, x[arm]) * vector
-            places.append(places[base] + (way if slide < 0 else x[slide] * way))
+        x = position.state.coordinates
+        places = self._started(self._fixed, position.state.pins)
+        for base, arm, way, slide in self._nodes:
+            turned = facing(x[arm]) * way
+            places.append(places[base] + (turned if slide < 0 else x[slide] * turned))
         return places
 
     def velocities(
         self, position: Position, velocity: Velocity, places: list[complex]
     ) -> list[complex]:
         """Return the velocities of the points, in [m/s], given their places."""
-        v, speeds = velocity.state
-        velocities = self._started(self._still, speeds)
-        for base, arm, vector, slide in self._nodes:
+        v = velocity.state.coordinates
+        velocities = self._started(self._still, velocity.state.pins)
+        for base, arm, way, slide in self._nodes:
             moved = 1j * v[arm] * (places[len(velocities)] - places[base])
             if slide >= 0:
-                moved += v[slide] * (rect(1.0, position.state.coordinates[arm]) * vector)
+                moved += v[slide] * (facing(position.state.coordinates[arm]) * way)
             velocities.append(velocities[base] + moved)
         return velocities
 
@@ -107,15 +113,15 @@ class Follower:
     ) -> list[complex]:
         """Return the accelerations of the points, in [m/s²], given their places."""
         v = velocity.state.coordinates
-        a, pulls = acceleration.state
-        accelerations = self._started(self._still, pulls)
-        for base, arm, vector, slide in self._nodes:
+        a = acceleration.state.coordinates
+        accelerations = self._started(self._still, acceleration.state.pins)
+        for base, arm, way, slide in self._nodes:
             turn = v[arm]
             lever = places[len(accelerations)] - places[base]
-            moved = complex(-turn * turn, a[arm]) * lever
+            moved = vector(-turn * turn, a[arm]) * lever
             if slide >= 0:
-                unit = rect(1.0, position.state.coordinates[arm]) * vector
-                moved += complex(a[slide], 2.0 * turn * v[slide]) * unit
+                unit = facing(position.state.coordinates[arm]) * way
+                moved += vector(a[slide], 2.0 * turn * v[slide]) * unit
             accelerations.append(accelerations[base] + moved)
         return accelerations
 

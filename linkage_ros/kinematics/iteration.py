@@ -30,7 +30,7 @@ inputs is followed anew for each state, with the same proof that no other assemb
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import hypot, inf, isnan, nan
 from operator import add, sub
 from typing import Any, NamedTuple
@@ -136,7 +136,7 @@ class Iteration:
         )
         self._branch: Branch | None = None
         self._solution: Array | None = None
-        self._straight: Callable[..., tuple[float, ...]] | None = None
+        self._straight: _StraightSystem | None = None
 
     @property
     def equation_count(self) -> int:
@@ -297,23 +297,18 @@ class Iteration:
 
     def _system(self, known: State, unknowns: Array) -> tuple[Array, Array]:
         """Return what the constraints are off by, and their derivatives by the unknowns."""
-        n = self.equation_count
-        found = np.array(self._listed_system(known, unknowns.tolist()))
-        return found[:n], found[n:].reshape(n, n)
+        errors, jacobian = self._listed_system(known, unknowns.tolist())
+        return np.array(errors), jacobian
 
-    def _listed_system(self, known: State, unknowns: Sequence[float]) -> tuple[float, ...]:
-        """Return both one after the other, the derivatives row by row."""
+    def _listed_system(
+        self, known: State, unknowns: Sequence[float]
+    ) -> tuple[tuple[float, ...], Array]:
         numbers = [*known.coordinates, *known.pins, *unknowns]
         if self._straight is None:
-            count, n = len(known.coordinates), len(unknowns)
-
-            def listed(*values: Any) -> list[float]:
-                state = State(list(values[:count]), list(values[count:-n]))
-                errors, rows = equations(self._constraints, values[-n:], state)
-                return [*errors, *(slope for row in rows for slope in row)]
-
-            self._straight = straight(listed, numbers)
-        return self._straight(*numbers)
+            self._straight = _StraightSystem(
+                self._constraints, numbers, len(known.coordinates), len(unknowns)
+            )
+        return self._straight.at(numbers)
 
     def _known_at(self, inputs: Sequence[float]) -> State | None:
         """Return what is known before this step, at any inputs."""
@@ -383,12 +378,11 @@ class Iteration:
     def _correct(self, known: State, start: Array, farthest: float) -> tuple[Array, Array] | None:
         """Return the solution within a distance of a start, and its Jacobian."""
         # In lists: of so few numbers an array's own overhead is greater than the arithmetic.
-        n, begin = self.equation_count, start.tolist()
+        begin = start.tolist()
         unknowns, last = begin, inf
         size = 1.0 + _greatest(begin)
         for _ in range(30):
-            found = self._listed_system(known, unknowns)
-            errors, jacobian = found[:n], np.array(found[n:]).reshape(n, n)
+            errors, jacobian = self._listed_system(known, unknowns)
             try:
                 step = np.linalg.solve(jacobian, np.negative(errors)).tolist()
             except np.linalg.LinAlgError:
@@ -424,6 +418,49 @@ class Iteration:
         return IteratedPose(
             Status.OPEN, gap if gap > _MOVED else first, unknowns.tolist(), jacobian
         )
+
+
+class _StraightSystem:
+    """
+    The constraints and their derivatives as a straight line.
+
+    Most derivatives are constants, such as 0 and 1: only the others are worked out.
+
+    Parameters
+    ----------
+    constraints
+        The constraints.
+    numbers
+        Coordinates, pins and unknowns, one after the other, for which they can be worked out.
+    coordinates, unknowns
+        How many there are of each.
+
+    """
+
+    def __init__(
+        self,
+        constraints: Sequence[Constraint],
+        numbers: Sequence[complex],
+        coordinates: int,
+        unknowns: int,
+    ) -> None:
+        def listed(*values: Any) -> list[float]:
+            state = State(list(values[:coordinates]), list(values[coordinates:-unknowns]))
+            errors, rows = equations(constraints, values[-unknowns:], state)
+            return [*errors, *(slope for row in rows for slope in row)]
+
+        self._line = straight(listed, numbers)
+        self._count = unknowns
+        self._constants = np.array(self._line.results[unknowns:])
+        self._places = np.array([place - unknowns for place in self._line.places[unknowns:]])
+
+    def at(self, numbers: Sequence[complex]) -> tuple[tuple[float, ...], Array]:
+        """Return what the constraints are off by, each of which varies, and the Jacobian."""
+        n = self._count
+        found = self._line.varying(*numbers)
+        jacobian = self._constants.copy()
+        jacobian[self._places] = found[n:]
+        return found[:n], jacobian.reshape(n, n)
 
 
 def _greatest(values: Sequence[float]) -> float:

@@ -31,7 +31,7 @@ from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch.arrays import Array, Mask
+    from linkage_ros.kinematics.batch import Array, Mask
     from linkage_ros.kinematics.closure import Position
 
 _UNDISTURBED = (Status.CLOSED, Status.CHANGE_POINT)

@@ -35,7 +35,7 @@ from linkage_ros.kinematics.survey import samples, usual_inputs, Way
 from linkage_ros.models.orientation import named_joints
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch.arrays import Array
+    from linkage_ros.kinematics.batch import Array
 
 _SAMPLES = 2880
 _MARGIN = 1e-3

@@ -16,11 +16,11 @@
 
 from __future__ import annotations
 
-from linkage_ros.kinematics.batch.arrays import INDETERMINATE, OPEN
+from linkage_ros.kinematics.batch import CODES
+from linkage_ros.kinematics.status import Status
 from linkage_ros.report.arrays import Numbers, Times
 from linkage_ros.report.run import LinkageRun
 from linkage_ros.report.spans import Lane
-import numpy as np
 
 
 def find_openings(linkage: LinkageRun, times: Times, angles: Numbers, lane: Lane) -> None:
@@ -42,7 +42,7 @@ def find_openings(linkage: LinkageRun, times: Times, angles: Numbers, lane: Lane
     if not len(times):
         return
     status = linkage.closure.solve(*angles.T, derivatives=0).status
-    found = np.isin(status, (OPEN, INDETERMINATE))
+    found = status >= CODES[Status.OPEN]
     for time, given in zip(times[found].tolist(), angles[found].tolist(), strict=True):
         text = ''
         # The text is that of the first of those that are one span.

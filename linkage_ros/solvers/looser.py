@@ -59,7 +59,8 @@ class _Looser(Iteration):
                 pose = IteratedPose(Status.CLOSED, 0.0, unknowns.tolist(), jacobian)
                 if self.conditioning(pose) <= _SINGULAR:
                     break
-                self._place(known, pose.unknowns, start.turned.tolist())
+                angles = (unknowns + start.turned)[0::3].tolist()
+                self._place(known, pose.unknowns, angles)
                 return pose
         return super().close(known)
 

@@ -51,10 +51,9 @@ from linkage_ros.solvers.knots import Knots
 from linkage_ros.solvers.loops import LoopFinder
 from linkage_ros.solvers.newton_dyad import NewtonDyad
 from linkage_ros.solvers.solver import Solver
-from linkage_ros.tuples import new
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch.solve import Batch
+    from linkage_ros.kinematics.batch import Batch
     from numpy.typing import ArrayLike
 
 PLACING = (FixedPoint, PointOnLink, PointOnRail)
@@ -148,7 +147,7 @@ class NewtonClosure(Solver):
                 ]
         signs = iter(knot.signs)
         pins: list[complex] = []
-        state = new(State, (x, pins))
+        state = State(x, pins)
         poses = _Found() if self._iterates else _NO_POSES
         for part in self._plan:
             if isinstance(part, NewtonDyad):
@@ -157,7 +156,7 @@ class NewtonClosure(Solver):
                     return self._exact(inputs)
                 continue
             pose = part.close(state)
-            if pose[0] is not _CLOSED:
+            if pose.status is not _CLOSED:
                 return self._exact(inputs)
             if self._iterates:
                 poses.append(pose)
@@ -166,7 +165,7 @@ class NewtonClosure(Solver):
         joints: tuple[float, ...] = ()
         for i, j, factor, constant in self._terms:
             joints += (factor * (x[i] - x[j]) + constant,)
-        return new(Position, (_CLOSED, 0.0, joints, state, poses))
+        return Position(_CLOSED, 0.0, joints, state, poses)
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
         """
@@ -187,15 +186,15 @@ class NewtonClosure(Solver):
         if v is None:
             return self.closed.velocity(position, *rates)
         x, pins = state
-        speeds = new(State, (v, []))
+        speeds = State(v, [])
         others = iter(poses)
         found = []
         for part in self._plan:
             if isinstance(part, NewtonDyad):
-                part.rates(x, pins, v, speeds[1])
+                part.rates(x, pins, v, speeds.pins)
             else:
                 found.append(part.rates(next(others, PLACED), state, speeds))
-        return new(Velocity, (self._joints(v), speeds, found))
+        return Velocity(self._joints(v), speeds, found)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -218,15 +217,15 @@ class NewtonClosure(Solver):
         if a is None:
             return self.closed.acceleration(position, velocity, *accelerations)
         _, speeds, rates = velocity
-        changes = new(State, (a, []))
+        changes = State(a, [])
         others, moving = iter(poses), iter(rates)
         for part in self._plan:
             if isinstance(part, NewtonDyad):
-                part.accelerations(state[0], speeds[0], a, changes[1])
+                part.accelerations(state.coordinates, speeds.coordinates, a, changes.pins)
             else:
                 pose, rate = next(others, PLACED), next(moving)
                 part.accelerations(pose, rate, state, speeds, changes)
-        return new(Acceleration, (self._joints(a), changes))
+        return Acceleration(self._joints(a), changes)
 
     def solve(
         self,

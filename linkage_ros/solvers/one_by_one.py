@@ -20,11 +20,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from linkage_ros.kinematics.batch.arrays import CLOSED, LIMITED
-from linkage_ros.kinematics.batch.solve import Batch
+from linkage_ros.kinematics.batch import Batch, CODES
+from linkage_ros.kinematics.status import Status
 from linkage_ros.solvers.solver import Solver
 import numpy as np
 from numpy.typing import ArrayLike
+
+_SOLVED = CODES[Status.CLOSED], CODES[Status.LIMITED]
 
 
 def solve_one_by_one(
@@ -42,7 +44,7 @@ def solve_one_by_one(
     count, driven = len(batch.status), len(inputs)
     given = [np.broadcast_to(np.asarray(value, np.float64), count).tolist() for value in inputs]
     moving = [_rows(rates, 1.0, driven, count), _rows(accelerations, 0.0, driven, count)]
-    for k in np.flatnonzero((batch.status == CLOSED) | (batch.status == LIMITED)).tolist():
+    for k in np.flatnonzero(np.isin(batch.status, _SOLVED)).tolist():
         position = solver.position(*(values[k] for values in given))
         batch.positions[:, k] = position.joints
         if batch.velocities is not None:

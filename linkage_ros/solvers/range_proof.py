@@ -27,7 +27,8 @@ from collections.abc import Mapping, Sequence
 from math import pi, sqrt
 from typing import Any, NamedTuple, NoReturn
 
-from linkage_ros.kinematics.batch.solve import Solver as Arrays
+from linkage_ros.kinematics.compiled.solve import Solver
+from linkage_ros.kinematics.compiled.trace import Motion
 from linkage_ros.solvers.cells import Array, Cells, enclose, Enclosure, Mask
 from linkage_ros.solvers.discs import Disc, Jet, times, total
 from linkage_ros.solvers.loops import Turns
@@ -99,6 +100,7 @@ class RangeProof:
 
     def __init__(self, task: Task, low: float, high: float) -> None:
         self._task = task
+        self._closed_form = _ClosedForm(task)
         self._ends = low, high
         self._unit = task.closed.scale if task.closed.linkage.inputs[0].slider else 1.0
         self._span = (high - low) / self._unit
@@ -221,7 +223,7 @@ class RangeProof:
     def _enclosed(self, low: Array, high: Array, order: int) -> Enclosure:
         """Enclose cells, given in [rad] or [m]."""
         middle = 0.5 * (low + high)
-        coordinates, pins = _states(self._task, middle)
+        coordinates, pins = self._closed_form.at(middle)
         # Wide enough to hold its ends, whatever was rounded.
         half = 0.5 * (high - low) / self._unit + _ROUNDING * np.abs(middle / self._unit)
         cells = Cells(middle / self._unit, half, coordinates, pins)
@@ -267,24 +269,28 @@ def _largest(values: Sequence[Any], count: int) -> Array:
     return found
 
 
-def _states(task: Task, x: Array) -> tuple[Array, NDArray[np.complex128]]:
-    """Return coordinates and pins of the closed form at values of the input."""
-    closed = task.closed
-    numbers = [k for group in task.groups for k in group.coordinates]
-    coordinates = np.zeros((max(numbers) + 1, len(x)))
-    pin_numbers = [k for group in task.groups for k in group.pins]
-    pins = np.zeros((max(pin_numbers, default=-1) + 1, len(x)), np.complex128)
-    if not pin_numbers:
-        terms = [(k, 0, 1.0, 0.0) for k in numbers]
-        factors = [1.0 / closed.scale if closed.linkage.inputs[0].slider else 1.0]
-        found = Arrays(closed.steps, terms, factors).solve([x], None, None, 0, None)
-        coordinates[numbers] = found.positions
+class _ClosedForm:
+    """Coordinates and pins of the closed form, at many values of the input."""
+
+    def __init__(self, task: Task) -> None:
+        self._numbers = [k for group in task.groups for k in group.coordinates]
+        self._pins = [k for group in task.groups for k in group.pins]
+        width = len(self._numbers) + 2 * len(self._pins)
+        self._solver = Solver(task.closed, width, self._wanted)
+
+    def at(self, x: Array) -> tuple[Array, NDArray[np.complex128]]:
+        """Return them, each in its row, at values in [rad] or [m]."""
+        found = self._solver.solve([x], derivatives=0).positions
+        coordinates = np.zeros((max(self._numbers) + 1, len(x)))
+        coordinates[self._numbers] = found[: len(self._numbers)]
+        pins = np.zeros((max(self._pins, default=-1) + 1, len(x)), np.complex128)
+        parts = found[len(self._numbers) :]
+        pins[self._pins] = parts[0::2] + 1j * parts[1::2]
         return coordinates, pins
-    for column, value in enumerate(x.tolist()):
-        position = closed.position(value)
-        if position.joints:
-            coordinates[numbers, column] = [position.state.coordinates[k] for k in numbers]
-            pins[pin_numbers, column] = [position.state.pins[k] for k in pin_numbers]
-        else:
-            coordinates[:, column] = np.nan
-    return coordinates, pins
+
+    def _wanted(self, motion: Motion) -> list[list[float]]:
+        if not motion.position.joints:
+            return [[]]
+        x, pins = motion.position.state
+        places = [part for k in self._pins for part in (pins[k].real, pins[k].imag)]
+        return [[*(x[k] for k in self._numbers), *places]]

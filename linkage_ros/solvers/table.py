@@ -48,11 +48,10 @@ from linkage_ros.kinematics.step import State
 from linkage_ros.kinematics.survey import Way
 from linkage_ros.parameters import number, point
 from linkage_ros.solvers.solver import Solver
-from linkage_ros.tuples import new
 import numpy as np
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch.solve import Batch
+    from linkage_ros.kinematics.batch import Batch
     from numpy.typing import ArrayLike, NDArray
 
 Order = Literal['linear', 'hermite']
@@ -89,6 +88,14 @@ PARAMETERS = TableParameters
 def build(parameters: TableParameters, linkage: Linkage) -> TableClosure:
     """Build the closure."""
     return TableClosure(linkage, parameters.tolerance, span=parameters.span or None)
+
+
+class _Place(NamedTuple):
+    """Where a position lies in a table: its cell's coefficients, what part of it, cells by x."""
+
+    coefficients: tuple[float, ...]
+    part: float
+    density: float
 
 
 class _Part(NamedTuple):
@@ -219,8 +226,8 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (c[i] + t * c[i + 1],)
         given = x if self._factors is None else x * self._factors[0]
-        state = new(State, ([0.0, given], self._no_pins))
-        return new(Position, (_CLOSED, 0.0, joints, state, [c, t, density]))
+        state = State([0.0, given], self._no_pins)
+        return Position(_CLOSED, 0.0, joints, state, cast('Any', _Place(c, t, density)))
 
     def residual(self, position: Position) -> float:
         """
@@ -256,10 +263,9 @@ class TableClosure(Solver):
             Of the driven joint, in [rad/s] or [m/s].
 
         """
-        _, _, _, state, poses = position
-        if state[1] is not self._no_pins:
+        if position.state.pins is not self._no_pins:
             return self.closed.velocity(position, *rates)
-        c, t, density = cast('list[Any]', poses)
+        c, t, density = cast('_Place', position.poses)
         (rate,) = rates
         factor = rate * density
         joints: tuple[float, ...] = ()
@@ -270,7 +276,7 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (factor * c[i + 1],)
         given = rate if self._factors is None else rate * self._factors[0]
-        return new(Velocity, (joints, new(State, ([0.0, given], self._no_pins)), [factor]))
+        return Velocity(joints, State([0.0, given], self._no_pins), [factor])
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -286,11 +292,10 @@ class TableClosure(Solver):
             Of the driven joint, in [rad/s²] or [m/s²].
 
         """
-        _, _, _, state, poses = position
-        if state[1] is not self._no_pins:
+        if position.state.pins is not self._no_pins:
             return self.closed.acceleration(position, velocity, *accelerations)
-        c, t, density = cast('list[Any]', poses)
-        (factor,), (change,) = velocity[2], accelerations
+        c, t, density = cast('_Place', position.poses)
+        (factor,), (change,) = velocity.rates, accelerations
         square, pull = factor * factor, change * density
         joints: tuple[float, ...] = ()
         if self._degree == 3:
@@ -301,7 +306,7 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (pull * c[i + 1],)
         given = change if self._factors is None else change * self._factors[0]
-        return new(Acceleration, (joints, new(State, ([0.0, given], self._no_pins))))
+        return Acceleration(joints, State([0.0, given], self._no_pins))
 
     def solve(
         self,

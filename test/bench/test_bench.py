@@ -30,6 +30,7 @@ from bench.spread import percentile, ratios, spread
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+LINKAGES = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
 
 
 def test_percentiles_lie_between_neighbours():
@@ -121,6 +122,17 @@ def test_the_empty_scene_is_measured_against_its_bare_closure(tmp_path):
     cells = _row(kept, 'µs a tick: empty scene / bare closure and packing')
     assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))
     assert cells[4] == '≤ 1.05'
+
+
+@pytest.mark.timeout(90)
+def test_compiled_linkages_are_measured_beside_their_plain_steps_and_by_their_dyads(tmp_path):
+    kept = _bench(tmp_path, '--only', 'compiled')
+    for linkage in LINKAGES:
+        cells = _row(kept, linkage.stem)
+        assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))
+        assert re.match('≤ 0', cells[4])
+    for dyads in (1, 2, 4, 8, 16, 32):
+        assert all(value > 0.0 for value in _numbers(_row(kept, str(dyads))[1:3]))
 
 
 @pytest.mark.timeout(90)

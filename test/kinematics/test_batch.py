@@ -21,24 +21,24 @@ The accelerations' reference differentiates the closing equation twice, in 70 di
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf, nan, pi, remainder
 from typing import Any
 import warnings
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.kinematics.batch import arrays
-from linkage_ros.kinematics.batch.arrays import ArrayStep, Block, CODES
-from linkage_ros.kinematics.batch.crank_rrr import ROWS
-from linkage_ros.kinematics.batch.steps import over_arrays
-from linkage_ros.kinematics.dyads.rrr import crank_diagonal, RRRDyad
+from linkage_ros.kinematics.batch import CODES
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiled import array_form
+from linkage_ros.kinematics.linkage import Pose, RevoluteJoint
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.step import State
 from mpmath import mp, mpc, mpf
 import numpy as np
 from numpy.typing import NDArray
 import pytest
 
+from .linkages import four_bar_linkage
 from .on_crank import FourBar
 from .reference import four_bar, Quantity, turned
 from .samples import FOUR_BARS, four_bars, FourBarCase
@@ -81,22 +81,16 @@ side = st.sampled_from((1, -1))
 Array = NDArray[np.float64]
 
 
-def four_bars_of(a: float, b: float, c: float, d: float, sign: int) -> ArrayStep:
-    return over_arrays(RRRDyad(crank_diagonal(a, b, c, d), b, c, sign))
+def four_bars_of(a: float, b: float, c: float, d: float, sign: int, phi: float = 1.0) -> Closure:
+    """Return a four-bar that publishes the directions of coupler and rocker."""
+    linkage = four_bar_linkage((a, b, c, d), 'left' if sign > 0 else 'right')
+    joints = {name: RevoluteJoint('ground', name) for name in ('coupler', 'rocker')}
+    return Closure(replace(linkage, joints=joints, pose=Pose((phi,), {})))
 
 
-def solved(dyad: ArrayStep, phi: Any, rate: Any = 1.0, acceleration: Any = 0.0) -> list[Any]:
-    """Return status, positions, velocities and accelerations, as far as there are any."""
-    phi = np.asarray(phi, np.float64)
-    status = np.full(phi.size, CLOSED, np.uint8)
-    states = [State([0.0, values], []) for values in (phi, rate, acceleration)]
-    with np.errstate(all='ignore'):
-        dyad.solve(Block(*states, status, np.empty((ROWS, phi.size))))  # type: ignore[arg-type]
-    found = [np.array(state.coordinates[2:]) for state in states]
-    found[0][:, status > TOGGLED] = nan
-    for motion in found[1:]:
-        motion[:, status >= TOGGLED] = nan
-    return [status, *found]
+def solved(closure: Closure, phi: Any, rate: Any = 1.0, acceleration: Any = 0.0) -> list[Any]:
+    """Return status, positions, velocities and accelerations."""
+    return [*closure.solve(phi, rates=rate, accelerations=acceleration)]
 
 
 def accelerations(case: FourBarCase) -> list[Quantity]:
@@ -140,8 +134,8 @@ def _accelerations(x: list[mpf], side_of_b: int) -> tuple[mpf, mpf]:
 
 @pytest.fixture(params=['tangent', 'sine and cosine'])
 def half_angle(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    by_tangent = request.param == 'tangent' and arrays._BY_TANGENT
-    monkeypatch.setattr(arrays, '_BY_TANGENT', by_tangent)
+    by_tangent = request.param == 'tangent' and array_form._BY_TANGENT
+    monkeypatch.setattr(array_form, '_BY_TANGENT', by_tangent)
 
 
 @pytest.mark.usefixtures('half_angle')
@@ -152,7 +146,8 @@ def test_all_is_right_in_every_family(family: str) -> None:
     for case in four_bars(family, COUNT):
         *lengths, phi, sign = case
         truth = four_bar(*case)
-        (code,), position, velocity, acceleration = solved(four_bars_of(*lengths, sign), [phi])
+        closure = four_bars_of(*lengths, sign, phi)
+        (code,), position, velocity, acceleration = solved(closure, [phi])
         gap = float(max(truth.gap, 0))
         worst.note_status(STATUSES[code], gap, gap, sum(lengths), case)
         assert np.isnan(position).all() == (code == OPEN), case

@@ -24,7 +24,7 @@ import random
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.batch.arrays import CODES
+from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits
 from linkage_ros.kinematics.status import Status

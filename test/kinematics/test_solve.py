@@ -18,19 +18,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 from math import inf, nan, pi, tau
+from pkgutil import iter_modules
 import re
 import tracemalloc
+from types import ModuleType
 from typing import Any
 import warnings
 
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.batch.arrays import BLOCK, CODES
-from linkage_ros.kinematics.batch.solve import Batch
-from linkage_ros.kinematics.batch.steps import _KINDS, _PARTS
+from linkage_ros.kinematics import (
+    crank_diagonal,
+    dyads,
+    free_diagonal,
+    iteration,
+    places,
+    rail,
+)
+from linkage_ros.kinematics.batch import Batch, CODES
 from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.compiled.solve import BLOCK
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -318,9 +328,25 @@ def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name: str) -
 
 def test_every_kind_of_step_is_tested() -> None:
     steps = [step for name in (*KINDS, *OTHERS) for step in case_of(name)[0].steps]
-    assert {type(step) for step in steps} == set(_KINDS)
+    kinds = [
+        import_module(f'{dyads.__name__}.{name}') for _, name, _ in iter_modules(dyads.__path__)
+    ]
+    assert {type(step) for step in steps} == classes_with('close', places, iteration, *kinds)
     parts = [getattr(step, name, None) for step in steps for name in ('diagonal', 'rail')]
-    assert {type(part) for part in parts if part is not None} == set(_PARTS)
+    wanted = classes_with('at', crank_diagonal, free_diagonal, rail)
+    assert {type(part) for part in parts if part is not None} == wanted
+
+
+def classes_with(method: str, *modules: ModuleType) -> set[type[Any]]:
+    return {
+        one
+        for module in modules
+        for one in vars(module).values()
+        if isinstance(one, type)
+        and one.__module__ == module.__name__
+        and hasattr(one, method)
+        and not getattr(one, '_is_protocol', False)
+    }
 
 
 length = st.floats(0.05, 5.0)

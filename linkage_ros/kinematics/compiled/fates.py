@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.kinematics.compiled.tape import Operation, Symbol
 from linkage_ros.kinematics.compiled.trace import Path
@@ -70,7 +70,8 @@ def _fate(closure: Closure, path: Path, decided: Sequence[bool]) -> Fate:
     tape = path.tape
     tape.begin()
     inputs = path.inputs[: len(closure.linkage.inputs)]
-    known = closure.known(*(Symbol(tape, given) for given in inputs))
+    symbols: list[Any] = [Symbol(tape, given) for given in inputs]
+    known = closure.known(*symbols)
     # The inputs are finite: what is decided begins with the first step.
     tape.begin(decided)
     fate: Fate = None

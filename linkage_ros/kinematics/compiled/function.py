@@ -18,18 +18,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.compiled.python import python_function
-from linkage_ros.kinematics.compiled.tape import Symbol, Tape
-from linkage_ros.kinematics.compiled.trace import Path
+from linkage_ros.kinematics.compiled.tape import Operation, Tape
+from linkage_ros.kinematics.compiled.trace import number_of, Path
 
 
-def straight(
-    function: Callable[..., Sequence[float]], values: Sequence[complex]
-) -> Callable[..., tuple[float, ...]]:
+class Line(NamedTuple):
     """
-    Return a function that does to the last bit what another does.
+    A function as a straight line.
+
+    Attributes
+    ----------
+    varying
+        Takes the arguments and returns those results that depend on them.
+    places
+        The numbers of these among all results.
+    results
+        All results, with 0 in the place of those that vary.
+
+    """
+
+    varying: Callable[..., tuple[float, ...]]
+    places: tuple[int, ...]
+    results: tuple[float, ...]
+
+
+def straight(function: Callable[..., Sequence[float]], values: Sequence[complex]) -> Line:
+    """
+    Return a function as a straight line, which has the same bits.
 
     Parameters
     ----------
@@ -41,15 +59,16 @@ def straight(
     """
     tape = Tape()
     given = [tape.given(f'x{i}', value) for i, value in enumerate(values)]
-    found = function(*given)
+    found = [number_of(number) for number in function(*given)]
     if tape.decisions:
         raise ValueError('the function decides by its arguments, and has no straight line')
-    outputs = tuple(n.operation if isinstance(n, Symbol) else n for n in found)
-    path = Path(tuple(one.operation for one in given), (), (outputs,), tape)
-    line = python_function(path)
+    places = tuple(i for i, number in enumerate(found) if isinstance(number, Operation))
+    inputs = tuple(one.operation for one in given)
+    line = python_function(Path(inputs, (), (tuple(found[i] for i in places),), tape))
 
-    def numbers(*arguments: Any) -> tuple[float, ...]:
+    def varying(*arguments: Any) -> tuple[float, ...]:
         (group,) = line(*arguments) or ((),)
         return group
 
-    return numbers
+    constants = tuple(0.0 if isinstance(number, Operation) else number for number in found)
+    return Line(varying, places, constants)

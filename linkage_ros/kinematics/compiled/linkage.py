@@ -24,6 +24,7 @@ from typing import NamedTuple, TYPE_CHECKING
 from linkage_ros.kinematics.compiled.python import Body, python_body, python_function, Values
 from linkage_ros.kinematics.compiled.trace import joints, moved, Path, traced, Wanted
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.survey import usual_inputs
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure
@@ -72,6 +73,8 @@ class Compiled:
         What it is asked for: positions (0), velocities too (1), and accelerations (2).
     wanted
         Which numbers of these; all published joints if not given.
+    within_limits
+        Whether a state with a joint beyond its limits is limited.
 
     Attributes
     ----------
@@ -88,24 +91,41 @@ class Compiled:
 
     """
 
-    def __init__(self, closure: Closure, derivatives: int = 0, wanted: Wanted = joints) -> None:
+    def __init__(
+        self,
+        closure: Closure,
+        derivatives: int = 0,
+        wanted: Wanted = joints,
+        within_limits: bool = True,
+    ) -> None:
         self._closure = closure
+        self._within_limits = within_limits
         self.driven = len(closure.linkage.inputs)
         self.derivatives = derivatives
         self._wanted = wanted
         self.paths: list[Path] = []
+        self._functions: list[Callable[..., Values | None]] = []
         self._bodies: dict[str, Body] = {}
-        functions: list[Callable[..., Values | None]] = []
-        more = (1.25,) * self.driven * derivatives
         for inputs in _states(closure):
-            if any(function(*inputs, *more) is not None for function in functions):
-                continue
-            if closure.position(*inputs).status is Status.CLOSED:
-                self.paths.append(traced(closure, inputs, derivatives, wanted))
-                functions.append(python_function(self.paths[-1]))
-                if len(functions) == _MOST_PATHS:
-                    break
-        self.fast: Callable[..., Values | None] = _first_of(functions)
+            self._follow(inputs)
+        if not self.paths and (self.driven > 1 or closure.input_ranges):
+            # A search of its own, which takes longer.
+            self._follow(usual_inputs(closure))
+        self.fast: Callable[..., Values | None] = _first_of(self._functions)
+
+    def _follow(self, inputs: tuple[float, ...]) -> None:
+        """Add the path that the steps take at a state, if it is closed and they take a new one."""
+        more = (1.25,) * self.driven * self.derivatives
+        if len(self.paths) == _MOST_PATHS or any(
+            function(*inputs, *more) is not None for function in self._functions
+        ):
+            return
+        close = self._closure.position if self._within_limits else self._closure.posed
+        if close(*inputs).status is Status.CLOSED:
+            self.paths.append(
+                traced(self._closure, inputs, self.derivatives, self._wanted, self._within_limits)
+            )
+            self._functions.append(python_function(self.paths[-1]))
 
     def body(self, leave: str) -> Body:
         """
@@ -145,9 +165,16 @@ class Compiled:
         """Return the answer of the plain steps."""
         n = self.driven
         given = [numbers[i * n : (i + 1) * n] for i in range(1 + self.derivatives)]
-        motion = moved(self._closure, given)
+        motion = moved(self._closure, given, self._within_limits)
         status, gap = motion.position.status, motion.position.gap
-        return Answer(status, gap, tuple(tuple(group) for group in self._wanted(motion)))
+        found = tuple(tuple(group) for group in self._wanted(motion))
+        groups = len(self.paths[0].outputs) if self.paths else 1 + self.derivatives
+        return Answer(status, gap, (*found, *((),) * (groups - len(found))))
+
+
+def iterated(closure: Closure) -> bool:
+    """Return whether a linkage has links that only iteration solves."""
+    return any(hasattr(step, 'branch') for step in closure.steps)
 
 
 def _first_of(
@@ -172,8 +199,7 @@ def _states(closure: Closure) -> Iterator[tuple[float, ...]]:
     linkage = closure.linkage
     if linkage.pose is not None:
         yield linkage.pose.inputs
-    iterated = any(hasattr(step, 'branch') for step in closure.steps)
-    count = _TRIED_ITERATED if iterated else _TRIED
+    count = _TRIED_ITERATED if iterated(closure) else _TRIED
     each = max(2, round(count ** (1.0 / len(linkage.inputs))))
     ways = []
     for given in linkage.inputs:

@@ -21,6 +21,7 @@ are the same, but for the sign of a zero.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError
@@ -190,7 +191,7 @@ def _negative(_: Tape, one: _Parts) -> _Parts:
     return _Parts(-one.x, -one.y)
 
 
-_FORMULAS = {
+_FORMULAS: dict[str, Callable[..., Any]] = {
     '+': _add,
     '-': _subtract,
     '*': _multiply,

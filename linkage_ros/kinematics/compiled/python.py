@@ -117,6 +117,8 @@ def python_body(path: Path, leave: str) -> Body:
             return f'({parts[0]}) ** {parts[1]}'
         if operation.name == 'item':
             return f'{_atom(parts[0])}[{parts[1]}]'
+        if operation.name == 'finite':
+            return '(' + ' and '.join(f'{_atom(p)} - {_atom(p)} == 0.0' for p in parts) + ')'
         if operation.name == 'found':
             return f'({parts[0]} is not None)'
         if operation.name == 'call':
@@ -132,12 +134,12 @@ def python_body(path: Path, leave: str) -> Body:
     )
     for given in path.inputs:
         writer.name(given, given.name)
-    if any(condition.name == 'finite' for condition in conditions):
+    if any(map(_of_inputs, conditions)):
         # 0 of finite numbers, and NaN of all others; where the sum is too great, it is in doubt.
         total = ' + '.join(given.name for given in path.inputs)
         writer.lines += [f'total = {total}', 'if total - total != 0.0:', f'    {leave}']
     for condition, held in path.decisions:
-        if condition.name != 'finite':
+        if not _of_inputs(condition):
             text = writer.write(condition)
             writer.lines += [f'if not ({text}):' if held else f'if {text}:', f'    {leave}']
     groups = [[writer.write(number) for number in group] for group in path.outputs]
@@ -149,6 +151,11 @@ def python_function(path: Path) -> Callable[..., Values | None]:
     source, bound = python_source(path)
     solve: Callable[..., Values | None] = written(source, 'solve', bound)
     return solve
+
+
+def _of_inputs(condition: Operation) -> bool:
+    """Return whether a condition is that inputs are finite numbers."""
+    return condition.name == 'finite' and all(one.is_input for one in condition.operands())
 
 
 def _atom(text: str) -> str:

@@ -90,6 +90,7 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
     'copysign': math.copysign,
     'hypot': math.hypot,
     'remainder': math.remainder,
+    'round': round,
     'facing': lambda angle: cmath.rect(1.0, angle),
     'phase': cmath.phase,
     'vector': complex,
@@ -109,22 +110,9 @@ _VALUES: Final[dict[str, Callable[..., Any]]] = {
 }
 
 _TRUTHS = frozenset(('<', '<=', '>', '>=', '==', '!=', 'finite', 'found'))
-_REALS = frozenset(
-    (
-        'abs',
-        'sin',
-        'cos',
-        'sqrt',
-        'atan2',
-        'copysign',
-        'hypot',
-        'remainder',
-        'phase',
-        'real',
-        'imag',
-    )  # fmt: skip
-)
 _COMPLEX = frozenset(('facing', 'vector', 'conjugate'))
+_OF_EITHER = frozenset(('+', '-', '*', '/', '**', 'negative', 'where'))
+_REALS = frozenset(_VALUES) - _TRUTHS - _COMPLEX - _OF_EITHER
 
 
 class Tape:
@@ -248,6 +236,9 @@ class Symbol:
     def __abs__(self) -> Any:
         return self.tape.write('abs', self)
 
+    def __round__(self) -> Any:
+        return self.tape.write('round', self)
+
     def __lt__(self, other: Any) -> Any:
         return self.tape.write('<', self, other)
 
@@ -353,8 +344,6 @@ def _kind(name: str, given: tuple[Any, ...]) -> Kind:
         return 'real'
     if name in _COMPLEX:
         return 'complex'
-    if name == 'item':
-        return 'real'
     numbers = given[1:] if name == 'where' else given
     if any(isinstance(a, complex) or getattr(a, 'kind', '') == 'complex' for a in numbers):
         return 'complex'

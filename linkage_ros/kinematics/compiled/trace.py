@@ -110,10 +110,7 @@ def traced(
     return Path(
         tuple(symbol.operation for group in given for symbol in group),
         tuple(tape.decisions),
-        tuple(
-            tuple(n.operation if isinstance(n, Symbol) else n for n in group)
-            for group in wanted(motion)
-        ),
+        tuple(tuple(number_of(n) for n in group) for group in wanted(motion)),
         tape,
     )
 
@@ -128,3 +125,8 @@ def moved(closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool 
         if len(more) > 1:
             acceleration = closure.acceleration(position, velocity, *more[1])
     return Motion(position, velocity, acceleration)
+
+
+def number_of(found: Any) -> Number:
+    """Return the operation of a symbol, or the constant that a number is."""
+    return found.operation if isinstance(found, Symbol) else found

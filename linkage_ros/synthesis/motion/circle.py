@@ -33,7 +33,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeAlias
 
-from linkage_ros.kinematics.batch.arrays import Array, Complex
+from linkage_ros.kinematics.batch import Array, Complex
 from linkage_ros.synthesis.double_double import minus, over, plus, times, Twofold
 import numpy as np
 

@@ -28,7 +28,7 @@ from itertools import combinations
 from math import degrees
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.batch.arrays import Complex
+from linkage_ros.kinematics.batch import Complex
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
 from linkage_ros.synthesis.motion.pivots import fixed_pivots, Links, moving_pivots, TRUSTED

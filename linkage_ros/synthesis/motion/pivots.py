@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.batch.arrays import Array, Complex
+from linkage_ros.kinematics.batch import Array, Complex
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.synthesis.double_double import minus, plus, sine_cosine, times, Twofold
 from linkage_ros.synthesis.motion.circle import circle, sensitivity

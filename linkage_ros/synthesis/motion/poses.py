@@ -23,7 +23,7 @@ from math import degrees, isfinite, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.batch.arrays import Array, Complex
+from linkage_ros.kinematics.batch import Array, Complex
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 import numpy as np
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from linkage_ros.kinematics.batch.arrays import Array, Complex
+from linkage_ros.kinematics.batch import Array, Complex
 import numpy as np
 from numpy.typing import NDArray
 

@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from linkage_ros.kinematics.batch.arrays import Array, Complex
+from linkage_ros.kinematics.batch import Array, Complex
 import numpy as np
 
 

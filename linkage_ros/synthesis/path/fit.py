@@ -25,7 +25,7 @@ counts as a distance.
 
 from __future__ import annotations
 
-from linkage_ros.kinematics.batch.arrays import Array, Mask
+from linkage_ros.kinematics.batch import Array, Mask
 from linkage_ros.synthesis.path.aim import Aim, Fitted
 from linkage_ros.synthesis.path.model import closes, folds, Slopes, slopes
 from linkage_ros.synthesis.path.steps import step

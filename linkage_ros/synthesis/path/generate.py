@@ -37,7 +37,7 @@ from math import remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.batch.arrays import Array
+from linkage_ros.kinematics.batch import Array
 from linkage_ros.synthesis.course import least_transmission
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
 from linkage_ros.synthesis.path.aim import Aim, Fitted

@@ -34,7 +34,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from linkage_ros.kinematics.batch.arrays import Array, Complex, Mask
+from linkage_ros.kinematics.batch import Array, Complex, Mask
 import numpy as np
 
 COLUMNS = ('x', 'y', 'phi', 'ln_a', 'ln_b', 'ln_c', 'ln_d', 'w_x', 'w_y')

@@ -35,7 +35,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from linkage_ros.kinematics.batch.arrays import Array, Complex
+from linkage_ros.kinematics.batch import Array, Complex
 from linkage_ros.synthesis.path.aim import Aim, Fitted
 from linkage_ros.synthesis.path.arcs import along, fractions, resampled, theta_at
 from linkage_ros.synthesis.path.model import coupler_directions, diagonals

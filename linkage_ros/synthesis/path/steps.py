@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from linkage_ros.kinematics.batch.arrays import Array, Complex
+from linkage_ros.kinematics.batch import Array, Complex
 from linkage_ros.synthesis.path.aim import Aim, Fitted
 from linkage_ros.synthesis.path.model import COLUMNS, folds, LENGTHS, POINT, Slopes, slopes
 import numpy as np

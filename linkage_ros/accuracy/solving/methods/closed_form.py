@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The closed form, as the node has it."""
+"""The closed form, compiled, as the node has it."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from linkage_ros.accuracy.solving.methods.method import (
     RATE,
 )
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Iterated
@@ -44,7 +45,26 @@ def closed_form(linkage: Linkage) -> Method:
     """Return it; links that no dyad covers are iterated, as the node does."""
     closure = Closure(linkage)
     iterated = any(isinstance(group, Iterated) for group in closure.structure.groups)
-    return closure_method(closure, ITERATED if iterated else NAME)
+    poses, motions = Compiled(closure, 0), Compiled(closure, 2)
+    fast, fast_motion = poses.fast, motions.fast
+    more = (*[RATE] * len(linkage.inputs), *[ACCELERATION] * len(linkage.inputs))
+
+    def position(*inputs: float) -> Joints:
+        (joints,) = fast(*inputs) or poses.plain(*inputs).values
+        return joints
+
+    def motion(*inputs: float) -> Motion:
+        values = fast_motion(*inputs, *more)
+        if values is None:
+            answer = motions.plain(*inputs, *more)
+            if answer.status is not _CLOSED:
+                return NOTHING
+            values = answer.values
+        joints, rates, accelerations = values
+        return joints, rates, accelerations
+
+    of_closure = closure_method(closure, ITERATED if iterated else NAME)
+    return of_closure._replace(position=position, motion=motion)
 
 
 def closure_method(
