@@ -73,14 +73,15 @@ $(STAMP): setup.py requirements/dev.txt
 demo: $(STAMP)
 	@$(BIN)/linkage demo $(if $(filter command,$(origin SECONDS)),--seconds $(SECONDS))
 
-# The tests run even when lint finds something, so that one run tells all. Those that start nodes
-# have the processors, and the graph, to themselves.
+# The tests run even when lint finds something, so that one run tells all. Each test that starts
+# nodes has a graph to itself; those that measure nodes have the processors, too.
 test: $(STAMP)
 	@status=0; \
 	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory lint || status=$$?; \
 	$(BIN)/python -m pytest -m 'not ros' --numprocesses auto --dist loadfile || status=$$?; \
-	$(BIN)/python -m pytest -m ros || status=$$?; \
+	$(BIN)/python -m pytest -m 'ros and not alone' --numprocesses 2 --dist loadfile || status=$$?; \
+	$(BIN)/python -m pytest -m alone || status=$$?; \
 	exit $$status
 
 bench: $(STAMP)

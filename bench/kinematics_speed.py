@@ -17,21 +17,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import tau
-from pathlib import Path
 
 from bench.in_turn import compare, in_turn
-from bench.kinematics_compiled import Array, compiled, compiler
 from bench.kinematics_pylinkage import AVAILABLE, HAS_NUMBA, stepping
 from bench.kinematics_straight import straight_line
 from bench.processes import BenchError, ROOT
 from bench.report import say, Table
 from linkage_ros.kinematics.batch import Batch
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.structure import Iterated
-from linkage_ros.kinematics.survey import usual_inputs
+from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 import numpy as np
@@ -67,50 +64,39 @@ class SpeedPlan:
     batch: int
 
 
-def measure_speed(folder: Path, plan: SpeedPlan) -> Table:
-    """
-    Measure all and return the table.
-
-    Parameters
-    ----------
-    folder
-        Where what is compiled goes.
-    plan
-        How much is measured.
-
-    """
+def measure_speed(plan: SpeedPlan) -> Table:
+    """Measure all and return the table."""
     table = Table(
         f'linkages solved with acceleration, one run, in turn; batch of {plan.batch:,} states',
         ('', 'first', 'second', 'ratio', 'target'),
     )
     _one_at_a_time(plan, table)
     _batches(plan, table)
-    if compiler():
-        for file in sorted((ROOT / 'config' / 'linkages').glob('*.yaml')):
-            _beside_c(folder, plan, table, file.stem)
-    else:
-        say('  no C compiler (cc): left out')
     return table
 
 
 def _one_at_a_time(plan: SpeedPlan, table: Table) -> None:
-    four_bar, leg = (_closure(name) for name in ('four_bar', 'jansen_leg'))
+    four_bar, leg = (Compiled(_closure(name), 2).fast for name in ('four_bar', 'jansen_leg'))
     line = straight_line(*LENGTHS, 1.0)
     angles = [tau * i / plan.states for i in range(plan.states)]
     for angle in angles[:: plan.states // 10]:
-        for one, other in zip(
-            _solve(four_bar, angle), line(angle, RATE, ACCELERATION), strict=True
-        ):
+        found = four_bar(angle, RATE, ACCELERATION)
+        if found is None:
+            raise BenchError('four-bar: leaves the compiled way')
+        for one, other in zip(found, line(angle, RATE, ACCELERATION), strict=True):
             _agree('straight line', one, other)
 
-    def straight() -> None:
-        for angle in angles:
-            line(angle, RATE, ACCELERATION)
+    def all_of(solve: Callable[[float, float, float], object]) -> Callable[[], None]:
+        def run() -> None:
+            for angle in angles:
+                solve(angle, RATE, ACCELERATION)
+
+        return run
 
     contenders: dict[str, Callable[[], object]] = {
-        'straight line': straight,
-        'four-bar': lambda: _walk(four_bar, angles),
-        'Jansen leg': lambda: _walk(leg, angles),
+        'straight line': all_of(line),
+        'four-bar': all_of(four_bar),
+        'Jansen leg': all_of(leg),
     }
     if AVAILABLE:
         contenders['pylinkage'], _ = stepping(*LENGTHS, plan.states, RATE, ACCELERATION)
@@ -121,104 +107,39 @@ def _one_at_a_time(plan: SpeedPlan, table: Table) -> None:
         for name, found in in_turn(contenders, plan.rounds).items()
     }
     for first, second, target in (
-        ('four-bar', 'straight line', '≤ 2'),
-        ('pylinkage', 'four-bar', '≥ 6'),
-        ('Jansen leg', 'four-bar', '≤ 6'),
+        ('four-bar', 'straight line', '≤ 1.2'),
+        ('pylinkage', 'four-bar', '≥ 8'),
+        ('Jansen leg', 'four-bar', '≤ 4'),
     ):
         if first in times:
             compare(table, 'µs a state', first, second, times, target)
 
 
 def _batches(plan: SpeedPlan, table: Table) -> None:
-    if not AVAILABLE:
-        return
     four_bar = _closure('four_bar')
     phi = np.linspace(0.0, tau, plan.batch)
-    out = _batch(four_bar, plan.batch)
+    out = Batch(np.empty(plan.batch, np.uint8), *np.empty((3, 2, plan.batch)))
 
     def solve_all() -> Batch:
         return four_bar.solve(phi, rates=RATE, accelerations=ACCELERATION, out=out)
 
-    count = plan.batch
+    if not AVAILABLE:
+        return
+    counts = {'numpy': plan.batch, 'pylinkage': plan.batch}
     if not HAS_NUMBA:
         say('  pylinkage has no numba: a hundredth of the batch')
-        count //= 100
-    _, theirs = stepping(*LENGTHS, count, RATE, ACCELERATION)
-    found = in_turn({'numpy': solve_all, 'pylinkage': theirs}, plan.rounds)
-    counts = {'numpy': plan.batch, 'pylinkage': count}
-    compare(table, 'Mstates/s', 'numpy', 'pylinkage', _speeds(found, counts), '≥ 6')
-
-
-def _beside_c(folder: Path, plan: SpeedPlan, table: Table, name: str) -> None:
-    """Set a linkage solved in arrays beside the C that is compiled from it."""
-    closure = _closure(name)
-    if any(isinstance(group, Iterated) for group in closure.structure.groups):
-        return
-    n = len(closure.linkage.inputs)
-    count = plan.batch if name == 'four_bar' else plan.batch // 10
-    inputs = _states(closure, count)
-    ours, theirs = _batch(closure, count), _batch(closure, count)
-    solve = compiled(folder, name, closure)
-
-    def in_arrays() -> None:
-        closure.solve(*inputs, rates=(RATE,) * n, accelerations=(ACCELERATION,) * n, out=ours)
-
-    def in_c() -> None:
-        solve(inputs, RATE, ACCELERATION, theirs)
-
-    in_arrays()
-    in_c()
-    if not np.array_equal(ours.status, theirs.status) or ours.status.any():
-        raise BenchError(f'{name}: not all states are closed')
-    for one, other in zip(ours[1:], theirs[1:], strict=True):
-        _agree(f'{name} in C', one, other)
-    found = in_turn({'numpy': in_arrays, 'C': in_c}, plan.rounds)
-    target = '≥ 0.9' if name == 'four_bar' else '≥ 0.5'
-    speeds = _speeds(found, dict.fromkeys(found, count))
-    compare(table, f'{name}, Mstates/s', 'numpy', 'C', speeds, target)
-
-
-def _batch(closure: Closure, count: int) -> Batch:
-    numbers = np.empty((3, len(closure.linkage.joints), count))
-    return Batch(np.empty(count, np.uint8), *numbers)
-
-
-def _states(closure: Closure, count: int) -> list[Array]:
-    """Return closed states: over the widest range, or near the usual ones of several inputs."""
-    if len(closure.linkage.inputs) > 1:
-        near = np.linspace(-0.1, 0.1, count)
-        return [value + near for value in usual_inputs(closure)]
-    widest = max(closure.closing_ranges, key=lambda each: each.highest - each.lowest)
-    # Off the ends, where there may be a toggle.
-    clear = 0.05 * (widest.highest - widest.lowest)
-    return [np.linspace(widest.lowest + clear, widest.highest - clear, count)]
-
-
-def _speeds(
-    found: Mapping[str, Sequence[float]], counts: Mapping[str, int]
-) -> dict[str, list[float]]:
-    return {name: [counts[name] / s / 1e6 for s in times] for name, times in found.items()}
+        counts['pylinkage'] = plan.batch // 100
+    _, stepped = stepping(*LENGTHS, counts['pylinkage'], RATE, ACCELERATION)
+    speeds = {
+        name: [counts[name] / seconds / 1e6 for seconds in found]
+        for name, found in in_turn({'numpy': solve_all, 'pylinkage': stepped}, plan.rounds).items()
+    }
+    compare(table, 'Mstates/s', 'numpy', 'pylinkage', speeds, '≥ 6')
 
 
 def _closure(name: str) -> Closure:
     content, _ = read_yaml(ROOT / 'config' / 'linkages' / f'{name}.yaml')
     return Closure(read_linkage(content))
-
-
-def _solve(closure: Closure, angle: float) -> tuple[tuple[float, ...], ...]:
-    position = closure.position(angle)
-    velocity = closure.velocity(position, RATE)
-    acceleration = closure.acceleration(position, velocity, ACCELERATION)
-    return position.joints, velocity.joints, acceleration.joints
-
-
-def _walk(closure: Closure, angles: Sequence[float]) -> None:
-    solve_position, solve_velocity = closure.position, closure.velocity
-    solve_acceleration = closure.acceleration
-    for angle in angles:
-        position = solve_position(angle)
-        velocity = solve_velocity(position, RATE)
-        solve_acceleration(position, velocity, ACCELERATION)
 
 
 def _agree(name: str, one: ArrayLike, other: ArrayLike) -> None:
