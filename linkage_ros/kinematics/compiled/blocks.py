@@ -51,9 +51,6 @@ _FUNCTIONS: Final[dict[str, Any]] = {
     'where': np.where,
 }
 
-_APART: Final = frozenset(('tan', 'atan2'))
-"""numpy 1.26 does these number by number, with other last digits, where they go to an operand."""
-
 
 class BlockFunction:
     """
@@ -209,12 +206,8 @@ class _Writer:
         if operation.name == 'where':
             self._choose(operation, texts)
         else:
-            if operation.name in _APART:
-                into = self._into(operation)
-                self._done_with(operands)
-            else:
-                self._done_with(operands)
-                into = self._into(operation)
+            self._done_with(operands)
+            into = self._into(operation)
             self.lines.append(
                 f'{_FUNCTIONS[operation.name].__name__}({", ".join(texts)}, out={into})'
             )
