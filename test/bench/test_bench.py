@@ -169,7 +169,7 @@ def _bench(runs: Path, *arguments: str) -> str:
 
 
 def _row(text: str, name: str, table: int = 0) -> list[str]:
-    """Return the cells of a row; of more tables that have one of that name, of the one asked for."""
+    """Return the cells of a row, of that table among those that have one of this name."""
     line = [line for line in text.splitlines() if line.startswith(f'| {name} |')][table]
     return [cell.strip() for cell in line.strip('|').split('|')]
 
