@@ -33,7 +33,7 @@ help:
 	@echo 'make timing    measure clients that come and go, and ticks under load, into docs/timing (35 min)'
 	@echo 'make accuracy  prove the kinematics on 11 million cases, then as topologies (35 min)'
 	@echo 'make topologies  try random linkages of every topology, into docs/accuracy (8 min)'
-	@echo 'make compiled  compare linkages in C, Python and JavaScript with the steps, by the 100,000 (5 min)'
+	@echo 'make compiled  compare linkages in C, Python and JavaScript with the steps, by the 100,000 (8 min)'
 	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (9 min)'
 	@echo 'make synthesis compute and draw what docs/synthesis.md says'
 	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
@@ -73,14 +73,15 @@ $(STAMP): setup.py requirements/dev.txt
 demo: $(STAMP)
 	@$(BIN)/linkage demo $(if $(filter command,$(origin SECONDS)),--seconds $(SECONDS))
 
-# The tests run even when lint finds something, so that one run tells all. Those that start nodes
-# have the processors, and the graph, to themselves.
+# The tests run even when lint finds something, so that one run tells all. Each test that starts
+# nodes has a graph to itself; those that measure nodes have the processors, too.
 test: $(STAMP)
 	@status=0; \
 	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory lint || status=$$?; \
 	$(BIN)/python -m pytest -m 'not ros' --numprocesses auto --dist loadfile || status=$$?; \
-	$(BIN)/python -m pytest -m ros || status=$$?; \
+	$(BIN)/python -m pytest -m 'ros and not alone' --numprocesses 2 --dist loadfile || status=$$?; \
+	$(BIN)/python -m pytest -m alone || status=$$?; \
 	exit $$status
 
 bench: $(STAMP)

@@ -154,8 +154,8 @@ def _ticks(graph: Graph, folder: Path, wanted: str, quick: bool) -> list[Table]:
     if 'b' in wanted:
         title = '(b) CPU of a tick against the bare loop'
         tables += [
-            cost_table(f'{title}, 1 kHz', slow, slow_bare, '≤ 1.25', found),
-            cost_table(f'{title}, 10 kHz', fast, fast_bare, '≤ 1.25', found),
+            cost_table(f'{title}, 1 kHz', slow, slow_bare, '≤ 1.2', found),
+            cost_table(f'{title}, 10 kHz', fast, fast_bare, '≤ 1.2', found),
         ]
     late = [c for c in (slow, fast, slow_recording, fast_recording) if c in found]
     return [*tables, lateness_table(late, found)]

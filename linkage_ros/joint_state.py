@@ -31,7 +31,7 @@ from struct import Struct
 from typing import Any, NamedTuple
 
 from linkage_ros.cdr import aligned, ENCAPSULATION, head_of_joints, STAMP_END
-from linkage_ros.tuples import new
+from linkage_ros.written import Lines
 
 NANOSECONDS = 1_000_000_000
 
@@ -123,7 +123,7 @@ class JointStateReader:
                         return Rejection.STAMP_INVALID
                     rates = pick_rates(values) if pick_rates else None
                     stamp = seconds * NANOSECONDS + nanoseconds
-                    return new(CrankSample, (stamp, pick_positions(values), rates))
+                    return CrankSample(stamp, pick_positions(values), rates)
         found = _find(data, self._joints)
         if isinstance(found, Rejection):
             return found
@@ -277,6 +277,18 @@ class JointStateWriter:
                 *positions, self._between, *rates, self._end,
             )  # fmt: skip
         return alone.pack(ENCAPSULATION, seconds, nanoseconds, self._head, *positions, self._end)
+
+    def straight(self, stamp: str, positions: Sequence[str], rates: Sequence[str]) -> Lines:
+        """Return `write` as lines that make ``message`` of expressions; they are short."""
+        alone, with_rates, _, _ = self._layouts
+        numbers = [*positions, *(('between', *rates) if rates else ())]
+        packed = f'{ENCAPSULATION!r}, seconds, nanoseconds, head, {", ".join(numbers)}'
+        lines = [
+            f'seconds, nanoseconds = divmod({stamp}, {NANOSECONDS})',
+            f'message = pack({packed}, {self._end!r})',
+        ]
+        layout = with_rates if rates else alone
+        return Lines(lines, {'pack': layout.pack, 'head': self._head, 'between': self._between})
 
 
 class OwnJointStates:

@@ -14,33 +14,86 @@
 
 
 """
-From a scene to its tick: each linkage looked at, and the messages written.
+The tick of a scene, from top to bottom: crank, closure, mechanism, sensors, message.
 
 Building puts in only what the scene names; a tick asks no scene.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from importlib import import_module
+from operator import add
+from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.effects.stage import Reading
+from linkage_ros.drives.drive import Context, CrankState, Drive, DRIVES
+from linkage_ros.effects.stage import (
+    Effect,
+    effect_of,
+    in_order,
+    LOADED,
+    module_of,
+    Motion,
+    needs,
+    PUBLISHED_WITH,
+    Reading,
+    SensorStage,
+    WriterStage,
+)
+from linkage_ros.effects.turns import all_wrapped, beginnings, Continuous
+from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.joint_state import JointStateWriter, Rejection
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.line import Extra, Line
-from linkage_ros.look import Look
+from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.status import Status
 from linkage_ros.routes import Routes
-from linkage_ros.scene.scene import Scene
-from linkage_ros.tuples import new
+from linkage_ros.scene.scene import Member, Scene
+from linkage_ros.solvers.registry import SOLVERS
+from linkage_ros.straight_tick import (
+    Numbers,
+    Seen,
+    Straight,
+    straight,
+    straight_look,
+    straight_tick,
+)
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Injection
+    from linkage_ros.solvers.solver import Choice
 
 _WITHHOLDING = {'rate_limit', 'dropout', 'delay', 'jitter'}
 """Effects that may leave a tick without a message."""
 
 _GOING_ON = {'backlash'}
 """Effects that go on where a linkage is open."""
+
+_KINEMATIC = {'velocity', 'acceleration'}
+"""Stages of the mechanism that a compiled linkage does itself."""
+
+
+class Look(NamedTuple):
+    """
+    What a linkage comes to at a tick, step by step.
+
+    Attributes
+    ----------
+    crank
+        The crank; nothing where there is none.
+    position
+        The loop; nothing where there is no crank.
+    motion
+        What the mechanism does; nothing where the loop has no pose.
+    reading
+        What is published of it; nothing where nothing is. A delay may have one where the linkage
+        has no pose.
+
+    """
+
+    crank: CrankState | None
+    position: Position | None
+    motion: Motion | None
+    reading: Reading | None
 
 
 class Tick(NamedTuple):
@@ -49,19 +102,396 @@ class Tick(NamedTuple):
 
     Attributes
     ----------
-    looks
-        What each linkage came to.
     message
         The JointState, serialized; empty where nothing is published.
     extras
         For each of the pipeline's further topics its message, serialized; empty where nothing is
         published on it. Empty as a whole where nothing is on any.
+    seen
+        What each linkage came to, as far as it was worked out.
+    lines
+        The linkages.
 
     """
 
-    looks: tuple[Look, ...]
     message: bytes
     extras: tuple[bytes, ...]
+    seen: Sequence[Look | Seen | Numbers]
+    lines: Sequence[Line]
+
+    @property
+    def looks(self) -> tuple[Look, ...]:
+        """All that each linkage came to; what no message needed is worked out here."""
+        return tuple(line.looked(seen) for line, seen in zip(self.lines, self.seen, strict=True))
+
+
+class Extra(NamedTuple):
+    """
+    A message beside the joint states.
+
+    Attributes
+    ----------
+    effect
+        What calls for it.
+    topic, message
+        Its topic and its type: package/msg/Type.
+    writer
+        Writes it.
+
+    """
+
+    effect: str
+    topic: str
+    message: str
+    writer: WriterStage
+
+
+class Line:
+    """
+    A linkage at work. To reset it, build it again.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    member
+        Its linkage, drive and effects.
+    closure
+        The linkage, where it has been solved before: it remembers nothing, and serves every reset.
+    injection
+        The faults of the scene, if it has any.
+
+    Raises
+    ------
+    FileError
+        Where something does not go together; where the linkage does not close.
+
+    """
+
+    def __init__(
+        self, scene: Scene, member: Member, closure: Closure | None, injection: Injection | None
+    ) -> None:
+        self.member = member
+        try:
+            self._build(scene, closure, injection)
+        except DefinitionError as error:
+            of_linkage = error.where.startswith('masses')
+            content = member.linkage_content if of_linkage else member.content
+            raise content.error(error.where, error.reason, error.remedy) from None
+
+    def _build(self, scene: Scene, closure: Closure | None, injection: Injection | None) -> None:
+        member = self.member
+        _refuse_not_imported(member)
+        drive, drive_parameters = member.drive
+        drive_module = import_module(DRIVES[drive])
+        named = set(member.effects)
+        named |= {also for effect in named for also in PUBLISHED_WITH.get(effect, ())}
+        moves_by_rates = getattr(drive_parameters, 'carry_forward', True)
+        starting = named - _between_readings(member, named, moves_by_rates)
+        computed = named | {need for effect in starting for need in needs(effect)}
+        effects = [effect_of(name) for name in in_order(computed)]
+        self.stages = tuple(effect.name for effect in effects)
+        """Names of the effects that are computed, in physical order."""
+        forced = drive == 'torque' or not computed.isdisjoint(LOADED)
+        _refuse_idle(member, forced)
+        _refuse_solver(member, forced)
+
+        seed = f'{scene.seed}/{member.name}'
+        given = {
+            effect.name: member.effects.get(effect.name) or effect.parameters()
+            for effect in effects
+        }
+        self.closure = closure or _closure(member, effects, given, seed, forced)
+        self.context = context = Context(
+            closure=self.closure,
+            rate=scene.rate,
+            needs_rate='velocity' in computed,
+            seed=seed,
+            loads=member.loads,
+            friction=given['friction'].friction if 'friction' in given else None,
+            prefix=member.prefix,
+            dependent=scene.dependent_joints,
+            effects=frozenset(member.effects),
+            moves_by_rates=moves_by_rates,
+        )
+
+        # Crank.
+        self.topic: str = getattr(drive_module, 'TOPIC', '')
+        """Topic that the drive listens to; '' for none."""
+        self.drive: Drive = drive_module.build(drive_parameters, context)
+        self._read_message = drive_module.reader(context) if self.topic else None
+        self._spoil = injection.build('message') if injection is not None else []
+        if self._spoil and not self.topic:
+            raise DefinitionError(
+                'faults', f'not_a_number spoils messages, and {drive} has none', 'leave it out'
+            )
+        self._drive_stages = [
+            effect.drive_stage(given[effect.name], context)
+            for effect in effects
+            if effect.drive_stage is not None
+        ]
+        # Closure and mechanism.
+        self._close = self.closure.position
+        if member.silent_beyond_limits and self.closure.bounds:
+            self._close = _silent_beyond(self._close, self.closure)
+        self._faults = injection.build('mechanism', context) if injection is not None else []
+        self._stages = [
+            effect.stage(given[effect.name], context)
+            for effect in effects
+            if effect.stage is not None
+        ]
+        self._read_off = (named | {'velocity'}) & computed
+        # Sensors.
+        sensors: dict[str, Any] = {
+            effect.name: effect.sensor(given[effect.name], context)
+            for effect in effects
+            if effect.sensor is not None
+        }
+        if {'encoder', 'rate_limit'} <= set(sensors):
+            sensors['rate_limit'].read_by(sensors['encoder'])
+        broken = injection.build('sensor', member.joints) if injection is not None else []
+        angles = Continuous(self.closure.turning, beginnings(self.closure))
+        behind = [*sensors.values(), *broken]
+        running = [angles] if behind or not scene.wrapped else []
+        if scene.wrapped:
+            behind.append(all_wrapped(self.closure.turning))
+        if 'velocity' in computed - named:
+            behind.append(_without_rates)
+        self._sensors = [SensorStage.of(sensor) for sensor in (*running, *behind)]
+        # Messages.
+        self.extras = [
+            _extra(effect, effect.writer(given[effect.name], context), member.name)
+            for effect in effects
+            if effect.writer is not None and effect.name in named
+        ]
+        """The topics beside the joint states."""
+
+        self.see: Callable[[int], Look | Seen] = self._see
+        """Returns what the linkage comes to at a time, in [ns]."""
+        self.usual: Straight | None = None
+        """Its usual tick, where all of it can be written as text."""
+        moved = {effect.name for effect in effects if effect.stage is not None}
+        if type(self.closure) is not Closure or not moved <= _KINEMATIC or self._faults:
+            return
+        compiled = self.closure.compiled(len(moved))
+        if compiled.paths:
+            running_on = angles if running else None
+            usual = straight(self.drive, self._drive_stages, compiled, running_on)
+            read = partial(self._read, first=len(running)) if behind else None
+            self.see = straight_look(usual, read, self.look)
+            if read is None and all(extra.writer.of_reading for extra in self.extras):
+                self.usual = usual
+
+    def _see(self, now: int) -> Look:
+        """Return what the linkage comes to at a time, in [ns], step by step."""
+        crank = self.drive.state(now)
+        if crank is not None:
+            for stage in self._drive_stages:
+                crank = stage(crank)
+        return self.look(now, crank)
+
+    def look(self, now: int, crank: CrankState | None) -> Look:
+        """Return what the linkage comes to, from the crank on."""
+        if crank is None:
+            return Look(None, None, None, self._read_gap(now))
+        position = self._close(*crank.angles)
+        for fault in self._faults:
+            position = fault(position)
+        if not position.joints:
+            return Look(crank, position, None, self._read_gap(now))
+        motion = self._moved(crank, position)
+        return Look(crank, position, motion, self._read(now, self._observed(now, motion)))
+
+    def _moved(self, crank: CrankState, position: Position) -> Motion:
+        """Return what the mechanism does in a pose."""
+        motion = Motion(crank, position, None, None, (), (), ())
+        for stage in self._stages:
+            motion = stage(motion)
+        return motion
+
+    def _observed(self, now: int, motion: Motion) -> Reading:
+        """Return what an ideal sensor reads of a motion: what is named, and no more."""
+        position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
+        efforts: tuple[float, ...] = ()
+        if 'effort' in self._read_off and motion.efforts:
+            # Of the inputs, which are published first; 0 for the others.
+            efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
+        return Reading(
+            now,
+            tuple(map(add, position.joints, motion.shift)) if motion.shift else position.joints,
+            velocity.joints if velocity and 'velocity' in self._read_off else (),
+            acceleration.joints if acceleration and 'acceleration' in self._read_off else (),
+            efforts,
+        )
+
+    def _read(self, now: int, ideal: Reading, first: int = 0) -> Reading | None:
+        """Return what the sensors, from a number on, make of what an ideal one reads."""
+        reading: Reading | None = ideal
+        gap = False
+        for sensor in self._sensors[first:]:
+            if reading is not None:
+                reading = sensor.read(now, reading)
+                gap = sensor.gap is not None
+            elif sensor.silence is not None:
+                reading = sensor.silence(now, gap)
+        return reading
+
+    def _read_gap(self, now: int) -> Reading | None:
+        """Return what the sensors read where the linkage has no pose."""
+        reading: Reading | None = None
+        for sensor in self._sensors:
+            if reading is not None:
+                reading = sensor.read(now, reading)
+            elif sensor.gap is not None:
+                reading = sensor.gap(now)
+        return reading
+
+    def looked(self, seen: Look | Seen | Numbers) -> Look:
+        """Return all that a linkage came to: of a straight tick it is worked out here."""
+        if isinstance(seen, Look):
+            return seen
+        crank_numbers, numbers = seen
+        crank = CrankState(*crank_numbers)
+        position = self._close(*crank.angles)
+        reading = None if numbers is None else Reading(*numbers)
+        return Look(crank, position, self._moved(crank, position), reading)
+
+    def write_extras(self, now: int, seen: Look | Seen) -> list[bytes]:
+        """Return the messages beside the joint states at a time, in [ns]; b'' for none."""
+        return [self._written(extra.writer, now, seen) for extra in self.extras]
+
+    def _written(self, writer: WriterStage, now: int, seen: Look | Seen) -> bytes:
+        if writer.due is not None and not writer.due(now):
+            return b''
+        reading = seen.reading
+        if writer.of_reading:
+            return b'' if reading is None else writer.write(now, None, reading)
+        _, position, motion, _ = self.looked(seen)
+        if motion is not None:
+            return b'' if reading is None else writer.write(now, motion, reading)
+        if position is None or writer.no_pose is None:
+            return b''
+        return writer.no_pose(now, position)
+
+    @property
+    def gap_begins(self) -> bool:
+        """Return whether a gap began with the last tick, if that had no pose."""
+        return any(sensor.gap_begins for sensor in self._sensors)
+
+    @property
+    def choice(self) -> Choice | None:
+        """Return what closes the loops and why, where an accuracy is asked for; else nothing."""
+        found: Choice | None = getattr(self.closure, 'choice', None)
+        return found
+
+    def offer(self, message: bytes, now: int) -> Rejection | None:
+        """Take a message of the drive's topic, serialized, at a time in [ns], or say why not."""
+        if self._read_message is None:
+            return Rejection.MISSING
+        for spoil in self._spoil:
+            message = spoil(message)
+        sample = self._read_message(message)
+        if isinstance(sample, Rejection):
+            return sample
+        rejection: Rejection | None = self.drive.offer(sample, now)  # type: ignore[attr-defined]
+        return rejection
+
+
+def _between_readings(member: Member, named: set[str], moves_by_rates: bool) -> set[str]:
+    """Return the effects that mix readings, where they do so without rates or not at all."""
+    found = {'jitter', 'delay'} & named
+    if moves_by_rates and 'delay' in found:
+        delay = module_of('delay')
+        parameters = member.effects.get('delay') or delay.PARAMETERS()
+        return set() if delay.interpolates(parameters, named) else {'delay'}
+    return set() if moves_by_rates else found
+
+
+def _extra(effect: Effect, writer: Any, member: str) -> Extra:
+    topic = f'~/{member}/{effect.topic[2:]}' if member else effect.topic
+    written = WriterStage.of(writer, of_reading=effect.of_reading)
+    return Extra(effect.name, topic, effect.message, written)
+
+
+def _without_rates(_now: int, reading: Reading) -> Reading:
+    """Let rates end that have served between readings."""
+    return reading._replace(rates=())
+
+
+def _silent_beyond(close: Callable[..., Position], closure: Closure) -> Callable[..., Position]:
+    """Return what closes the loops, and has no joints to publish where one is beyond limits."""
+
+    def within(*inputs: float) -> Position:
+        position = close(*inputs)
+        if position.joints and closure.bounds.exceeded(inputs, position.joints) is not None:
+            return position._replace(status=Status.LIMITED, joints=())
+        return position
+
+    return within
+
+
+def _refuse_not_imported(member: Member) -> None:
+    if member.not_imported:
+        from linkage_ros.effects.own import found_in  # local import: only where a scene has one
+
+        name = member.not_imported[0]
+        raise DefinitionError(
+            f'effects.{name}',
+            f'names a module, and what a bag names is not imported unasked; the name leads to '
+            f'{found_in(name)} here',
+            '--trust-effects imports it',
+        )
+
+
+def _refuse_idle(member: Member, forced: bool) -> None:
+    """Refuse what acts on nothing."""
+    # Of several linkages those without forces may share what others need.
+    own = member.content
+    for given, key in (
+        (member.loads and 'loads' in own, 'loads'),
+        ('friction' in member.effects and 'effects' in own, 'effects.friction'),
+    ):
+        if given and not forced:
+            raise DefinitionError(
+                key,
+                'acts on nothing here: no effect and no drive asks for forces',
+                f'leave it out, drive by torque, or name one of {listed(LOADED)}',
+            )
+
+
+def _refuse_solver(member: Member, forced: bool) -> None:
+    """Refuse what has no poses of dyads where forces start from these."""
+    if forced and member.solver is not None and member.solver[0] != 'closed_form':
+        raise DefinitionError(
+            'solver',
+            f'{member.solver[0]} finds no forces, and an effect or the drive asks for them',
+            f'write closed_form, or leave {listed(LOADED)} and torque out',
+        )
+
+
+def _closure(
+    member: Member,
+    effects: Sequence[Effect],
+    given: Mapping[str, Any],
+    seed: str,
+    forced: bool,
+) -> Closure:
+    linkage = member.linkage
+    for effect in effects:
+        if effect.alter is not None:
+            random = Context.generator(seed, effect.name)
+            linkage = effect.alter(given[effect.name], linkage, random)
+    if member.accuracy is not None:
+        from linkage_ros.solvers import choose  # local import: only where an accuracy is asked for
+
+        if forced:
+            return choose.only_closed_form(linkage, 'forces start from it')
+        return choose.choose(linkage, member.accuracy)
+    if member.solver is not None:
+        name, solving = member.solver
+        closure: Closure = import_module(SOLVERS[name]).build(solving, linkage)
+        return closure
+    return Closure(linkage)
 
 
 class Pipeline:
@@ -121,15 +551,12 @@ class Pipeline:
             or any(not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines)
         )
         """Whether there may be ticks without a message of which a replay has to know."""
-        if len(self.lines) == 1:
-            (line,) = self.lines
-            self.tick = _ticking_one(line)
-        else:
-            self._routes = Routes({line: line.member.inputs for line in self.lines})
-            self._offered = 0
-            self._newest: dict[Line, int] = {}
-            self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
-            self.tick = self._tick_many
+        self._routes = Routes({line: line.member.inputs for line in self.lines})
+        self._offered = 0
+        self._newest: dict[Line, int] = {}
+        self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
+        self.tick: Callable[[int], Tick] = self._straight() or self._tick
+        """Ticks at a time, in [ns]."""
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """
@@ -162,32 +589,45 @@ class Pipeline:
         self._newest.clear()
         return len(numbers)
 
+    def _tick(self, now: int) -> Tick:
+        return self._made(now, [line.see(now) for line in self.lines])
+
+    def _made(self, now: int, seen: Sequence[Look | Seen]) -> Tick:
+        """Return what a tick comes to; joints are left out that have no reading."""
+        extras: tuple[bytes, ...] = ()
+        if self.extras:
+            pairs = zip(self.lines, seen, strict=True)
+            extras = tuple([extra for line, one in pairs for extra in line.write_extras(now, one)])
+        readings = [one.reading for one in seen if one.reading is not None]
+        if not readings:
+            return Tick(b'', extras if any(extras) else (), seen, self.lines)
+        present = tuple([one.reading is not None for one in seen])
+        writer = self._writers.get(present) or self._writer(present)
+        stamp = max([reading.stamp for reading in readings])
+        return Tick(writer.write(stamp, *_joined(readings)), extras, seen, self.lines)
+
+    def _straight(self) -> Callable[[int], Tick] | None:
+        """Return the tick as one function, where all of it can be written so."""
+        line = self.lines[0]
+        if len(self.lines) > 1 or line.usual is None:
+            return None
+        return straight_tick(
+            line.usual,
+            self._writer((True,)),
+            [extra.writer.write for extra in self.extras],
+            Tick,
+            self.lines,
+            lambda now, crank: self._made(now, [line.look(now, crank)]),
+        )
+
     def remembers(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes what comes after it."""
         return any(
-            line.gap_begins
-            if look.position is None or not (look.position.joints or self._goes_on)
-            else True
-            for line, look in zip(self.lines, tick.looks, strict=True)
+            not isinstance(seen, Look)
+            or line.gap_begins
+            or (seen.position is not None and (bool(seen.position.joints) or self._goes_on))
+            for line, seen in zip(self.lines, tick.seen, strict=True)
         )
-
-    def _tick_many(self, now: int) -> Tick:
-        """Return all linkages at a time, in [ns], those joints left out that have no reading."""
-        looks = tuple([line.look(now) for line in self.lines])
-        read = [look[3] for look in looks]
-        present = tuple([reading is not None for reading in read])
-        extras = tuple(
-            _written(extra, now, look)
-            for line, look in zip(self.lines, looks, strict=True)
-            for extra in line.extras
-        )
-        readings = [reading for reading in read if reading is not None]
-        if not readings:
-            return Tick(looks, b'', extras if any(extras) else ())
-        writer = self._writers.get(present) or self._writer(present)
-        stamp = max(reading.stamp for reading in readings)
-        message = writer.write(stamp, *_joined(readings))
-        return Tick(looks, message, extras)
 
     def _writer(self, present: tuple[bool, ...]) -> JointStateWriter:
         joints = [
@@ -227,45 +667,6 @@ def _refuse_stamps(scene: Scene) -> None:
             )
 
 
-def _ticking_one(line: Line) -> Callable[[int], Tick]:
-    """Return what ticks where there is one linkage; a method takes longer, in every tick."""
-    look_at, write = line.look, JointStateWriter(line.member.joints).write
-    extras = tuple(extra.write for extra in line.extras)
-    tells_open = any(extra.write_open for extra in line.extras)
-
-    def tick(now: int) -> Tick:
-        look = look_at(now)
-        _, _, motion, reading = look
-        if reading is None:
-            if tells_open and motion is None:
-                opened = tuple([_written(extra, now, look) for extra in line.extras])
-                return new(Tick, ((look,), b'', opened if any(opened) else ()))
-            return new(Tick, ((look,), b'', ()))
-        stamp, joints, rates, _, efforts = reading
-        message = write(stamp, joints, rates, efforts)
-        if not extras:
-            return new(Tick, ((look,), message, ()))
-        if motion is None:
-            written = tuple([_written(extra, now, look) for extra in line.extras])
-            return new(Tick, ((look,), message, written if any(written) else ()))
-        written = tuple([write_extra(now, motion, reading) for write_extra in extras])
-        return new(Tick, ((look,), message, written))
-
-    return tick
-
-
-def _written(extra: Extra, now: int, look: Look) -> bytes:
-    """Return an extra of a linkage at a time, in [ns]; b'' for none."""
-    _, position, motion, reading = look
-    if reading is not None and (motion is not None or extra.of_reading):
-        return extra.write(now, motion, reading)
-    if motion is not None:
-        return b''
-    if position is None or extra.write_open is None:
-        return b''
-    return extra.write_open(now, position)
-
-
 def _joined(
     readings: Sequence[Reading],
 ) -> tuple[list[float], list[float], list[float]]:
@@ -275,8 +676,8 @@ def _joined(
     The arrays of a JointState are of one length or empty. Where some readings have rates and
     others, at a toggle or without the effect, have none, none are published; so with efforts.
     """
-    positions = [value for reading in readings for value in reading[1]]
-    rates = [value for reading in readings for value in reading[2]]
-    efforts = [value for reading in readings for value in reading[4]]
+    positions = [value for reading in readings for value in reading.joints]
+    rates = [value for reading in readings for value in reading.rates]
+    efforts = [value for reading in readings for value in reading.efforts]
     n = len(positions)
     return positions, rates if len(rates) == n else [], efforts if len(efforts) == n else []

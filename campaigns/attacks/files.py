@@ -64,6 +64,7 @@ COMMANDS = {
     'check': [_FILE],
     'solve': [_FILE, '--steps', '8', '--rate', '1', '--points'],
     'draw': [_FILE, '-o', 'x.svg'],
+    'compile': [_FILE, '-o', 'x.c'],
     'urdf': [_FILE],
     'mjcf': [_FILE],
     'scene': [_FILE],

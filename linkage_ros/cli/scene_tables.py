@@ -24,9 +24,8 @@ from typing import Any
 from linkage_ros.cli.tables import Table
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import bringing, module_of
-from linkage_ros.line import Line
 from linkage_ros.parameters import declared
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline import Line, Pipeline
 from linkage_ros.scene.scene import Scene
 from linkage_ros.scene.schema import default_of, is_required, summary
 

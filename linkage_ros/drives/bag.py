@@ -30,12 +30,11 @@ from dataclasses import dataclass
 
 from linkage_ros.bag.reading.reader import read_bag
 from linkage_ros.drives.bag_samples import read_samples, Samples
-from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import DefinitionError
 from linkage_ros.joint_state import CrankSample
 from linkage_ros.parameters import choice, file, flag, number, text
-from linkage_ros.tuples import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +92,7 @@ def build(parameters: BagParameters, context: Context) -> RecordedPace | FastPac
     return FastPace(samples, repeat=parameters.repeat)
 
 
-class RecordedPace:
+class RecordedPace(Drive):
     """
     The samples at their times: each comes as long after the first tick as after the first sample.
 
@@ -151,11 +150,11 @@ class RecordedPace:
         if self._newest != (rounds, number):
             self._newest = (rounds, number)
             stamp = elapsed - time + self.samples.offsets[number] + 1
-            self._topic.offer(new(CrankSample, (stamp, *self.samples[number])), elapsed + 1)
+            self._topic.offer(CrankSample(stamp, *self.samples[number]), elapsed + 1)
         return self._topic.state(elapsed + 1)
 
 
-class FastPace:
+class FastPace(Drive):
     """
     The samples one by one: at each tick the next, as it was measured, whatever the time.
 
@@ -187,4 +186,4 @@ class FastPace:
             number = 0
         self._next = number + 1
         angles, rates = self.samples[number]
-        return new(CrankState, (angles, rates, (0.0,) * len(angles), 0))
+        return CrankState(angles, rates, (0.0,) * len(angles), 0)

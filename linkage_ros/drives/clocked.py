@@ -25,10 +25,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
-from linkage_ros.drives.drive import Context, CrankState
+from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.drives.limits import refuse_beyond
 from linkage_ros.errors import DefinitionError, listed
-from linkage_ros.tuples import new
+from linkage_ros.written import Lines
 
 LARGEST = 1e10
 """No value or rate of a machine's input is beyond this, in [rad], [m], [rad/s] or [m/s]."""
@@ -44,7 +44,7 @@ derivative by time of the one before it.
 P = TypeVar('P')
 
 
-class ClockedDrive:
+class ClockedDrive(Drive):
     """
     Inputs that follow curves, from the first tick on.
 
@@ -55,26 +55,40 @@ class ClockedDrive:
 
     """
 
-    __slots__ = ('_curve', '_curves', '_start')
+    __slots__ = ('_curve', '_curves', 'start')
 
     stamp = 0
     max_age = 0
+    start: int | None
+    """Time of the first tick, in [ns]; None before it."""
 
     def __init__(self, curves: tuple[Curve, ...]) -> None:
         self._curves = curves
         self._curve = curves[0] if len(curves) == 1 else None
-        self._start: int | None = None
+        self.start = None
 
     def state(self, now: int) -> CrankState:
         """Return the crank at a time, in [ns]; the first that is asked for is the curves' zero."""
-        if self._start is None:
-            self._start = now
+        if self.start is None:
+            self.start = now
         if self._curve is not None:  # zip over one takes twice as long, in every tick
-            value, rate, acceleration = self._curve(now - self._start)
-            return new(CrankState, ((value,), (rate,), (acceleration,), 0))
-        elapsed = now - self._start
+            value, rate, acceleration = self._curve(now - self.start)
+            return CrankState((value,), (rate,), (acceleration,), 0)
+        elapsed = now - self.start
         values, rates, accelerations = zip(*[c(elapsed) for c in self._curves], strict=True)
-        return new(CrankState, (values, rates, accelerations, 0))
+        return CrankState(values, rates, accelerations, 0)
+
+    def straight(self, inputs: int, leave: str) -> Lines:
+        """Return `state` as lines: of one input without a frame of its own."""
+        if self._curve is None:
+            return super().straight(inputs, leave)
+        lines = [
+            'if drive.start is None:',
+            '    drive.start = now',
+            'value, rate, acceleration = curve(now - drive.start)',
+            'angles, rates, accelerations, age = (value,), (rate,), (acceleration,), 0',
+        ]
+        return Lines(lines, {'drive': self, 'curve': self._curve})
 
 
 def build_clocked(

@@ -40,6 +40,7 @@ from random import Random
 from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.written import Lines
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.loads import Friction, Loads
@@ -81,6 +82,9 @@ class CrankState(NamedTuple):
     age: int
 
 
+_CRANK = ', '.join(CrankState._fields)
+
+
 class CrankBehindPlay(CrankState):
     """
     The crank at a tick, behind the play between it and its motor.
@@ -109,6 +113,21 @@ class Drive(Protocol):
 
     def state(self, now: int, /) -> CrankState | None:
         """Return the crank at a time, in [ns]; nothing where there is none."""
+
+    def straight(self, _inputs: int, leave: str) -> Lines:
+        """
+        Return `state` as lines that make what a `CrankState` has, by its names, of ``now``.
+
+        Parameters
+        ----------
+        inputs
+            How many the linkage has.
+        leave
+            The statement that leaves the lines where there is no crank.
+
+        """
+        lines = ['crank = state(now)', 'if crank is None:', f'    {leave}', f'{_CRANK} = crank']
+        return Lines(lines, {'state': self.state})
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite
 
-from linkage_ros.drives.drive import Context, CrankState, Reader
+from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
 from linkage_ros.joint_state import CrankSample, JointStateReader, NANOSECONDS, Rejection
 from linkage_ros.parameters import flag, number
-from linkage_ros.tuples import new
+from linkage_ros.written import Lines
 
 LARGEST = 1e10
 """Angles beyond this, in [rad], are 2e-6 rad apart as doubles: none of a machine. Rates alike."""
@@ -67,7 +67,7 @@ def build(parameters: TopicParameters, context: Context) -> TopicDrive:
 _Values = tuple[float, ...]
 
 
-class TopicDrive:
+class TopicDrive(Drive):
     """
     The newest good sample, and nothing else.
 
@@ -84,22 +84,24 @@ class TopicDrive:
 
     """
 
-    __slots__ = ('_carry_forward', '_max_lead', '_needs_rate', '_sample', 'max_age')
+    __slots__ = ('_carry_forward', '_max_lead', '_needs_rate', 'max_age', 'sample')
 
     max_age: int
     """Age of the newest sample beyond which there is no crank, in [ns]."""
+    sample: tuple[int, _Values, _Values, _Values] | None
+    """The newest good sample: its stamp, in [ns], angles, rates, and as many zeros."""
 
     def __init__(self, use: TopicParameters, needs_rate: bool) -> None:
         self._carry_forward = use.carry_forward
         self.max_age = round(use.max_age * NANOSECONDS)
         self._max_lead = round(use.max_lead * NANOSECONDS)
         self._needs_rate = needs_rate or use.carry_forward
-        self._sample: tuple[int, _Values, _Values, _Values] | None = None
+        self.sample = None
 
     @property
     def stamp(self) -> int:
         """Stamp of the newest good sample, in [ns]; 0 before the first."""
-        return self._sample[0] if self._sample else 0
+        return self.sample[0] if self.sample else 0
 
     def offer(self, sample: CrankSample, now: int) -> Rejection | None:
         """
@@ -127,16 +129,16 @@ class TopicDrive:
             return Rejection.STAMP_ZERO
         if stamp > now + self._max_lead:
             return Rejection.STAMP_FUTURE
-        if self._sample is not None and stamp < self._sample[0]:
+        if self.sample is not None and stamp < self.sample[0]:
             return Rejection.STAMP_OLD
-        self._sample = (stamp, angles, rates, zeros)
+        self.sample = (stamp, angles, rates, zeros)
         return None
 
     def state(self, now: int) -> CrankState | None:
         """Return the crank at a time, in [ns]; nothing where the newest sample is too old."""
-        if self._sample is None:
+        if self.sample is None:
             return None
-        stamp, angles, rates, zeros = self._sample
+        stamp, angles, rates, zeros = self.sample
         age = now - stamp
         if age > self.max_age:
             return None
@@ -147,4 +149,19 @@ class TopicDrive:
             else:
                 pairs = zip(angles, rates, strict=True)
                 angles = tuple([angle + rate * seconds for angle, rate in pairs])
-        return new(CrankState, (angles, rates, zeros, age))
+        return CrankState(angles, rates, zeros, age)
+
+    def straight(self, inputs: int, leave: str) -> Lines:
+        """Return `state` as lines: without a frame of its own."""
+        lines = [
+            'if drive.sample is None:',
+            f'    {leave}',
+            'stamp, angles, rates, accelerations = drive.sample',
+            'age = now - stamp',
+            f'if age > {self.max_age}:',
+            f'    {leave}',
+        ]
+        if self._carry_forward:
+            carried = [f'angles[{i}] + rates[{i}] * seconds,' for i in range(inputs)]
+            lines += ['seconds = age * 1e-9', f'angles = ({" ".join(carried)})']
+        return Lines(lines, {'drive': self})

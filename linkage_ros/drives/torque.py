@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from math import copysign, inf, isfinite
 
-from linkage_ros.drives.drive import Context, CrankState, Reader
+from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators.method import METHODS
 from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError
@@ -159,7 +159,7 @@ def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]
     )
 
 
-class TorqueDrive:
+class TorqueDrive(Drive):
     """
     A mechanism that commands move.
 

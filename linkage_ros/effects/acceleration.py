@@ -29,7 +29,6 @@ from math import isfinite
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Reading, Stage, Writer
-from linkage_ros.tuples import new
 
 TOPIC = '~/motion'
 MESSAGE = 'trajectory_msgs/msg/JointTrajectory'
@@ -49,14 +48,14 @@ def stage(_parameters: AccelerationParameters, context: Context) -> Stage:
     acceleration_of = context.closure.acceleration
 
     def acceleration(motion: Motion) -> Motion:
-        crank, position, velocity, _, _, _, _ = motion
+        velocity = motion.velocity
         if velocity is None:
             return motion
-        found = acceleration_of(position, velocity, *crank.accelerations)
+        found = acceleration_of(motion.position, velocity, *motion.crank.accelerations)
         # Towards a toggle it grows as the cube of what the rates grow as: it may overflow alone.
         if not all(map(isfinite, found.joints)):
             return motion
-        return new(Motion, (crank, position, velocity, found, (), (), ()))
+        return motion._replace(acceleration=found)
 
     return acceleration
 
@@ -68,7 +67,6 @@ def writer(_parameters: AccelerationParameters, context: Context) -> Writer:
     write = JointTrajectoryWriter(context.joints_in_messages).write
 
     def write_motion(_now: int, _motion: Motion | None, reading: Reading) -> bytes:
-        stamp, positions, rates, accelerations, _ = reading
-        return write(stamp, positions, rates, accelerations)
+        return write(reading.stamp, reading.joints, reading.rates, reading.accelerations)
 
     return write_motion

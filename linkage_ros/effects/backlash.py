@@ -49,7 +49,6 @@ from math import pi, tau
 from linkage_ros.drives.drive import Context, CrankBehindPlay, CrankState
 from linkage_ros.effects.stage import DriveStage
 from linkage_ros.parameters import each, Number, number
-from linkage_ros.tuples import new
 
 _LARGEST = 6.0
 
@@ -78,19 +77,8 @@ def drive_stage(parameters: BacklashParameters, context: Context) -> DriveStage:
         Play(parameters.inputs.get(given.joint, parameters.play), turns=not given.slider)
         for given in linkage.inputs
     )
-    if len(plays) == 1:  # a loop over one takes three times as long, in every tick
-        follow = plays[0].follow
 
-        def backlash(motor: CrankState) -> CrankState:
-            (angle,), (rate,), (acceleration,), age = motor
-            angle, rate, acceleration, free = follow(angle, rate, acceleration)
-            crank = new(CrankBehindPlay, ((angle,), (rate,), (acceleration,), age))
-            crank.free_motors = (free,)
-            return crank
-
-        return backlash
-
-    def backlash_of_all(motor: CrankState) -> CrankState:
+    def backlash(motor: CrankState) -> CrankState:
         angles, rates, accelerations, free_motors = zip(
             *[
                 play.follow(*of_one)
@@ -100,11 +88,11 @@ def drive_stage(parameters: BacklashParameters, context: Context) -> DriveStage:
             ],
             strict=True,
         )
-        crank = new(CrankBehindPlay, (angles, rates, accelerations, motor.age))
+        crank = CrankBehindPlay(angles, rates, accelerations, motor.age)
         crank.free_motors = free_motors
         return crank
 
-    return backlash_of_all
+    return backlash
 
 
 class Play:

@@ -33,7 +33,6 @@ from operator import add
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading, Sensor
 from linkage_ros.parameters import each, Number
-from linkage_ros.tuples import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +55,6 @@ def sensor(parameters: BiasParameters, context: Context) -> Sensor:
     biases = tuple(parameters.joints.get(joint, 0.0) for joint in context.joints)
 
     def bias(_now: int, reading: Reading) -> Reading:
-        stamp, joints, rates, accelerations, efforts = reading
-        joints = tuple(map(add, joints, biases))
-        return new(Reading, (stamp, joints, rates, accelerations, efforts))
+        return reading._replace(joints=tuple(map(add, reading.joints, biases)))
 
     return bias

@@ -93,7 +93,7 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
     shift_of = context.reactions.shift
 
     def clearance(motion: Motion) -> Motion:
-        _, position, _, _, _, reactions, _ = motion
+        reactions = motion.reactions
         if not reactions:
             return motion
         sizes = [hypot(fx, fy) for fx, fy, _ in reactions]
@@ -104,7 +104,7 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
             if size > smallest:
                 fx, fy, _ = reactions[joint]
                 offsets[joint] = complex(-play * (fx / size), -play * (fy / size))
-        moved = shift_of(position, offsets)
+        moved = shift_of(motion.position, offsets)
         return motion if moved is None else yielding(motion, moved)
 
     return clearance

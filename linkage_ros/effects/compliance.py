@@ -102,10 +102,10 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
     shift_of = context.reactions.shift
 
     def compliance(motion: Motion) -> Motion:
-        _, position, _, _, _, reactions, _ = motion
+        position, reactions = motion.position, motion.reactions
         if not reactions:
             return motion
-        x = position[3][0]
+        x = position.state.coordinates
         offsets = list(rigid)
         for coordinate, axis, halves, far, softness in bars:
             along = rect(1.0, x[coordinate]) * axis

@@ -145,6 +145,10 @@ class Delay:
         self.gap_begins = self._messages is None and self._history.add_gap(now)
         return self._arriving(now)
 
+    def silence(self, now: int, gap: bool) -> Reading | None:
+        """Return what arrives where a sensor before it is silent, or looks into a gap."""
+        return self.gap(now) if gap else self(now, None)
+
     def _begin_messages(self) -> None:
         """Let the line carry messages from the newest reading on."""
         self._messages = -1

@@ -153,4 +153,4 @@ class Dropout:
         last = self._last
         if last is None or not self._repeat:
             return None
-        return restamped(last, reading[0])
+        return restamped(last, reading.stamp)

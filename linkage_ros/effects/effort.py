@@ -35,7 +35,6 @@ from math import isfinite
 
 from linkage_ros.drives.drive import Context, CrankBehindPlay
 from linkage_ros.effects.stage import Motion, Stage
-from linkage_ros.tuples import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,14 +50,14 @@ def stage(_parameters: EffortParameters, context: Context) -> Stage:
     efforts_of = context.mechanics.drive_efforts
 
     def effort(motion: Motion) -> Motion:
-        crank, position, velocity, acceleration, _, reactions, shift = motion
+        velocity, acceleration = motion.velocity, motion.acceleration
         if velocity is None or acceleration is None:
             return motion
-        efforts = efforts_of(position, velocity, acceleration)
+        efforts = efforts_of(motion.position, velocity, acceleration)
         # Towards a toggle they grow with the accelerations, and further.
         if not all(map(isfinite, efforts)):
             return motion
-        return new(Motion, (crank, position, velocity, acceleration, efforts, reactions, shift))
+        return motion._replace(efforts=efforts)
 
     return _behind_play(effort, context) if 'backlash' in context.effects else effort
 

@@ -56,7 +56,6 @@ from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading, Sensor
 from linkage_ros.errors import DefinitionError
 from linkage_ros.parameters import choice, each, flag, number, whole
-from linkage_ros.tuples import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,11 +216,10 @@ class Encoder:
 
     def __call__(self, now: int, reading: Reading) -> Reading:
         """Return what is read."""
-        stamp, joints, rates, accelerations, efforts = reading
-        values = list(joints)
+        values = list(reading.joints)
         for place, counter in self._counters:
             values[place] = counter.count(values[place])
-        found = new(Reading, (stamp, tuple(values), rates, accelerations, efforts))
+        found = reading._replace(joints=tuple(values))
         return self.differenced(now, found) if self.read_at_ticks else found
 
     def differenced(self, now: int, reading: Reading) -> Reading:
@@ -230,10 +228,9 @@ class Encoder:
             return reading
         elapsed = now - self._last
         self._last = now
-        stamp, joints, rates, accelerations, efforts = reading
-        speeds = list(rates)
+        speeds = list(reading.rates)
         for place, counter in self._counters:
             rate = counter.read(elapsed)
-            if rates:
+            if speeds:
                 speeds[place] = rate
-        return new(Reading, (stamp, joints, tuple(speeds), accelerations, efforts))
+        return reading._replace(rates=tuple(speeds))

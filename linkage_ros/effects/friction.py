@@ -54,15 +54,15 @@ class FrictionParameters:
 
     joints: Mapping[str, OneJoint] = each('of each pin or slider', 'pin', OneJoint, required=True)
 
+    @property
+    def friction(self) -> Friction:
+        """Return the friction as the mechanics take it."""
+        return Friction(
+            {
+                name: JointFriction(joint.viscous, joint.coulomb)
+                for name, joint in self.joints.items()
+            }
+        )
+
 
 PARAMETERS = FrictionParameters
-
-
-def friction(parameters: FrictionParameters) -> Friction:
-    """Return the friction as the mechanics take it."""
-    return Friction(
-        {
-            name: JointFriction(joint.viscous, joint.coulomb)
-            for name, joint in parameters.joints.items()
-        }
-    )

@@ -40,7 +40,6 @@ from bisect import bisect_right
 from collections import deque
 
 from linkage_ros.effects.stage import Reading
-from linkage_ros.tuples import new
 
 _Values = tuple[float, ...]
 
@@ -190,7 +189,7 @@ def _mixed(
         )
     else:
         joints = _line(s, x0, x1)
-    return new(Reading, (time, joints, _line(s, v0, v1), _line(s, a0, a1), _line(s, e0, e1)))
+    return Reading(time, joints, _line(s, v0, v1), _line(s, a0, a1), _line(s, e0, e1))
 
 
 def _cubic(s: float, x0: float, x1: float, way0: float, way1: float) -> float:

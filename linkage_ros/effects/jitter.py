@@ -106,7 +106,7 @@ class Jitter:
         history = self._history
         history.add(now, reading)
         found = history.between(max(now - self._earlier(), history.begin))
-        return None if found is None else restamped(found, reading[0])
+        return None if found is None else restamped(found, reading.stamp)
 
     def gap(self, now: int) -> None:
         """Take note that the linkage has no pose at a time, in [ns]; nothing is read."""

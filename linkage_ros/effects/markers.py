@@ -145,12 +145,11 @@ class Markers:
 
     def __call__(self, now: int, motion: Motion, _reading: Reading) -> bytes:
         """Return a message, b'' between two of them."""
-        slot = now * self._unit // self._per
-        if slot == self._slot:
+        if not self.due(now):
             return b''
-        self._slot = slot
-        _, position, _, _, efforts, reactions, _ = motion
-        full = self._due(now)
+        self._slot = now * self._unit // self._per
+        position = motion.position
+        full = self._still_due(now)
         write, shapes = self._full if full else self._moving, self._shapes
         closure = self._closure
         points, angles = closure.points(position), closure.link_angles(position)
@@ -169,24 +168,27 @@ class Markers:
             # A line has as many places from the start on.
             write.draw(marker, [*trail, *(place,) * (trail.maxlen or 0)][: trail.maxlen])
         for marker, drawn in zip(
-            shapes.forces, self._arrows.forces(points, reactions), strict=True
+            shapes.forces, self._arrows.forces(points, motion.reactions), strict=True
         ):
             _show(write, marker, drawn)
         for marker, drawn in zip(
             shapes.efforts,
-            self._arrows.efforts(self._inputs, points, angles, efforts),
+            self._arrows.efforts(self._inputs, points, angles, motion.efforts),
             strict=True,
         ):
             _show(write, marker, drawn)
         write.show(shapes.status, False)
         return write.message(now)
 
+    def due(self, now: int) -> bool:
+        """Return whether a message is due at a time, in [ns]."""
+        return now * self._unit // self._per != self._slot
+
     def no_pose(self, now: int, position: Position) -> bytes:
         """Return a message that there is no pose, b'' between two of them."""
-        slot = now * self._unit // self._per
-        if slot == self._slot:
+        if not self.due(now):
             return b''
-        self._slot = slot
+        self._slot = now * self._unit // self._per
         for trail in self._trails:
             trail.clear()
         said = f'{position.status.value}: no pose'
@@ -201,11 +203,11 @@ class Markers:
             else marker._replace(points=(), action=DELETE)
             for number, marker in enumerate(shapes.moving)
         ]
-        if self._due(now):
+        if self._still_due(now):
             markers += shapes.still
         return MarkerArrayWriter(self._frame, markers).message(now)
 
-    def _due(self, now: int) -> bool:
+    def _still_due(self, now: int) -> bool:
         """Return whether what does not move is due."""
         before, self._second = self._second, now // NANOSECONDS
         return before != self._second

@@ -42,7 +42,6 @@ from math import sqrt
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading, Sensor
 from linkage_ros.parameters import each, number
-from linkage_ros.tuples import new
 
 _Source = tuple[int, float, Callable[[float, float], float]]
 """Place of the joint, how strong its noise is, and what draws it: normal(mean, deviation)."""
@@ -114,8 +113,8 @@ class Noise:
 
     def __call__(self, now: int, reading: Reading) -> Reading:
         """Return the reading with noise."""
-        stamp, joints, rates, accelerations, efforts = reading
-        noisy = list(joints)
+        rates = reading.rates
+        noisy = list(reading.joints)
         for i, deviation, normal in self._white:
             noisy[i] += normal(0.0, deviation)
         if self._walk:
@@ -133,4 +132,4 @@ class Noise:
                 if speeds:
                     speeds[i] += drawn
             rates = tuple(speeds)
-        return new(Reading, (stamp, tuple(noisy), rates, accelerations, efforts))
+        return reading._replace(joints=tuple(noisy), rates=rates)

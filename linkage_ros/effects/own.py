@@ -160,10 +160,6 @@ def _check(name: str, module: ModuleType) -> None:
     own = [function for function in FUNCTIONS if hasattr(module, function)]
     if not own:
         raise DefinitionError(name, 'does nothing', f'define one of {listed(FUNCTIONS)}')
-    if hasattr(module, 'begin'):
-        raise DefinitionError(
-            name, 'has begin, and only velocity can begin a motion', 'define stage instead'
-        )
     topics = [key for key in ('TOPIC', 'MESSAGE', 'writer') if hasattr(module, key)]
     if topics and len(topics) < 3:
         raise DefinitionError(

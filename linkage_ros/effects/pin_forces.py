@@ -31,7 +31,6 @@ from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Reading, Stage, Writer
-from linkage_ros.tuples import new
 
 TOPIC = '~/pin_forces'
 MESSAGE = 'sensor_msgs/msg/MultiDOFJointState'
@@ -50,13 +49,11 @@ def stage(_parameters: PinForcesParameters, context: Context) -> Stage:
     solve = context.reactions.solve
 
     def pin_forces(motion: Motion) -> Motion:
-        crank, position, velocity, acceleration, efforts, _, shift = motion
+        velocity, acceleration = motion.velocity, motion.acceleration
         if velocity is None or acceleration is None:
             return motion
-        reactions = solve(position, velocity, acceleration)
-        if reactions is None:
-            return motion
-        return new(Motion, (crank, position, velocity, acceleration, efforts, reactions, shift))
+        reactions = solve(motion.position, velocity, acceleration)
+        return motion if reactions is None else motion._replace(reactions=reactions)
 
     return pin_forces
 
@@ -68,7 +65,6 @@ def writer(_parameters: PinForcesParameters, context: Context) -> Writer:
     write = PlanarWrenchWriter([context.prefix + name for name in context.reactions.names]).write
 
     def write_forces(now: int, motion: Motion, _reading: Reading) -> bytes:
-        reactions = motion[5]
-        return write(now, reactions) if reactions else b''
+        return write(now, motion.reactions) if motion.reactions else b''
 
     return write_forces

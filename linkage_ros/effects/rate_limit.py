@@ -100,7 +100,7 @@ class RateLimit:
         elif now < self._due:
             if not self._repeat:
                 return None
-            return restamped(held, reading[0])
+            return restamped(held, reading.stamp)
         unit, per = self._unit, self._per
         elapsed = now - self._begin
         following = ((2 * elapsed + 1) * unit - 1) // per + 1

@@ -28,8 +28,8 @@ and with what builds its part of the tick; which, says where in the tick it stan
 ``drive_stage(parameters, context) -> Callable[[CrankState], CrankState]``
     Between the drive and the crank.
 ``stage(parameters, context) -> Callable[[Motion], Motion]``
-    In the mechanism, once its loops are closed. All of these start from rates, so that `velocity`
-    stands before them and has ``begin`` instead, which makes the motion that they change.
+    In the mechanism, once its loops are closed. The first is `velocity`: all others start from
+    rates.
 ``sensor(parameters, context) -> Callable[[int, Reading], Reading | None]``
     Between the mechanism and the message: given the time of the tick, in [ns], and what is read
     so far, return what is read; None where nothing is. Where the linkage has no pose, or no crank,
@@ -46,14 +46,19 @@ An effect that publishes a message of its own has also
 ``writer(parameters, context) -> Callable[[int, Motion, Reading], bytes]``
     Build what writes the message, given the time of the tick, in [ns]; b'' where there is nothing
     to publish. It is asked only where there is a reading. Where it has a method
-    ``no_pose(now, position) -> bytes`` that is asked where the loop has no pose.
+    ``no_pose(now, position) -> bytes`` that is asked where the loop has no pose. Where it has a
+    method ``due(now) -> bool`` and that says no, it is not asked at all, and no motion is worked
+    out for it.
 
 A scene may also name a module of one's own, by its dotted name: see `linkage_ros.effects.own`.
+What a module, a sensor or a writer may leave out is looked up here alone: `Effect`, `SensorStage`
+and `WriterStage` say what stands in its place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from importlib import import_module
 from operator import add
 from types import ModuleType
@@ -61,10 +66,10 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
-from linkage_ros.tuples import new
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.reactions import Reaction
+    from linkage_ros.kinematics.linkage import Linkage
 
 EFFECTS = {
     # The mechanism as it was made.
@@ -207,22 +212,128 @@ class Reading(NamedTuple):
     efforts: tuple[float, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """
+    An effect: what its module has, and None or '' for what it has not.
+
+    Attributes
+    ----------
+    name
+        As a scene names it.
+    parameters
+        The type of its parameters.
+    alter, drive_stage, stage, sensor, writer
+        Its functions; see above.
+    topic, message
+        Of its own message.
+    of_reading
+        Whether that message is made of the reading alone.
+
+    """
+
+    name: str
+    parameters: Any
+    alter: Callable[..., Linkage] | None
+    drive_stage: Callable[..., DriveStage] | None
+    stage: Callable[..., Stage] | None
+    sensor: Callable[..., Sensor] | None
+    writer: Callable[..., Writer] | None
+    topic: str
+    message: str
+    of_reading: bool
+
+
+def effect_of(name: str) -> Effect:
+    """Import an effect and return it."""
+    module = module_of(name)
+    return Effect(
+        name,
+        parameters=module.PARAMETERS,
+        alter=getattr(module, 'alter', None),
+        drive_stage=getattr(module, 'drive_stage', None),
+        stage=getattr(module, 'stage', None),
+        sensor=getattr(module, 'sensor', None),
+        writer=getattr(module, 'writer', None),
+        topic=getattr(module, 'TOPIC', ''),
+        message=getattr(module, 'MESSAGE', ''),
+        of_reading=getattr(module, 'OF_READING', False),
+    )
+
+
+class SensorStage(NamedTuple):
+    """
+    A sensor in its place.
+
+    Attributes
+    ----------
+    read
+        Reads.
+    gap
+        Is told that the linkage has no pose, and returns what is read then; None where nothing is
+        and it need not be told.
+    silence
+        Is told that a sensor before it reads nothing, and whether since that one looks into a gap;
+        returns what is read then. None as above.
+
+    """
+
+    read: Sensor
+    gap: Callable[[int], Reading | None] | None
+    silence: Callable[[int, bool], Reading | None] | None
+
+    @classmethod
+    def of(cls, sensor: Sensor) -> SensorStage:
+        """Put a sensor in its place."""
+        return cls(sensor, getattr(sensor, 'gap', None), getattr(sensor, 'silence', None))
+
+    @property
+    def gap_begins(self) -> bool:
+        """Return whether the last gap that it was told of began there."""
+        return self.gap is not None and bool(self.read.gap_begins)  # type: ignore[attr-defined]
+
+
+class WriterStage(NamedTuple):
+    """
+    A writer of a message in its place.
+
+    Attributes
+    ----------
+    write
+        Writes the message.
+    no_pose
+        Writes it where the loop has no pose; None where nothing is published then.
+    due
+        Says whether there is anything to write at a time, in [ns]; None for always.
+    of_reading
+        Whether the message is made of the reading alone.
+
+    """
+
+    write: Writer
+    no_pose: Callable[[int, Position], bytes] | None
+    due: Callable[[int], bool] | None
+    of_reading: bool
+
+    @classmethod
+    def of(cls, writer: Writer, *, of_reading: bool) -> WriterStage:
+        """Put a writer in its place."""
+        return cls(
+            writer, getattr(writer, 'no_pose', None), getattr(writer, 'due', None), of_reading
+        )
+
+
 def restamped(reading: Reading, stamp: int) -> Reading:
     """Return a reading under another stamp, in [ns]."""
-    _, joints, rates, accelerations, efforts = reading
-    return new(Reading, (stamp, joints, rates, accelerations, efforts))
+    return reading._replace(stamp=stamp)
 
 
 def yielding(motion: Motion, moved: tuple[float, ...]) -> Motion:
     """Return a motion whose published joints have moved further, in [rad] or [m]."""
-    crank, position, velocity, acceleration, efforts, reactions, shift = motion
-    shift = tuple(map(add, shift, moved)) if shift else moved
-    return new(Motion, (crank, position, velocity, acceleration, efforts, reactions, shift))
+    return motion._replace(shift=tuple(map(add, motion.shift, moved)) if motion.shift else moved)
 
 
 DriveStage = Callable[[CrankState], CrankState]
-Begin = Callable[[CrankState, Position], Motion]
 Stage = Callable[[Motion], Motion]
 Sensor = Callable[[int, Reading], Reading | None]
 Writer = Callable[[int, Any, Reading], bytes]
-OpenWriter = Callable[[int, Position], bytes]

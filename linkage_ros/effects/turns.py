@@ -16,7 +16,7 @@
 """
 How a published angle runs: on beyond a turn, or wrapped.
 
-The closure knows an angle up to whole turns. `continuous` adds the turns that bring it nearest to
+The closure knows an angle up to whole turns. `Continuous` adds the turns that bring it nearest to
 what came last, so it takes steps of less than half a turn. It stands before the sensors, which may
 then mix and quantise what they get without a thought of wrapping; `all_wrapped` stands behind.
 """
@@ -25,18 +25,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from math import pi, remainder, tau
+from operator import add
 
 from linkage_ros.effects.stage import Reading, Sensor
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.tuples import new
+
+_NO_TURN = -0.0
+"""What changes no number that it is added to; 0.0 would make −0.0 another."""
 
 Begin = Callable[[float], float]
 """Returns the turn of an angle that is published first."""
 
 
-def continuous(turning: Sequence[bool], begins: Mapping[int, Begin] | None = None) -> Sensor:
+class Continuous:
     """
-    Build what lets angles run on without jumps; the first lies in (−π, π].
+    Lets angles run on without jumps; the first lies in (−π, π].
 
     Parameters
     ----------
@@ -45,34 +48,46 @@ def continuous(turning: Sequence[bool], begins: Mapping[int, Begin] | None = Non
     begins
         For joints that begin elsewhere, by their numbers, where.
 
+    Attributes
+    ----------
+    places
+        Numbers of the joints that are angles.
+    raw
+        The joints as they came last; empty before the first.
+    added
+        What is added to each: whole turns, in [rad].
+
     """
-    begin = {i: wrapped for i, turns in enumerate(turning) if turns} | dict(begins or {})
-    places = tuple(i for i, turns in enumerate(turning) if turns)
-    raw: tuple[float, ...] = ()
-    """The angles as they came last."""
-    added: list[int] = []
-    """What is added to them, in turns; nothing where it is 0 for all."""
 
-    def run_on(_now: int, reading: Reading) -> Reading:
-        nonlocal raw, added
-        joints = reading[1]
+    __slots__ = ('_begin', '_turns', 'added', 'places', 'raw')
+
+    def __init__(self, turning: Sequence[bool], begins: Mapping[int, Begin] | None = None) -> None:
+        self.places = tuple(i for i, turns in enumerate(turning) if turns)
+        self._begin = dict.fromkeys(self.places, wrapped) | dict(begins or {})
+        self._turns = [0] * len(turning)
+        self.raw: tuple[float, ...] = ()
+        self.added = (_NO_TURN,) * len(turning)
+
+    def __call__(self, _now: int, reading: Reading) -> Reading:
+        """Return a reading with the turns that its angles have made."""
+        joints, raw = reading.joints, self.raw
+        self.raw = joints
         if raw:
-            for i in places:
-                if not -pi < raw[i] - joints[i] < pi:
-                    added = _followed(added, raw, joints, places)
-                    break
-            raw = joints
-            if not added:
-                return reading
-            now = [v + n * tau if n else v for v, n in zip(joints, added, strict=True)]
-        else:
-            raw = joints
-            now = [begin[i](v) if i in places else v for i, v in enumerate(joints)]
-            added = _turns([round((w - v) / tau) for w, v in zip(now, joints, strict=True)])
-        stamp, _, rates, accelerations, efforts = reading
-        return new(Reading, (stamp, tuple(now), rates, accelerations, efforts))
+            if not all(-pi < raw[i] - joints[i] < pi for i in self.places):
+                self._turn({i: raw[i] for i in self.places}, joints)
+            return reading._replace(joints=tuple(map(add, joints, self.added)))
+        first = {i: begin(joints[i]) for i, begin in self._begin.items()}
+        self._turn(first, joints)
+        # Just as they begin: to add turns may round.
+        began = tuple(first.get(i, value) for i, value in enumerate(joints))
+        return reading._replace(joints=began)
 
-    return run_on
+    def _turn(self, last: Mapping[int, float], joints: Sequence[float]) -> None:
+        """Add the turns that bring joints nearest to where they were last."""
+        for i, value in last.items():
+            if not -pi < value - joints[i] < pi:
+                self._turns[i] += round((value - joints[i]) / tau)
+        self.added = tuple(n * tau if n else _NO_TURN for n in self._turns)
 
 
 def beginnings(closure: Closure) -> dict[int, Begin]:
@@ -92,21 +107,6 @@ def beginnings(closure: Closure) -> dict[int, Begin]:
     return found
 
 
-def _followed(
-    added: list[int], raw: tuple[float, ...], joints: tuple[float, ...], places: Sequence[int]
-) -> list[int]:
-    """Return the turns that take back the jumps since the last reading too."""
-    turns = added or [0] * len(joints)
-    for i in places:
-        if not -pi < raw[i] - joints[i] < pi:
-            turns[i] += round((raw[i] - joints[i]) / tau)
-    return _turns(turns)
-
-
-def _turns(turns: list[int]) -> list[int]:
-    return turns if any(turns) else []
-
-
 def all_wrapped(turning: Sequence[bool]) -> Sensor:
     """
     Build what wraps angles to (−π, π].
@@ -120,9 +120,8 @@ def all_wrapped(turning: Sequence[bool]) -> Sensor:
     turns = tuple(turning)
 
     def wrap(_now: int, reading: Reading) -> Reading:
-        stamp, joints, rates, accelerations, efforts = reading
-        now = [wrapped(v) if turn else v for v, turn in zip(joints, turns, strict=True)]
-        return new(Reading, (stamp, tuple(now), rates, accelerations, efforts))
+        now = [wrapped(v) if turn else v for v, turn in zip(reading.joints, turns, strict=True)]
+        return reading._replace(joints=tuple(now))
 
     return wrap
 

@@ -23,10 +23,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from linkage_ros.drives.drive import Context, CrankState
-from linkage_ros.effects.stage import Begin, Motion
-from linkage_ros.kinematics.closure import Position
-from linkage_ros.tuples import new
+from linkage_ros.drives.drive import Context
+from linkage_ros.effects.stage import Motion, Stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +35,14 @@ class VelocityParameters:
 PARAMETERS = VelocityParameters
 
 
-def begin(_parameters: VelocityParameters, context: Context) -> Begin:
-    """Build what begins a motion."""
+def stage(_parameters: VelocityParameters, context: Context) -> Stage:
+    """Build the stage."""
     velocity_of = context.closure.velocity
 
-    def velocity(crank: CrankState, position: Position) -> Motion:
-        found = velocity_of(position, *crank[1]) if position[0].has_rates else None
-        return new(Motion, (crank, position, found, None, (), (), ()))
+    def velocity(motion: Motion) -> Motion:
+        position = motion.position
+        if not position.status.has_rates:
+            return motion
+        return motion._replace(velocity=velocity_of(position, *motion.crank.rates))
 
     return velocity

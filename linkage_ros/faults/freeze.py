@@ -71,7 +71,7 @@ class Freeze:
         if not self._switch.on:
             self._last = reading
             return reading
-        return None if self._last is None else restamped(self._last, reading[0])
+        return None if self._last is None else restamped(self._last, reading.stamp)
 
     def gap(self, now: int) -> Reading | None:
         """Return the last reading before it hung, stamped now, in [ns]; nothing else."""

@@ -28,7 +28,6 @@ from dataclasses import dataclass
 from linkage_ros.effects.stage import Reading, Sensor
 from linkage_ros.faults.fault import Switch
 from linkage_ros.parameters import name
-from linkage_ros.tuples import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,13 +53,15 @@ def sensor(parameters: StuckParameters, switch: Switch, joints: Sequence[str]) -
 
     def stuck(_now: int, reading: Reading) -> Reading | None:
         nonlocal held
-        stamp, positions, rates, accelerations, efforts = reading
         if not switch.on:
-            held = positions[place]
+            held = reading.joints[place]
             return reading
         if held is None:
             return None
-        read = with_one(positions, held), with_one(rates, 0.0), with_one(accelerations, 0.0)
-        return new(Reading, (stamp, *read, efforts))
+        return reading._replace(
+            joints=with_one(reading.joints, held),
+            rates=with_one(reading.rates, 0.0),
+            accelerations=with_one(reading.accelerations, 0.0),
+        )
 
     return stuck

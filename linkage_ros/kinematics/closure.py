@@ -48,6 +48,7 @@ from linkage_ros.kinematics.structure import Structure
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Batch
+    from linkage_ros.kinematics.compiled.linkage import Compiled
     from linkage_ros.kinematics.compiled.solve import Solver
     from linkage_ros.kinematics.follower import Follower
     from numpy.typing import ArrayLike
@@ -177,6 +178,7 @@ class Closure:
         self.bounds = Bounds(linkage)
         """The limits between which its joints stay."""
         self._keep_limits()
+        self._compiled: dict[int, Compiled] = {}
 
     def _keep_limits(self) -> None:
         """Let positions tell of limits; where there are none, nothing is asked at any."""
@@ -285,6 +287,24 @@ class Closure:
         for step, pose, rate in zip(self.steps, position.poses, velocity.rates, strict=True):
             step.accelerations(pose, rate, position.state, velocity.state, changes)
         return Acceleration(self._joints(a), changes)
+
+    def compiled(self, derivatives: int) -> Compiled:
+        """
+        Return the linkage compiled for its published joints; it is compiled once.
+
+        Parameters
+        ----------
+        derivatives
+            Positions (0), velocities too (1), and accelerations (2).
+
+        """
+        from linkage_ros.kinematics.compiled.linkage import (  # local import: it traces closures
+            Compiled,
+        )
+
+        if derivatives not in self._compiled:
+            self._compiled[derivatives] = Compiled(self, derivatives)
+        return self._compiled[derivatives]
 
     def solve(
         self,

@@ -29,8 +29,7 @@ from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.linkage import Input
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.status import Status
-from linkage_ros.line import Line
-from linkage_ros.look import Look
+from linkage_ros.pipeline import Line, Look
 from linkage_ros.ros.run_snapshots import RunSnapshots
 from linkage_ros.ros.tick_loop import Counts, TickLoop
 
@@ -267,14 +266,15 @@ class Health:
             'Ticks indeterminate': counts.unclosed[Status.INDETERMINATE],
             'Gap when last open (m)': f'{last.gap:.6g}' if last is not None else '0',
         }
+        looks = [*zip(counts.last.lines, counts.last.looks, strict=True)] if counts.last else []
         posed = [
             (line, look.position)
-            for line, look in zip(lines, counts.last.looks if counts.last else (), strict=False)
+            for line, look in looks
             if look.position is not None and look.position.joints
         ]
         if posed:
             if len(lines) == 1:
-                values |= self._inputs()
+                values |= _inputs(*looks[0])
             line, worst = max(
                 ((line, line.closure.residual(position)) for line, position in posed),
                 key=itemgetter(1),
@@ -284,46 +284,11 @@ class Health:
             values |= near
             if warning and level == OK:
                 level, message = WARN, warning
-        shares, warning = self._shares()
+        shares, warning = _shares(looks)
         values |= shares
         if warning and level == OK:
             level, message = WARN, warning
         return self._status('loop closure', level, message, values)
-
-    def _shares(self) -> tuple[dict[str, str], str]:
-        """Return what of its limits each joint takes at the last tick, and what is too much."""
-        values, warnings = {}, []
-        last = self.loop.counts.last
-        for line, look in zip(self.loop.pipeline.lines, last.looks if last else (), strict=False):
-            for name, (rate, effort) in _exertions(line, look).items():
-                limits = line.member.linkage.limits[name]
-                for what, value, most in (
-                    ('Velocity', rate, limits.velocity),
-                    ('Effort', effort, limits.effort),
-                ):
-                    if value is None or most == inf:
-                        continue
-                    values[f'{what} of {line.member.prefix}{name}, of its limit'] = (
-                        f'{abs(value) / most:.4g}'
-                    )
-                    if abs(value) > most:
-                        warnings.append(
-                            f'{what} of {line.member.prefix}{name} is {abs(value):.6g}, '
-                            f'its limit {most:.6g}'
-                        )
-        return values, '; '.join(warnings)
-
-    def _inputs(self) -> dict[str, str]:
-        """Return the inputs of the only linkage."""
-        (line,) = self.loop.pipeline.lines
-        last = self.loop.counts.last
-        crank = last.looks[0].crank if last else None
-        return {
-            f'Input {driven.joint} ({_unit(driven)})': f'{angle:.6f}'
-            for driven, angle in zip(
-                line.member.linkage.inputs, crank.angles if crank else (), strict=False
-            )
-        }
 
     def _nearness(self, posed: Sequence[tuple[Line, Position]]) -> tuple[dict[str, str], str]:
         """Return how near trouble the linkage is that is nearest, and what there is to warn."""
@@ -423,6 +388,34 @@ class Health:
 def no_clock(silence: float) -> str:
     """Return that ``/clock`` has been silent for a time, in [s]."""
     return 'No /clock yet' if silence == inf else f'No /clock for {silence:.1f} s'
+
+
+def _shares(looks: Sequence[tuple[Line, Look]]) -> tuple[dict[str, str], str]:
+    """Return what of its limits each joint takes at the last tick, and what is too much."""
+    values, warnings = {}, []
+    for line, look in looks:
+        for name, (rate, effort) in _exertions(line, look).items():
+            limits = line.member.linkage.limits[name]
+            for what, value, most in (
+                ('Velocity', rate, limits.velocity),
+                ('Effort', effort, limits.effort),
+            ):
+                if value is None or most == inf:
+                    continue
+                joint = f'{line.member.prefix}{name}'
+                values[f'{what} of {joint}, of its limit'] = f'{abs(value) / most:.4g}'
+                if abs(value) > most:
+                    warnings.append(f'{what} of {joint} is {abs(value):.6g}, its limit {most:.6g}')
+    return values, '; '.join(warnings)
+
+
+def _inputs(line: Line, look: Look) -> dict[str, str]:
+    """Return the inputs of the only linkage."""
+    angles = look.crank.angles if look.crank is not None else ()
+    return {
+        f'Input {driven.joint} ({_unit(driven)})': f'{angle:.6f}'
+        for driven, angle in zip(line.member.linkage.inputs, angles, strict=False)
+    }
 
 
 def _exertions(line: Line, look: Look) -> dict[str, tuple[float | None, float | None]]:

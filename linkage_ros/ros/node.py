@@ -46,7 +46,7 @@ from linkage_ros.ros.real_time import RealTime
 from linkage_ros.ros.run_recording import RunRecording
 from linkage_ros.ros.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
 from linkage_ros.ros.simulated_time import ClockGuard
-from linkage_ros.ros.tick_loop import DIAGNOSTICS, Pace, TickLoop
+from linkage_ros.ros.tick_loop import Pace, TickLoop
 from linkage_ros.ros.transports import standstill
 from linkage_ros.ros.warnings import Warnings
 from linkage_ros.scene.load import load_scene
@@ -275,16 +275,17 @@ class LinkageNode(LifecycleNode):
         )
 
     def _bag_topics(self) -> list[tuple[str, Topic]]:
-        """Describe what is recorded, in the order of the tick's topic numbers."""
-        joint_states = self._joint_states
-        topics = [
-            (
-                'joint_states_topic',
-                bag_topic(joint_states.topic_name, JointState, joint_states.qos_profile),
-            ),
-            ('diagnostics_topic', bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS)),
-        ]
-        return topics + self._scene_topics.described()
+        """Describe what is recorded, in the order of the handles."""
+        assert self.loop is not None
+        handles, states = self.loop.topics, self._joint_states
+        joint_states = bag_topic(states.topic_name, JointState, states.qos_profile)
+        diagnostics = bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS)
+        topics = {
+            handles.joint_states: ('joint_states_topic', joint_states),
+            handles.diagnostics: ('diagnostics_topic', diagnostics),
+            **self._scene_topics.described(handles),
+        }
+        return [topics[handle] for handle in sorted(topics)]
 
     # Services.
 
@@ -432,7 +433,9 @@ class LinkageNode(LifecycleNode):
         data = serialize_message(message)
         self._diagnostics.publish(data)
         if self.loop.recorder is not None:
-            self.loop.recorder.offer(DIAGNOSTICS, clock.nanoseconds, clock.nanoseconds, data)
+            self.loop.recorder.offer(
+                self.loop.topics.diagnostics, clock.nanoseconds, clock.nanoseconds, data
+            )
 
     def _crank_publishers(self) -> list[str]:
         """Return who else publishes on the drives' topic."""

@@ -42,7 +42,7 @@ from linkage_ros.bag.writing.snapshot import SnapshotMemory
 from linkage_ros.bag.writing.storage import Storage
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.errors import RecordingError
-from linkage_ros.line import Line
+from linkage_ros.pipeline import Line
 from linkage_ros.replay import own_effects_here
 from linkage_ros.ros.run_snapshots import (
     Answer,
@@ -109,7 +109,7 @@ class RunRecording:
         directory
             Where the bag's folder is made; '' for where the scene says.
         topics
-            Returns what will be recorded, in the order of the tick's topic numbers, each with the
+            Returns what will be recorded, in the order of their handles, each with the
             key under which the bag's account of the run names it; that of several names a list.
         description
             The message of the topic `DESCRIPTION`, with which each file begins; empty for none.

@@ -26,6 +26,7 @@ from linkage_ros.cdr import text_message
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import change_text
 from linkage_ros.ros.bag_topics import bag_topic, message_type
+from linkage_ros.ros.recorded_topics import RecordedTopics
 from linkage_ros.ros.run_recording import DESCRIPTION, EXTRA
 from linkage_ros.ros.tick_loop import Take
 from linkage_ros.scene.scene import Scene
@@ -79,7 +80,6 @@ class SceneTopics:
         self.description = b''
         """The message with the robot model, serialized; empty where the scene asks for none."""
         self._injectors: list[Any] = []
-        self._withholds = False
         self.extras: list[Publisher] = []
         """Publishers of the pipeline's extras."""
         self._crank_name = ''
@@ -98,7 +98,6 @@ class SceneTopics:
         """
         self.disconnect()
         node, overridable = self._node, QoSOverridingOptions.with_default_policies()
-        self._withholds = pipeline.withholds
         for extra in pipeline.extras:
             self.extras.append(
                 node.create_publisher(
@@ -188,34 +187,31 @@ class SceneTopics:
         self._changes.handle.publish_raw(message)
         return message
 
-    def described(self) -> list[tuple[str, Topic]]:
-        """Describe the topics for a bag, in the order of the tick's numbers."""
-        node, topics = self._node, []
-        if self.crank_topic:
+    def described(self, handles: RecordedTopics) -> dict[int, tuple[str, Topic]]:
+        """Describe the topics for a bag, by their handles."""
+        node, topics = self._node, {}
+        if handles.crank is not None:
             publishers = self.crank_publishers
             qos = publishers[0].qos_profile if publishers else CRANK_QOS
-            topics.append(('crank_topic', bag_topic(self.crank_topic, JointState, qos)))
-        if (changes := self._changes) is not None:
-            topics.append(
-                ('faults_topic', bag_topic(changes.topic_name, changes.msg_type, _CHANGES_QOS))
-            )
+            topics[handles.crank] = 'crank_topic', bag_topic(self.crank_topic, JointState, qos)
+        if handles.faults is not None and (changes := self._changes) is not None:
+            described = bag_topic(changes.topic_name, changes.msg_type, _CHANGES_QOS)
+            topics[handles.faults] = 'faults_topic', described
         # For the replay alone: on the graph there is nothing to say of these.
         time_type = message_type('builtin_interfaces/msg/Time', 'record')
         withheld, resets = (
             bag_topic(f'{node.get_fully_qualified_name()}/{name}', time_type, OUTPUT_QOS)
             for name in ('withheld', 'resets')
         )
-        if self._withholds:
-            topics.append(('withheld_topic', withheld))
-        topics += [
-            (EXTRA, bag_topic(extra.topic_name, extra.msg_type, extra.qos_profile))
-            for extra in self.extras
-        ]
-        topics.append(('resets_topic', resets))
+        if handles.withheld is not None:
+            topics[handles.withheld] = 'withheld_topic', withheld
+        for handle, extra in zip(handles.extras, self.extras, strict=True):
+            described = bag_topic(extra.topic_name, extra.msg_type, extra.qos_profile)
+            topics[handle] = EXTRA, described
+        topics[handles.resets] = 'resets_topic', resets
         if (model := self._description) is not None:
-            # Last: no tick publishes it, so that it has none of the tick's numbers.
             described = bag_topic(model.topic_name, model.msg_type, _DESCRIPTION_QOS)
-            topics.append((DESCRIPTION, described))
+            topics[handles.description] = DESCRIPTION, described
         return topics
 
 

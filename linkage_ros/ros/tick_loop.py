@@ -34,19 +34,12 @@ from linkage_ros.cdr import time_message
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.status import Status
-from linkage_ros.pipeline import Pipeline, Tick
+from linkage_ros.pipeline import Look, Pipeline, Tick
 from linkage_ros.ros.duration_histogram import DurationHistogram
+from linkage_ros.ros.recorded_topics import recorded_topics
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Change, Injection
-
-JOINT_STATES, DIAGNOSTICS = range(2)
-"""
-The recorder's first topics. Where there are such, the crank's follows, those of the faults and of
-the ticks without a message, and those of the pipeline's extras. The last is that of the resets.
-"""
-
-_CLOSED = Status.CLOSED
 
 _LONGEST_DRAIN = 20_000_000
 """How long a tick takes messages at most, in [ns]: huge ones, each read for the first time."""
@@ -135,13 +128,9 @@ class TickLoop:
         self._pipeline = build()
         self.injection = self._pipeline.injection
         self._publish_change = publish_change
-        self._crank_number = DIAGNOSTICS + 1
-        self._change_number = self._crank_number + (take is not None)
-        self._withheld_number = self._change_number + (self.injection is not None)
-        self._withholds = self._pipeline.withholds
-        first = self._withheld_number + self._withholds
-        self._publish_extras = tuple(enumerate(publish_extras, first))
-        self._reset_number = first + len(self._publish_extras)
+        self.topics = recorded_topics(self._pipeline)
+        """The handles by which it offers messages to the recorder."""
+        self._publish_extras = tuple(zip(self.topics.extras, publish_extras, strict=True))
         self._stopping = Event()
         self._thread: Thread | None = None
         self.counts = Counts()
@@ -216,8 +205,9 @@ class TickLoop:
             if 0 < self._sequence < number:  # else it is the first, or of a publisher begun anew
                 counts.missed += number - self._sequence - 1
             self._sequence = number
-        if (recorder := self.recorder) is not None:  # another thread takes it away
-            recorder.offer(self._crank_number, now, info['source_timestamp'], message)
+        recorder, topic = self.recorder, self.topics.crank  # another thread takes it away
+        if recorder is not None and topic is not None:
+            recorder.offer(topic, now, info['source_timestamp'], message)
         rejection = self._pipeline.offer(message, now)
         if rejection is None:
             return True
@@ -291,7 +281,7 @@ class TickLoop:
         if (recorder := self.recorder) is not None:
             # Where the clock jumps back after ticks of which nothing is recorded, the times in the
             # bag go on.
-            recorder.offer(self._reset_number, now, now, time_message(now))
+            recorder.offer(self.topics.resets, now, now, time_message(now))
         self._pipeline = self._build()
 
     def _inject(self, injection: Injection, now: int) -> int:
@@ -301,40 +291,47 @@ class TickLoop:
         for change in changes:
             if self._publish_change is not None:
                 message = self._publish_change(change)
-                if (recorder := self.recorder) is not None:
-                    recorder.offer(self._change_number, now, now, message)
+                recorder, topic = self.recorder, self.topics.faults
+                if recorder is not None and topic is not None:
+                    recorder.offer(topic, now, now, message)
         return now
 
     def _tick(self, now: int, at: int) -> None:
         """Solve now for a time, both in [ns]; publish, record and count."""
         counts = self.counts
         counts.last = tick = self._pipeline.tick(at)
-        looks, message, extras = tick
+        message, extras = tick.message, tick.extras
         recorder = self.recorder
         if message:
             self._publish(message)
             if recorder is not None:
-                recorder.offer(JOINT_STATES, now, at, message)
+                recorder.offer(self.topics.joint_states, now, at, message)
             counts.published += 1
         # Of a linkage without a pose there may be an extra, which then tells of the tick.
         if extras:
-            for (number, publish), extra in zip(self._publish_extras, extras, strict=True):
+            for (topic, publish), extra in zip(self._publish_extras, extras, strict=True):
                 if extra:
                     publish(extra)
                     if recorder is not None:
-                        recorder.offer(number, now, at, extra)
+                        recorder.offer(topic, now, at, extra)
         elif message or recorder is None:
             pass
-        elif self._withholds and self._pipeline.remembers(tick):
-            recorder.offer(self._withheld_number, now, at, time_message(at))
+        elif (withheld := self.topics.withheld) is not None and self._pipeline.remembers(tick):
+            recorder.offer(withheld, now, at, time_message(at))
         counts.ticks += 1
-        for number, (_, position, _, reading) in enumerate(looks):
+        for number, one in enumerate(tick.seen):
+            if not isinstance(one, Look):
+                _, reading = one
+                counts.withheld += reading is None
+                continue
+            position = one.position
             if position is None:
                 counts.silent += 1
-            elif position[0] is not _CLOSED:
-                counts.unclosed[position[0]] += 1
-                counts.last_unclosed[position[0]] = number, position
-            if reading is None and position is not None and position[2]:
+                continue
+            if position.status is not Status.CLOSED:
+                counts.unclosed[position.status] += 1
+                counts.last_unclosed[position.status] = number, position
+            if one.reading is None and position.joints:
                 counts.withheld += 1
 
     def _guarded(self, pace: Pace) -> None:

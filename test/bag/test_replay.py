@@ -80,7 +80,8 @@ class Run:
         self.pipeline.offer(message, now)
 
     def tick(self, now: int, at: int, drop: str = '') -> None:
-        _, message, extras = self.pipeline.tick(at)
+        tick = self.pipeline.tick(at)
+        message, extras = tick.message, tick.extras
         if message and drop != 'joint state':
             self.recorder.offer(1, now, at, message)
             self.published.append(message)

@@ -52,6 +52,7 @@ def test_table_is_the_same_as_text_and_as_markdown():
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_latency_is_measured_against_the_relay(tmp_path):
     kept = _bench(tmp_path, '--only', 'c')
@@ -64,6 +65,7 @@ def test_latency_is_measured_against_the_relay(tmp_path):
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_ticks_are_measured_against_the_bare_loop(tmp_path):
     kept = _bench(tmp_path, '--only', 'b')
@@ -74,6 +76,7 @@ def test_ticks_are_measured_against_the_bare_loop(tmp_path):
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_ticks_are_measured_against_the_idiomatic_node(tmp_path):
     kept = _bench(tmp_path, '--only', 'a')
@@ -82,6 +85,7 @@ def test_ticks_are_measured_against_the_idiomatic_node(tmp_path):
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_a_hundred_linkages_are_measured(tmp_path):
     cells = _row(_bench(tmp_path, '--only', 'many'), '100 four-bars in one node, 1 kHz')
@@ -89,6 +93,7 @@ def test_a_hundred_linkages_are_measured(tmp_path):
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_ticks_under_load_are_measured_with_and_without_what_the_system_gives(tmp_path):
     kept = _bench(tmp_path, '--only', 'real_time')
@@ -99,6 +104,7 @@ def test_ticks_under_load_are_measured_with_and_without_what_the_system_gives(tm
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_subscribers_that_come_and_go_are_measured_for_each_way_to_carry_messages(tmp_path):
     kept = _bench(tmp_path, '--only', 'comers')

@@ -23,7 +23,7 @@ from pathlib import Path
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.effects import velocity
-from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.effects.stage import EFFECTS, Motion
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml
@@ -65,8 +65,8 @@ def moved(within, crank, effects):
 
     """
     state = CrankState(*((value,) for value in crank), 0)
-    motion = velocity.begin(velocity.PARAMETERS(), within)(
-        state, within.closure.position(crank[0])
+    motion = velocity.stage(velocity.PARAMETERS(), within)(
+        Motion(state, within.closure.position(crank[0]), None, None, (), (), ())
     )
     for effect in EFFECTS:
         if effect == 'acceleration' or effect in effects:

@@ -50,7 +50,9 @@ def moved(loop, angle, rate, alpha=0.0):
     position = loop.position(angle)
     crank = CrankState((angle,), (rate,), (alpha,), 0)
     context = Context(loop, 1000.0, True, 'seed', None, None)
-    motion = velocity.begin(velocity.PARAMETERS(), context)(crank, position)
+    motion = velocity.stage(velocity.PARAMETERS(), context)(
+        Motion(crank, position, None, None, (), (), ())
+    )
     return acceleration.stage(acceleration.PARAMETERS(), context)(motion)
 
 

@@ -48,7 +48,7 @@ def test_a_scene_names_pins_and_sliders():
     assert parameters == FrictionParameters(
         {'A': OneJoint(viscous=0.002), 'B': OneJoint(coulomb=0.1), 'cylinder': OneJoint(3.0, 4.0)}
     )
-    assert friction.friction(parameters) == Friction(
+    assert parameters.friction == Friction(
         {
             'A': JointFriction(0.002, 0.0),
             'B': JointFriction(0.0, 0.1),
@@ -75,7 +75,7 @@ def test_what_is_wrong_is_said_in_one_line(text, message):
 @pytest.mark.parametrize('rate', [5.0, -5.0])
 def test_a_cylinder_that_rubs_takes_that_much_more_power(rate):
     # The piston's rate is the slope of its place over time: the rod's pin on its line.
-    rubbing = friction.friction(read('joints: {cylinder: {viscous: 3, coulomb: 4}}'))
+    rubbing = read('joints: {cylinder: {viscous: 3, coulomb: 4}}').friction
     with_it, without = (
         moved(context(SLIDER_CRANK, by), (1.0, rate, 7.0), {'effort': ()})
         for by in (rubbing, None)

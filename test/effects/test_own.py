@@ -254,7 +254,6 @@ REFUSED = {
         HEAD + "AFTER = 'bias'\n",
         f'does nothing; define one of {", ".join(FUNCTIONS)}',
     ),
-    'the beginning': (HEAD + ADD + 'begin = sensor\n', 'has begin, and only velocity can'),
     'a place that is none': (
         HEAD + ADD.replace("'bias'", "'bais'"),
         "AFTER is 'bais': that is no effect; did you mean 'bias'?",

@@ -23,7 +23,7 @@ from math import nextafter, pi, tau
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.effects.stage import Reading
-from linkage_ros.effects.turns import all_wrapped, continuous, wrapped
+from linkage_ros.effects.turns import all_wrapped, Continuous, wrapped
 import pytest
 
 EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')
@@ -38,7 +38,7 @@ def reading(*joints):
 @given(st.lists(steps, min_size=1, max_size=60), st.floats(-pi, pi))
 def test_continuous_follows_from_any_turns(moves, start):
     # What the loop knows of an angle is the angle up to turns.
-    stage = continuous([True])
+    stage = Continuous([True])
     angle = wrapped(start)
     assert stage(0, reading(angle)).joints == (angle,)
     for move in moves:
@@ -48,14 +48,14 @@ def test_continuous_follows_from_any_turns(moves, start):
 
 @given(st.floats(-1e6, 1e6))
 def test_the_first_angle_is_wrapped(angle):
-    (first,) = continuous([True])(0, reading(angle)).joints
+    (first,) = Continuous([True])(0, reading(angle)).joints
     assert -pi < first <= pi
     assert first == wrapped(angle)
 
 
 @given(st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=20))
 def test_a_step_is_never_more_than_half_a_turn(angles):
-    stage = continuous([True])
+    stage = Continuous([True])
     last = None
     for angle in angles:
         (now,) = stage(0, reading(angle)).joints
@@ -66,7 +66,7 @@ def test_a_step_is_never_more_than_half_a_turn(angles):
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=20))
 def test_slides_are_left_alone(lengths):
-    for stage in (continuous([False, True]), all_wrapped([False, True])):
+    for stage in (Continuous([False, True]), all_wrapped([False, True])):
         for length in lengths:
             assert stage(0, reading(length, length)).joints[0] == length
 
@@ -101,7 +101,7 @@ def test_wrapped_at_the_edge(angle, rest):
 
 
 def test_many_turns_add_up_without_drift():
-    stage = continuous([True])
+    stage = Continuous([True])
     for step in range(100_001):
         (now,) = stage(0, reading(wrapped(step * 1.0))).joints
     # The last is exact up to the rounding of tau, 2.4e-16, for each of 15915 turns.
@@ -110,5 +110,5 @@ def test_many_turns_add_up_without_drift():
 
 def test_the_rest_of_the_motion_is_passed_on():
     rest = (1.0, 2.0), (3.0, 4.0), (5.0, 0.0)
-    for stage in (continuous([True, False]), all_wrapped([True, False])):
+    for stage in (Continuous([True, False]), all_wrapped([True, False])):
         assert stage(9, Reading(7, (0.5, 0.5), *rest)) == (7, (0.5, 0.5), *rest)

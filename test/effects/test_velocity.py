@@ -23,7 +23,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import velocity
-from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.effects.stage import EFFECTS, Motion
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.parameters import declared
@@ -47,7 +47,8 @@ def moved(loop, angle, rate):
     position = loop.position(angle)
     crank = CrankState((angle,), (rate,), (0.0,), 0)
     context = Context(loop, 1000.0, True, 'seed', None, None)
-    return velocity.begin(velocity.VelocityParameters(), context)(crank, position)
+    stage = velocity.stage(velocity.VelocityParameters(), context)
+    return stage(Motion(crank, position, None, None, (), (), ()))
 
 
 @given(st.floats(-10.0, 10.0), st.floats(-100.0, 100.0))

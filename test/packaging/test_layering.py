@@ -27,7 +27,7 @@ PACKAGE = 'linkage_ros'
 # Rooms by height: a room may import from below its own height, and from its neighbours as long
 # as no two import each other.
 HEIGHTS = (
-    ('errors', 'stop', 'regular_file', 'tuples', 'parameters', 'bounded_yaml'),
+    ('errors', 'stop', 'regular_file', 'written', 'parameters', 'bounded_yaml'),
     ('whole_file',),
     ('kinematics', 'shipped', 'cdr', 'bag', 'page'),
     ('joint_state', 'synthesis', 'dynamics', 'drawing', 'solvers', 'models'),
@@ -35,8 +35,7 @@ HEIGHTS = (
     ('drives',),
     ('effects',),
     ('faults',),
-    ('scene', 'look', 'routes'),
-    ('line',),
+    ('scene', 'straight_tick', 'routes'),
     ('pipeline',),
     ('replay', 'cost', 'accuracy'),
     ('report',),

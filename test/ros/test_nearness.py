@@ -41,7 +41,6 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
     position = SimpleNamespace(status=None, gap=0.1, joints=(1.0,))
     crank = SimpleNamespace(angles=(0.25,) * len(inputs), rates=(1.0,) * len(inputs))
     look = SimpleNamespace(crank=crank, position=position, reading=None)
-    counts.last = SimpleNamespace(looks=(look,))
     counts.last_unclosed[position.status] = 0, position
     closure = SimpleNamespace(
         input_ranges=(),
@@ -51,11 +50,9 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
         ),
     )
     member = SimpleNamespace(name='', linkage=SimpleNamespace(inputs=inputs, joints={}, limits={}))
-    pipeline = SimpleNamespace(
-        lines=[SimpleNamespace(member=member, closure=closure, drive=None)],
-        max_age=1,
-        newest_stamp=0,
-    )
+    lines = [SimpleNamespace(member=member, closure=closure, drive=None)]
+    counts.last = SimpleNamespace(lines=lines, looks=(look,))
+    pipeline = SimpleNamespace(lines=lines, max_age=1, newest_stamp=0)
     loop = SimpleNamespace(
         counts=counts,
         pipeline=pipeline,

@@ -75,10 +75,10 @@ def test_a_scene_runs_with_it(name: str) -> None:
     closure = plain.lines[0].closure
     for number in range(3000):
         now = BEGIN + number * 1_000_000
-        (look,), message, extras = pipeline.tick(now)
-        (expected,), _, _ = plain.tick(now)
-        assert message
-        assert all(extras)
+        tick = pipeline.tick(now)
+        (look,), (expected,) = tick.looks, plain.tick(now).looks
+        assert tick.message
+        assert all(tick.extras)
         assert apart(closure, look.reading.joints, expected.reading.joints) <= 1e-6
         assert look.reading.rates == pytest.approx(expected.reading.rates, abs=1e-3)
         assert look.reading.accelerations == pytest.approx(expected.reading.accelerations, abs=0.1)

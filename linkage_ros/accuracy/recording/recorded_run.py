@@ -191,10 +191,10 @@ def _tick(
             if recorder:
                 recorder.offer(0, now, now, sample)
             pipeline.offer(sample, now)
-        _, message, extras = pipeline.tick(now)
-        if recorder and message:
-            recorder.offer(crank, now, now, message)
-            for topic, extra in enumerate(extras, crank + 1):
+        tick = pipeline.tick(now)
+        if recorder and tick.message:
+            recorder.offer(crank, now, now, tick.message)
+            for topic, extra in enumerate(tick.extras, crank + 1):
                 if extra:
                     recorder.offer(topic, now, now, extra)
         if not going_on((due + late - begin) * 1e-9):

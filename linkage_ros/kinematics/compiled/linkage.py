@@ -21,7 +21,7 @@ from itertools import islice, product
 from math import inf, pi, tau
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.compiled.python import python_function, Values
+from linkage_ros.kinematics.compiled.python import Body, python_body, python_function, Values
 from linkage_ros.kinematics.compiled.trace import joints, moved, Path, traced, Wanted
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.survey import usual_inputs
@@ -78,6 +78,10 @@ class Compiled:
 
     Attributes
     ----------
+    driven
+        How many inputs it has.
+    derivatives
+        As given.
     paths
         The ways that the steps take where the linkage is closed. There is more than one where they
         take different forms in different regions.
@@ -96,21 +100,22 @@ class Compiled:
     ) -> None:
         self._closure = closure
         self._within_limits = within_limits
-        self._driven = len(closure.linkage.inputs)
-        self._derivatives = derivatives
+        self.driven = len(closure.linkage.inputs)
+        self.derivatives = derivatives
         self._wanted = wanted
         self.paths: list[Path] = []
         self._functions: list[Callable[..., Values | None]] = []
+        self._bodies: dict[str, Body] = {}
         for inputs in _states(closure):
             self._follow(inputs)
-        if not self.paths and (self._driven > 1 or closure.input_ranges):
+        if not self.paths and (self.driven > 1 or closure.input_ranges):
             # A search of its own, which takes longer.
             self._follow(usual_inputs(closure))
         self.fast: Callable[..., Values | None] = _first_of(self._functions)
 
     def _follow(self, inputs: tuple[float, ...]) -> None:
         """Add the path that the steps take at a state, if it is closed and they take a new one."""
-        more = (1.25,) * self._driven * self._derivatives
+        more = (1.25,) * self.driven * self.derivatives
         if len(self.paths) == _MOST_PATHS or any(
             function(*inputs, *more) is not None for function in self._functions
         ):
@@ -118,9 +123,23 @@ class Compiled:
         close = self._closure.position if self._within_limits else self._closure.posed
         if close(*inputs).status is Status.CLOSED:
             self.paths.append(
-                traced(self._closure, inputs, self._derivatives, self._wanted, self._within_limits)
+                traced(self._closure, inputs, self.derivatives, self._wanted, self._within_limits)
             )
             self._functions.append(python_function(self.paths[-1]))
+
+    def body(self, leave: str) -> Body:
+        """
+        Return its first path as lines of Python; they are written once.
+
+        Parameters
+        ----------
+        leave
+            The statement that leaves the lines where the path does not hold.
+
+        """
+        if leave not in self._bodies:
+            self._bodies[leave] = python_body(self.paths[0], leave)
+        return self._bodies[leave]
 
     def __call__(self, *numbers: float) -> Answer:
         """
@@ -144,12 +163,12 @@ class Compiled:
 
     def plain(self, *numbers: float) -> Answer:
         """Return the answer of the plain steps."""
-        n = self._driven
-        given = [numbers[i * n : (i + 1) * n] for i in range(1 + self._derivatives)]
+        n = self.driven
+        given = [numbers[i * n : (i + 1) * n] for i in range(1 + self.derivatives)]
         motion = moved(self._closure, given, self._within_limits)
         status, gap = motion.position.status, motion.position.gap
         found = tuple(tuple(group) for group in self._wanted(motion))
-        groups = len(self.paths[0].outputs) if self.paths else 1 + self._derivatives
+        groups = len(self.paths[0].outputs) if self.paths else 1 + self.derivatives
         return Answer(status, gap, (*found, *((),) * (groups - len(found))))
 
 

@@ -19,11 +19,12 @@ from __future__ import annotations
 import cmath
 from collections.abc import Callable
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.compiled.tape import Operation
 from linkage_ros.kinematics.compiled.trace import Path
 from linkage_ros.kinematics.compiled.writer import Writer
+from linkage_ros.written import written
 
 Values = tuple[tuple[float, ...], ...]
 
@@ -45,12 +46,52 @@ _ATTRIBUTES = frozenset(('real', 'imag'))
 _NEGATIONS = {'<': '>=', '<=': '>', '>': '<=', '>=': '<', '==': '!=', '!=': '=='}
 
 
+class Body(NamedTuple):
+    """
+    A path as lines of Python.
+
+    Attributes
+    ----------
+    lines
+        They start from the inputs, by the names that these have in the path.
+    outputs
+        The expressions of the outputs, in groups; they come after the lines.
+    bound
+        What the lines and expressions name.
+
+    """
+
+    lines: list[str]
+    outputs: list[list[str]]
+    bound: dict[str, Any]
+
+
 def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]:
     """
-    Return a path as the source of a Python function, and the constants that it needs by name.
+    Return a path as the source of a Python function, and what it names.
 
     The function takes the inputs and returns the outputs, in groups; None where the path does not
     hold.
+    """
+    lines, outputs, bound = python_body(path, 'return None')
+    groups = [f'({", ".join(group)},)' if group else '()' for group in outputs]
+    parameters = ', '.join(given.name for given in path.inputs)
+    text = [f'def {name}({parameters}):', *(f'    {line}' for line in lines)]
+    returned = f'{", ".join(groups)},' if groups else '()'
+    return '\n'.join([*text, f'    return {returned}', '']), bound
+
+
+def python_body(path: Path, leave: str) -> Body:
+    """
+    Return a path as lines of Python.
+
+    Parameters
+    ----------
+    path
+        The path.
+    leave
+        The statement that leaves the lines where the path does not hold.
+
     """
     constants: dict[str, Any] = {}
     conditions = [decision.condition for decision in path.decisions]
@@ -96,30 +137,19 @@ def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]
     if any(map(_of_inputs, conditions)):
         # 0 of finite numbers, and NaN of all others; where the sum is too great, it is in doubt.
         total = ' + '.join(given.name for given in path.inputs)
-        writer.lines += [f'total = {total}', 'if total - total != 0.0:', '    return None']
+        writer.lines += [f'total = {total}', 'if total - total != 0.0:', f'    {leave}']
     for condition, held in path.decisions:
         if not _of_inputs(condition):
             text = writer.write(condition)
-            writer.lines += [f'if not ({text}):' if held else f'if {text}:', '    return None']
-    groups = [', '.join(writer.write(number) for number in group) for group in path.outputs]
-    returned = ', '.join(f'({group},)' if group else '()' for group in groups)
-    parameters = ', '.join(given.name for given in path.inputs)
-    lines = [f'def {name}({parameters}):', *(f'    {line}' for line in writer.lines)]
-    return '\n'.join(
-        [*lines, f'    return {returned},' if groups else '    return ()', '']
-    ), constants
+            writer.lines += [f'if not ({text}):' if held else f'if {text}:', f'    {leave}']
+    groups = [[writer.write(number) for number in group] for group in path.outputs]
+    return Body(writer.lines, groups, {**_FUNCTIONS, **constants})
 
 
 def python_function(path: Path) -> Callable[..., Values | None]:
     """Return a path as a function of its inputs that returns its outputs; None as above."""
-    source, constants = python_source(path)
-    # What a function finds among its own variables it finds faster than a global name.
-    bound = {**_FUNCTIONS, **constants}
-    names = ', '.join(bound)
-    body = ''.join(f'    {line}\n' for line in source.splitlines())
-    namespace: dict[str, Any] = {}
-    exec(f'def bind({names}):\n{body}    return solve\n', namespace)
-    solve: Callable[..., Values | None] = namespace['bind'](**bound)
+    source, bound = python_source(path)
+    solve: Callable[..., Values | None] = written(source, 'solve', bound)
     return solve
 
 

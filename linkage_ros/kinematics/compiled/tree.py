@@ -23,22 +23,19 @@ None, and what is written from the tree gives no numbers there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.kinematics.compiled.lowered import Lowering
 from linkage_ros.kinematics.compiled.tape import Operation, Tape
-from linkage_ros.kinematics.compiled.trace import joints, moved, Number, number_of, traced, Wanted
+from linkage_ros.kinematics.compiled.trace import joints, moved, Number, number_of, Wanted
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Iterated
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure
-
-_TRIED = 32
-"""In each range of the input, ways are looked for at so many states."""
 
 _MOST_SOLVED = 32
 """So many leaves have numbers at most: change points of several dyads multiply."""
@@ -105,38 +102,22 @@ def program(closure: Closure, derivatives: int, wanted: Wanted = joints) -> Prog
             'some are only solved by iteration, which is no straight line',
             'compile a linkage of dyads',
         )
-    taken: dict[tuple[bool, ...], tuple[float, ...]] = {}
-    for at in _closed(closure):
-        path = traced(closure, at, derivatives, wanted, within_limits=False)
-        taken.setdefault(tuple(decision.held for decision in path.decisions), at)
-    if not taken:
+    paths = Compiled(closure, derivatives, wanted, within_limits=False).paths
+    if not paths:
         raise DefinitionError(
             'pose',
             'no state is found at which the linkage is closed',
             'write one: pose: {inputs: [VALUE]}',
         )
     tape = Tape()
-    given = [
-        [tape.given(f'{letter}{i}', value) for i, value in enumerate(next(iter(taken.values())))]
-        for letter in 'qwa'[: 1 + derivatives]
-    ]
-    tree = _Growth(closure, tape, given, wanted, list(taken)).below(())
+    count = len(closure.linkage.inputs)
+    given = [tape.given(one.name, one.value) for one in paths[0].inputs]
+    groups = [given[start:][:count] for start in range(0, len(given), count)]
+    taken = [tuple(decision.held for decision in path.decisions) for path in paths]
+    tree = _Growth(closure, tape, groups, wanted, taken).below(())
     lowering = Lowering()
-    inputs = tuple(lowering.operation(one.operation) for group in given for one in group)
+    inputs = tuple(lowering.operation(one.operation) for one in given)
     return Program(inputs, _lowered(tree, lowering))
-
-
-def _closed(closure: Closure) -> Iterator[tuple[float, ...]]:
-    """Yield states at which a linkage is closed, one in each region that is likely to differ."""
-    for path in Compiled(closure).paths:
-        yield tuple(given.value for given in path.inputs)
-    for each in closure.closing_ranges:
-        wide = each.highest - each.lowest
-        for i in range(_TRIED):
-            # Not in a middle or at an end, where links may lie in one line.
-            at = each.lowest + wide * (i + 0.3183) / _TRIED
-            if closure.posed(at).status is Status.CLOSED:
-                yield (at,)
 
 
 class _Growth:

@@ -41,7 +41,7 @@ from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import change_text
 from linkage_ros.ros.bag_topics import bag_topic, message_type
 from linkage_ros.ros.run_recording import EXTRA, RunRecording
-from linkage_ros.ros.tick_loop import DIAGNOSTICS, TickLoop
+from linkage_ros.ros.tick_loop import TickLoop
 from linkage_ros.scene.load import load_scene
 import numpy as np
 import pytest
@@ -126,7 +126,7 @@ def run(folder: Path, text: str, linkage: str = 'four_bar') -> Path:
             if message:
                 samples.append((message, {'source_timestamp': now - 137_000}))
             if number % 50 == 25:
-                loop.recorder.offer(DIAGNOSTICS, now, now, health(number))
+                loop.recorder.offer(loop.topics.diagnostics, now, now, health(number))
             loop.tick_at(now)
 
     recording = RunRecording(_Log())

@@ -1,0 +1,60 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Functions that are written as text, and compiled when they are first bound."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+_MOST = 128
+"""So many texts are kept compiled."""
+
+
+class Lines(NamedTuple):
+    """
+    A part of a function.
+
+    Attributes
+    ----------
+    lines
+        Lines of Python.
+    bound
+        What they name.
+
+    """
+
+    lines: list[str]
+    bound: dict[str, Any]
+
+
+def written(source: str, name: str, bound: Mapping[str, Any]) -> Any:
+    """
+    Return the function of that name that a text defines.
+
+    What it names in ``bound`` it finds among its own variables, which is faster than a global
+    name. A text is compiled once, however often it is bound: not when a running node is reset.
+    """
+    return _binding(source, name, tuple(bound))(**bound)
+
+
+@lru_cache(maxsize=_MOST)
+def _binding(source: str, name: str, names: tuple[str, ...]) -> Callable[..., Any]:
+    body = ''.join(f'    {line}\n' for line in source.splitlines())
+    namespace: dict[str, Any] = {}
+    exec(f'def bind({", ".join(names)}):\n{body}    return {name}\n', namespace)
+    bind: Callable[..., Any] = namespace['bind']
+    return bind
