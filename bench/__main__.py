@@ -107,7 +107,7 @@ def main() -> int:
                 compiled_plan = _COMPILED_QUICK if arguments.quick else _COMPILED
                 picture = FOLDER / 'chains.svg' if arguments.write else None
                 tables += [measure_gallery(compiled_plan), measure_chains(compiled_plan, picture)]
-                arrays_plan = (3, 100_000) if arguments.quick else (11, 1_000_000)
+                arrays_plan = (1, 20_000) if arguments.quick else (11, 1_000_000)
                 tables.append(measure_arrays(folder, *arrays_plan))
     except BenchError as error:
         print(f'bench: {error}', file=sys.stderr)

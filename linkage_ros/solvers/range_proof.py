@@ -281,10 +281,10 @@ class _ClosedForm:
     def at(self, x: Array) -> tuple[Array, NDArray[np.complex128]]:
         """Return them, each in its row, at values in [rad] or [m]."""
         found = self._solver.solve([x], derivatives=0).positions
+        numbers, parts = np.split(found, [len(self._numbers)])
         coordinates = np.zeros((max(self._numbers) + 1, len(x)))
-        coordinates[self._numbers] = found[: len(self._numbers)]
+        coordinates[self._numbers] = numbers
         pins = np.zeros((max(self._pins, default=-1) + 1, len(x)), np.complex128)
-        parts = found[len(self._numbers) :]
         pins[self._pins] = parts[0::2] + 1j * parts[1::2]
         return coordinates, pins
 

@@ -21,6 +21,7 @@ from dataclasses import replace
 from importlib import import_module
 from math import inf, nan, pi, tau
 from pkgutil import iter_modules
+import random
 import re
 import tracemalloc
 from types import ModuleType
@@ -28,7 +29,6 @@ from typing import Any
 import warnings
 
 from campaigns.topologies.families import FAMILIES
-from campaigns.topologies.run import make
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import DefinitionError
@@ -334,7 +334,7 @@ def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name: str) -
 
 @pytest.mark.parametrize('family', [name for name in FAMILIES if 'class III' not in name])
 def test_random_linkages_are_solved_as_state_by_state(family: str) -> None:
-    topology, _ = make(SEED, family, 0)
+    topology = FAMILIES[family].make(random.Random(f'{SEED}/{family}/0'))
     closure = Closure(topology.linkage)
     rng = np.random.default_rng(SEED)
     inputs = [
