@@ -24,7 +24,7 @@ unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_D
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help demo test bench accuracy topologies synthesis round_trips gallery schema cost effects docs lint format
-.PHONY: clean damage kills endurance disk attacks accuracy_page report lock sbom
+.PHONY: clean damage kills endurance disk attacks accuracy_page report lock sbom compiled
 
 help:
 	@echo 'make demo      run a linkage on a ROS graph of its own (SECONDS=10 to say how long)'
@@ -33,6 +33,7 @@ help:
 	@echo 'make timing    measure clients that come and go, and ticks under load, into docs/timing (35 min)'
 	@echo 'make accuracy  prove the kinematics on 11 million cases, then as topologies (35 min)'
 	@echo 'make topologies  try random linkages of every topology, into docs/accuracy (8 min)'
+	@echo 'make compiled  compare linkages in C, Python and JavaScript with the steps, by the 100,000 (8 min)'
 	@echo 'make accuracy_page  measure what accuracy costs, into docs/accuracy.md (9 min)'
 	@echo 'make synthesis compute and draw what docs/synthesis.md says'
 	@echo 'make round_trips  design linkages back from their own pairs, by the 100,000'
@@ -72,14 +73,15 @@ $(STAMP): setup.py requirements/dev.txt
 demo: $(STAMP)
 	@$(BIN)/linkage demo $(if $(filter command,$(origin SECONDS)),--seconds $(SECONDS))
 
-# The tests run even when lint finds something, so that one run tells all. Those that start nodes
-# have the processors, and the graph, to themselves.
+# The tests run even when lint finds something, so that one run tells all. Each test that starts
+# nodes has a graph to itself; those that measure nodes have the processors, too.
 test: $(STAMP)
 	@status=0; \
 	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory lint || status=$$?; \
 	$(BIN)/python -m pytest -m 'not ros' --numprocesses auto --dist loadfile || status=$$?; \
-	$(BIN)/python -m pytest -m ros || status=$$?; \
+	$(BIN)/python -m pytest -m 'ros and not alone' --numprocesses 2 --dist loadfile || status=$$?; \
+	$(BIN)/python -m pytest -m alone || status=$$?; \
 	exit $$status
 
 bench: $(STAMP)
@@ -99,6 +101,9 @@ accuracy: $(STAMP)
 
 topologies: $(STAMP)
 	@$(BIN)/python -m campaigns.topologies
+
+compiled: $(STAMP)
+	@LINKAGE_STATES=100000 $(BIN)/python -m pytest -q test/kinematics/compiled
 
 accuracy_page: $(STAMP)
 	@$(BIN)/python -m docs.make_accuracy

@@ -32,7 +32,7 @@ from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
 
-_RATE, _ACCELERATION = 3.0, 0.5
+RATE, ACCELERATION = 3.0, 0.5
 _DYADS = (1, 2, 4, 8, 16, 32)
 _ITERATED_STATES = 50
 """A state that is iterated takes a hundred times as long."""
@@ -153,13 +153,18 @@ def _closed_states(closure: Closure) -> Iterator[Numbers]:
     """Yield closed states over the whole range, with rates and accelerations."""
     rng = random.Random(5)
     driven = len(closure.linkage.inputs)
-    ranges = closure.input_ranges if driven == 1 else ()
-    low = min((each.lowest for each in ranges), default=-3.0)
-    high = max((each.highest for each in ranges), default=3.0)
+    low, high = input_bounds(closure)
     while True:
         inputs = tuple(rng.uniform(low, high) for _ in range(driven))
         if closure.position(*inputs).joints:
-            yield (*inputs, *[_RATE] * driven, *[_ACCELERATION] * driven)
+            yield (*inputs, *[RATE] * driven, *[ACCELERATION] * driven)
+
+
+def input_bounds(closure: Closure) -> tuple[float, float]:
+    """Return from where to where the inputs of a linkage go, in [rad] or [m]."""
+    ranges = closure.input_ranges if len(closure.linkage.inputs) == 1 else ()
+    low = min((each.lowest for each in ranges), default=-3.0)
+    return low, max((each.highest for each in ranges), default=3.0)
 
 
 def _over(call: Callable[..., object], states: Sequence[Numbers]) -> Callable[[], None]:

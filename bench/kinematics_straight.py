@@ -18,7 +18,7 @@ The formulas of a four-bar and nothing else: one function, in a straight line.
 
 It is what the closure of any linkage is measured against: no status, no pose, no steps. It serves
 linkages whose crank turns fully and passes no change point. The arithmetic is that of
-`linkage_ros.kinematics.dyads.crank_rrr`.
+`linkage_ros.kinematics.dyads.rrr` over `linkage_ros.kinematics.crank_diagonal`.
 """
 
 from __future__ import annotations

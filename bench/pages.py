@@ -56,6 +56,10 @@ once, and what they do is kept as one straight Python function, which gives the 
 asked for all published joints with rates and accelerations, in turn, over the whole range of each
 linkage. `class_3` is iterated: its constraints are a straight line, the iteration is a call.
 
+Arrays of closed states, drawn at random from the whole range, are solved by `solve` (numpy in
+blocks) and by the C that `linkage compile` writes, in a loop over the states; both come of the
+same tape.
+
 ![What chains of crank-rockers take over their number of dyads](chains.svg)
 """
 

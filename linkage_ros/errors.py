@@ -21,13 +21,19 @@ value, and the remedy. It is printable, on one line, and not without end, whatev
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from copyreg import __newobj__  # type: ignore[attr-defined]
 from difflib import get_close_matches
 from os import PathLike
 from typing import Any
 
 _LONGEST_VALUE = 80
+_LONGEST_LIST = 800
 _LONGEST_PART = 2000
+
+_PYTHON_PACKAGES = {'mcap': 'mcap', 'numpy': 'numpy', 'yaml': 'PyYAML'}
+"""What every installation needs beside ROS: name of the import, and of the package."""
 
 
 class LinkageError(Exception):
@@ -51,6 +57,11 @@ class LinkageError(Exception):
             for text in (str(where), reason, remedy)
         )
         super().__init__(f'{self.where}: {self.reason}; {self.remedy}')
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # An exception is else made anew from its text alone, which none of these is: what a
+        # process of workers raises would not come back.
+        return __newobj__, (type(self), *self.args), vars(self)
 
 
 class DefinitionError(LinkageError):
@@ -96,6 +107,36 @@ class BagError(LinkageError):
     """A bag that cannot be read; ``where`` is its folder or file."""
 
 
+@contextmanager
+def missing_packages_reported() -> Iterator[None]:
+    """
+    Raise an error of one line where a package that cannot be done without is not installed.
+
+    Packages of one kind of work alone are looked for where that work begins, with their own
+    remedies: so what is missing here is one of Python's that all installations need, or ROS.
+
+    Raises
+    ------
+    LinkageError
+        Where an import within finds no such package.
+
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        name = (error.name or '').partition('.')[0]
+        if name in {'', 'linkage_ros'}:
+            raise
+        if package := _PYTHON_PACKAGES.get(name):
+            remedy = (
+                f'python3 -m pip install {package} '
+                "(into the system's Python with --user --break-system-packages)"
+            )
+        else:
+            remedy = "source the setup.bash of ROS 2, or pip install 'linkage_ros[ros]'"
+        raise LinkageError(name, 'is not installed', remedy) from None
+
+
 def did_you_mean(name: str, names: Iterable[str], otherwise: str) -> str:
     """Return the remedy for a name that is none of these: the nearest, or what else there is."""
     near = get_close_matches(name, list(names), n=1)
@@ -109,6 +150,18 @@ def quoted(value: Any) -> str:
     What is too long loses its middle: a path ends with the name that matters.
     """
     return shortened(repr(value), _LONGEST_VALUE)
+
+
+def listed(names: Iterable[str], between: str = ', ') -> str:
+    """Return names as an error message lists them: not without end, whoever has made them."""
+    names, shown, letters = list(names), [], 0
+    for name in names:
+        shown.append(shortened(clean(name), _LONGEST_VALUE))
+        letters += len(shown[-1]) + len(between)
+        if letters > _LONGEST_LIST:
+            break
+    more = len(names) - len(shown)
+    return between.join(shown) + (f' and {more} more' if more else '')
 
 
 def shortened(text: str, most: int) -> str:

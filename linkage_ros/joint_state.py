@@ -30,7 +30,7 @@ from struct import error as StructError
 from struct import Struct
 from typing import Any, NamedTuple
 
-from linkage_ros.cdr import aligned, ENCAPSULATION, head_of_joints
+from linkage_ros.cdr import aligned, ENCAPSULATION, head_of_joints, STAMP_END
 from linkage_ros.written import Lines
 
 NANOSECONDS = 1_000_000_000
@@ -223,14 +223,11 @@ class JointStateWriter:
 
     """
 
-    __slots__ = ('_between', '_end', '_layouts', '_no_rates', 'names')
-
-    names: bytes
-    """What its messages have from byte 12 up to the first position: names and counts."""
+    __slots__ = ('_between', '_end', '_head', '_layouts', '_no_rates')
 
     def __init__(self, names: Sequence[str]) -> None:
         n = len(names)
-        self.names = head = head_of_joints(names, n)
+        self._head = head = head_of_joints(names, n)
         # After n doubles the offset is a multiple of 8: the next count, then four bytes of
         # padding, unless nothing follows.
         self._between = Struct('<II').pack(n, 0)
@@ -270,16 +267,16 @@ class JointStateWriter:
         alone, with_rates, with_efforts, with_both = self._layouts
         # A field shorter than what is packed into it takes as much as it holds.
         if efforts:
-            begin = (ENCAPSULATION, seconds, nanoseconds, self.names, *positions)
+            begin = (ENCAPSULATION, seconds, nanoseconds, self._head, *positions)
             if rates:
                 return with_both.pack(*begin, self._between, *rates, self._between, *efforts)
             return with_efforts.pack(*begin, self._no_rates, *efforts)
         if rates:
             return with_rates.pack(
-                ENCAPSULATION, seconds, nanoseconds, self.names,
+                ENCAPSULATION, seconds, nanoseconds, self._head,
                 *positions, self._between, *rates, self._end,
             )  # fmt: skip
-        return alone.pack(ENCAPSULATION, seconds, nanoseconds, self.names, *positions, self._end)
+        return alone.pack(ENCAPSULATION, seconds, nanoseconds, self._head, *positions, self._end)
 
     def straight(self, stamp: str, positions: Sequence[str], rates: Sequence[str]) -> Lines:
         """Return `write` as lines that make ``message`` of expressions; they are short."""
@@ -291,7 +288,59 @@ class JointStateWriter:
             f'message = pack({packed}, {self._end!r})',
         ]
         layout = with_rates if rates else alone
-        return Lines(lines, {'pack': layout.pack, 'head': self.names, 'between': self._between})
+        return Lines(lines, {'pack': layout.pack, 'head': self._head, 'between': self._between})
+
+
+class OwnJointStates:
+    """
+    Tells the joint states of a scene from other messages on their topic, by their joints.
+
+    Parameters
+    ----------
+    linkages
+        The published joints of each linkage, in their order. Of several linkages any may be left
+        out of a message: those that are open.
+
+    """
+
+    __slots__ = ('_all', '_linkages')
+
+    def __init__(self, linkages: Iterable[Sequence[str]]) -> None:
+        linkages = tuple(linkages)
+        joints = [joint for linkage in linkages for joint in linkage]
+        self._all = head_of_joints(joints, len(joints))
+        self._linkages = [(len(linkage), _names(linkage)) for linkage in linkages]
+
+    def __call__(self, message: bytes) -> bool:
+        """Return whether a serialized message is one of them."""
+        if message.startswith(self._all, STAMP_END):
+            return True
+        at = _FIRST_NAME
+        counted = message[_COUNT_AT:at]
+        if not message.startswith(_NO_FRAME, STAMP_END) or len(counted) < _COUNT.size:
+            return False
+        (count,) = _COUNT.unpack(counted)
+        left = count
+        for joints, names in self._linkages:
+            if joints <= left and message.startswith(names, at):
+                at += len(names)
+                left -= joints
+        return count > left == 0 and message.startswith(counted, at)
+
+
+_COUNT = Struct('<I')
+
+_NO_FRAME = head_of_joints(())[:8]
+"""What stands behind the stamp and before the count of the names: an empty frame_id."""
+
+_COUNT_AT = STAMP_END + len(_NO_FRAME)
+_FIRST_NAME = _COUNT_AT + _COUNT.size
+
+
+def _names(joints: Sequence[str]) -> bytes:
+    """Return the names as they stand in a message, up to what follows them."""
+    texts = [joint.encode() + b'\0' for joint in joints]
+    return b''.join(_COUNT.pack(len(text)) + text + bytes(-len(text) % 4) for text in texts)
 
 
 def head_of(data: bytes) -> tuple[set[bytes], int] | None:

@@ -42,7 +42,7 @@ from linkage_ros.effects.stage import (
     WriterStage,
 )
 from linkage_ros.effects.turns import all_wrapped, beginnings, Continuous
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.joint_state import JointStateWriter, Rejection
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.status import Status
@@ -210,7 +210,7 @@ class Line:
             loads=member.loads,
             friction=given['friction'].friction if 'friction' in given else None,
             prefix=member.prefix,
-            dependent=frozenset(scene.joints).difference(*(each.inputs for each in scene.members)),
+            dependent=scene.dependent_joints,
             effects=frozenset(member.effects),
             moves_by_rates=moves_by_rates,
         )
@@ -461,7 +461,7 @@ def _refuse_idle(member: Member, forced: bool) -> None:
             raise DefinitionError(
                 key,
                 'acts on nothing here: no effect and no drive asks for forces',
-                f'leave it out, drive by torque, or name one of {", ".join(LOADED)}',
+                f'leave it out, drive by torque, or name one of {listed(LOADED)}',
             )
 
 
@@ -471,7 +471,7 @@ def _refuse_solver(member: Member, forced: bool) -> None:
         raise DefinitionError(
             'solver',
             f'{member.solver[0]} finds no forces, and an effect or the drive asks for them',
-            f'write closed_form, or leave {", ".join(LOADED)} and torque out',
+            f'write closed_form, or leave {listed(LOADED)} and torque out',
         )
 
 

@@ -41,8 +41,8 @@ from linkage_ros.bag.reading.run_events import (
     VERSIONS,
 )
 from linkage_ros.cdr import text_of, TIME_END
-from linkage_ros.errors import BagError
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.errors import BagError, listed
+from linkage_ros.joint_state import OwnJointStates
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
@@ -97,7 +97,7 @@ def recorded_scene(bag: Bag, *, trust_effects: bool = False) -> Scene:
     if missing:
         raise BagError(
             bag.path,
-            f'carries no {", ".join(sorted(missing))}',
+            f'carries no {listed(sorted(missing))}',
             'name a bag that linkage_ros has recorded',
         )
     run = run_account(bag)
@@ -141,7 +141,7 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
     pipeline = Pipeline(scene)
     closures, injection = pipeline.closures, pipeline.injection
     last = 0
-    for event in recorded_events(run_account(bag), own_head(scene), messages):
+    for event in recorded_events(run_account(bag), own_joint_states(scene), messages):
         if event.log_time < last:
             pipeline = Pipeline(scene, closures, injection)
         last = event.log_time
@@ -163,9 +163,9 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
             turn(bag, injection, event.data)
 
 
-def own_head(scene: Scene) -> bytes:
-    """Return what the joint states of a scene have behind their stamp."""
-    return JointStateWriter(scene.joints).names
+def own_joint_states(scene: Scene) -> OwnJointStates:
+    """Return what tells the joint states of a scene from others on their topic."""
+    return OwnJointStates(member.joints for member in scene.members)
 
 
 def change_text(change: Change, kind: str) -> str:

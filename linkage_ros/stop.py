@@ -161,6 +161,7 @@ def bounded_end() -> Iterator[None]:
     known. Where threads of the middleware wait for each other, they may do so with the
     interpreter's lock: then no thread of Python ends that.
     """
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)  # a signal while it configured may have taken it
     signal.alarm(_LONGEST_END)
     try:
         yield

@@ -27,7 +27,13 @@ import struct
 
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from linkage_ros.joint_state import CrankSample, JointStateReader, JointStateWriter, Rejection
+from linkage_ros.joint_state import (
+    CrankSample,
+    JointStateReader,
+    JointStateWriter,
+    OwnJointStates,
+    Rejection,
+)
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
@@ -232,14 +238,31 @@ def test_writes_as_rosbags_does_to_the_last_byte(names, stamp, data):
     assert len(read.effort) == 0
 
 
-@given(st.lists(names_, min_size=1, max_size=6, unique=True))
-def test_a_writers_names_tell_its_messages(names):
-    writer = JointStateWriter(names)
-    message = writer.write(NS, [0.0] * len(names), [])
-    assert message.startswith(writer.names, 12)
-    assume(CRANK not in names)
-    stranger = serialized([CRANK, *names], [0.0] * (len(names) + 1))
-    assert not stranger.startswith(writer.names, 12)
+@given(st.lists(st.lists(names_, min_size=1, max_size=3), min_size=1, max_size=4), st.data())
+def test_own_messages_are_told_whatever_linkages_are_in_them(linkages, data):
+    joints = [joint for linkage in linkages for joint in linkage]
+    assume(len(set(joints)) == len(joints) and CRANK not in joints)
+    own = OwnJointStates(linkages)
+    there = [linkage for linkage in linkages if data.draw(st.booleans())] or linkages[:1]
+    names = [joint for linkage in there for joint in linkage]
+    rates = data.draw(st.sampled_from([[], [0.5] * len(names)]))
+    assert own(JointStateWriter(names).write(NS, [0.0] * len(names), rates))
+
+
+@given(st.lists(st.lists(names_, min_size=2, max_size=3), min_size=2, max_size=3), st.data())
+def test_a_message_of_other_joints_is_none_of_ones_own(linkages, data):
+    joints = [joint for linkage in linkages for joint in linkage]
+    assume(len(set(joints)) == len(joints) and CRANK not in joints)
+    own = OwnJointStates(linkages)
+    others = [
+        [CRANK], [CRANK, *joints], [*joints, CRANK], [*linkages[1], *linkages[0]],
+        linkages[0][:1], [*linkages[0], linkages[1][0]], [*joints, *linkages[0]],
+    ]  # fmt: skip
+    names = data.draw(st.sampled_from(others))
+    assert not own(serialized(names, [0.0] * len(names)))
+    assert not own(serialized(linkages[0], []))
+    assert not own(serialized([], []))
+    assert not own(JointStateWriter(joints).write(NS, [0.0] * len(joints), [])[:20])
 
 
 @settings(max_examples=20)

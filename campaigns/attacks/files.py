@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Files that are changed at random, through every command that takes one and starts no node.
+Files that are changed at random, through every command that takes one.
 
 Each has to end in time and within memory: with what was asked for, or with exit code 2 and a
 line that is no longer than a screen. Whatever else comes of it is a finding.
@@ -22,14 +22,24 @@ line that is no longer than a screen. Whatever else comes of it is a finding.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
+import os
 from pathlib import Path
 import random
+from shutil import rmtree
+import subprocess
+import sys
 from typing import Any
 import warnings
 
 from campaigns.attacks.mutations import mutated
 from campaigns.in_process import confined, in_process
 from campaigns.processes import tried_in_parts
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import parse_yaml
 from linkage_ros.shipped import shipped
 
 _PART = 50
@@ -40,16 +50,32 @@ _SECONDS = 60.0
 
 _LONGEST_LINE = 1000
 
-_LINKAGE = {
-    'check': [],
-    'solve': ['--steps', '8', '--rate', '1', '--points'],
-    'draw': ['-o', 'x.svg'],
-    'urdf': [],
-    'mjcf': [],
-    'scene': [],
-    'cost': ['--ticks', '2'],
+_BESIDE = 'left out: ', 'accuracy of '
+"""What is said beside an answer: what an import leaves out, and how far a measurement is."""
+
+_NODE = {
+    'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF',
+    'RCUTILS_CONSOLE_OUTPUT_FORMAT': '{severity} {message}',
+    'RCUTILS_COLORIZED_OUTPUT': '0',
 }
-_SCENE = ('scene', 'cost', 'urdf', 'mjcf')
+
+_FILE = 'scenes/x.yaml'
+COMMANDS = {
+    'check': [_FILE],
+    'solve': [_FILE, '--steps', '8', '--rate', '1', '--points'],
+    'draw': [_FILE, '-o', 'x.svg'],
+    'compile': [_FILE, '-o', 'x.c'],
+    'urdf': [_FILE],
+    'mjcf': [_FILE],
+    'scene': [_FILE],
+    'cost': [_FILE, '--ticks', '2'],
+    'accuracy': [_FILE, '--quick', '--only', 'effects,dynamics', '-o', 'page'],
+    'replay': ['bag', '--scene', _FILE],
+    'run': [_FILE, '--plain', '--seconds', '0.1', '--runs', 'runs'],
+}
+"""What is typed behind each command."""
+
+_SCENE = ('scene', 'cost', 'urdf', 'mjcf', 'accuracy', 'replay', 'run')
 _TABLES = {
     'pairs': b'crank,rocker\n0,0\n30,17\n60,38\n',
     'path': b'0.1;0.2\n0.15;0.25\n0.2;0.2\n0.15;0.1\n0.12;0.1\n',
@@ -111,7 +137,25 @@ def _originals(folder: Path) -> dict[str, dict[str, bytes]]:
     for name in ('four_bar', 'slider_crank', 'watt_1'):
         in_process(['urdf', f'linkages/{name}.yaml', '-o', f'{name}.urdf'], _SECONDS)
         found['urdf'][name] = Path(f'{name}.urdf').read_bytes()
+    _record(found['linkage'])
     return found
+
+
+def _record(linkages: Mapping[str, bytes]) -> None:
+    """Record samples of the inputs of all linkages, for the scenes that are replayed over them."""
+    inputs = {
+        driven.joint: None
+        for name, content in linkages.items()
+        for driven in read_linkage(parse_yaml(content, name)).inputs
+    }
+    write = JointStateWriter([*inputs]).write
+    topic = Topic('/crank_states', 'sensor_msgs/msg/JointState', 'text', 'RIHS01_' + '0a' * 32)
+    bag = BagWriter(Path('bag'), [topic], {})
+    for number in range(20):
+        stamp = 1_700_000_000_000_000_000 + 1_000_000 * number
+        angles = [0.01 * number] * len(inputs)
+        bag.write(0, stamp, stamp, write(stamp, angles, [10.0] * len(inputs)))
+    bag.close()
 
 
 def _try(originals: dict[str, dict[str, bytes]], seed: str) -> tuple[str, str]:
@@ -120,28 +164,47 @@ def _try(originals: dict[str, dict[str, bytes]], seed: str) -> tuple[str, str]:
     kind = rng.choice(('linkage', 'linkage', 'linkage', 'scene', 'scene', 'urdf', 'table'))
     name = rng.choice(sorted(originals[kind]))
     done, data = mutated(originals[kind][name], rng)
-    file = Path('scenes/x.yaml')
-    file.write_bytes(data)
+    Path(_FILE).write_bytes(data)
     match kind:
-        case 'linkage':
-            command = rng.choice(sorted(_LINKAGE))
-            arguments = [command, str(file), *_LINKAGE[command]]
-        case 'scene':
-            command = rng.choice(_SCENE)
-            arguments = [command, str(file), *_LINKAGE[command]]
+        case 'linkage' | 'scene':
+            command = rng.choice(sorted(COMMANDS) if kind == 'linkage' else _SCENE)
+            arguments = [command, *COMMANDS[command]]
         case 'urdf':
-            command, arguments = 'import', ['import', str(file)]
+            command, arguments = 'import', ['import', _FILE]
         case _:
-            command, arguments = 'synthesize', ['synthesize', f'--{name}', str(file)]
+            command, arguments = 'synthesize', ['synthesize', f'--{name}', _FILE]
             arguments += ['--candidates', '200']
-    code, said, _ = in_process(arguments, _SECONDS)
+    code, said = _node(arguments) if command == 'run' else in_process(arguments, _SECONDS)[:2]
+    for folder in ('page', 'runs'):
+        rmtree(folder, ignore_errors=True)
     wrong = judged(command, code, said)
     return f'{command}: {code}', wrong and f'{name}: {done}: {" ".join(arguments)}: {wrong}'
 
 
+def _node(arguments: list[str]) -> tuple[Any, str]:
+    """Run a command that starts a node, in a process of its own; return its end as `judged`."""
+    try:
+        ended = subprocess.run(
+            [sys.executable, '-m', 'linkage_ros.cli.main', *arguments],
+            env=os.environ | _NODE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=_SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return 'no end', f'more than {_SECONDS} s'
+    # What a node says as it goes is no answer.
+    lines = [line for line in ended.stderr.splitlines() if not line.startswith(('INFO', 'WARN'))]
+    return ended.returncode, '\n'.join(lines)
+
+
 def judged(command: str, code: Any, said: str) -> str:
     """Return what is wrong with an end, in a line; nothing where it is as it should be."""
-    lines = [line for line in said.splitlines() if not line.startswith('left out: ')]
+    lines = [line for line in said.splitlines() if not line.startswith(_BESIDE)]
+    if command == 'replay' and code == 0:
+        lines = [line for line in lines if not line.startswith('linkage replay: ')]
     if code == 0 or (command, code) == ('synthesize', 1):
         return f'said {lines[0][:200]}' if lines else ''
     if code != 2:

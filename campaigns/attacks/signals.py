@@ -45,6 +45,7 @@ _COMMANDS = {
     'check': ['jansen_leg.yaml'],
     'solve': ['jansen_leg.yaml', '--steps', '30000', '-o', 'x.csv'],
     'draw': ['jansen_leg.yaml', '-o', 'x.svg'],
+    'compile': ['jansen_leg.yaml', '-o', 'x.c'],
     'urdf': ['jansen_leg.yaml', '-o', 'x.urdf'],
     'mjcf': ['jansen_leg.yaml', '-o', 'x.xml'],
     'scene': ['jansen_leg.yaml'],

@@ -65,9 +65,8 @@ def _typed(action: argparse.Action) -> str:
     if action.nargs == argparse.REMAINDER:
         values = ' …'
     elif action.nargs != 0:
-        shown = (
-            action.metavar or (action.choices and '|'.join(action.choices)) or action.dest.upper()
-        )
+        choices = '|'.join(map(str, action.choices or ()))
+        shown = action.metavar or choices or action.dest.upper()
         names = (shown,) if isinstance(shown, str) else shown
         values = ' ' + ' '.join(names)
     return ', '.join(code(option + values) for option in action.option_strings)

@@ -32,7 +32,7 @@ from linkage_ros.accuracy.measure import measure_accuracy, PARTS
 from linkage_ros.accuracy.page.folder import check_folder, PAGE, write_page
 from linkage_ros.cli.accuracy_tables import print_results
 from linkage_ros.cli.progress import progress, Told
-from linkage_ros.errors import did_you_mean, LinkageError
+from linkage_ros.errors import did_you_mean, LinkageError, listed
 from linkage_ros.scene.load import load_scene
 
 _REFERENCE = 'mpmath'
@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--only',
         default=','.join(PARTS),
         metavar='PARTS',
-        help=f'parts to measure, separated by commas, of {", ".join(PARTS)}',
+        help=f'parts to measure, separated by commas, of {listed(PARTS)}',
     )
 
 
@@ -113,6 +113,6 @@ def _parts(text: str) -> list[str]:
     parts = [part.strip() for part in text.split(',')]
     for part in parts:
         if part not in PARTS:
-            remedy = did_you_mean(part, PARTS, f'known: {", ".join(PARTS)}')
+            remedy = did_you_mean(part, PARTS, f'known: {listed(PARTS)}')
             raise LinkageError(f'--only {part}', 'there is no such part', remedy)
     return parts

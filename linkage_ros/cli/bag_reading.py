@@ -28,11 +28,11 @@ from threading import Event
 from linkage_ros.bag.account import counts_in
 from linkage_ros.bag.reading.contents import TOLD_EVERY
 from linkage_ros.bag.reading.layout import layout_of
-from linkage_ros.bag.reading.reader import Bag, BagMessage, read_bag
+from linkage_ros.bag.reading.reader import Bag, BagMessage, MOST_ATTACHED, read_bag
 from linkage_ros.bag.reading.run_events import run_account, run_said, RunAccount
 from linkage_ros.bag.recovering.recovery import NOTHING_LOST, RECOVERED
 from linkage_ros.cli.progress import progress
-from linkage_ros.errors import BagError, clean
+from linkage_ros.errors import BagError, clean, listed
 from linkage_ros.replay import recorded_scene
 from linkage_ros.scene.scene import Scene
 from linkage_ros.stop import heeded, StoppedError
@@ -43,7 +43,7 @@ _BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside 
 
 def opened(path: Path, stop: Event) -> Bag:
     """
-    Open a bag for reading, as far as it goes.
+    Open a bag for reading, as far as it goes; say what of its attachments is not read.
 
     Raises
     ------
@@ -58,7 +58,14 @@ def opened(path: Path, stop: Event) -> Bag:
         if stop.is_set():
             raise StoppedError
 
-    return read_bag(path, allow_truncated=True, told=look)
+    bag = read_bag(path, allow_truncated=True, told=look)
+    if bag.passed_over:
+        line = (
+            f'linkage: {path}: attachments beyond {MOST_ATTACHED // _MIB} MiB are not read: '
+            f'{listed(bag.passed_over)}'
+        )
+        print(clean(line), file=sys.stderr)
+    return bag
 
 
 def add_trust(parser: argparse.ArgumentParser) -> None:

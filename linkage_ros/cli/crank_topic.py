@@ -22,7 +22,7 @@ from collections.abc import Iterable, Sequence
 from linkage_ros.bag.reading.reader import Bag, BagMessage
 from linkage_ros.bag.reading.run_events import RunAccount
 from linkage_ros.cli.message_values import JOINT_STATE
-from linkage_ros.errors import BagError, did_you_mean
+from linkage_ros.errors import BagError, did_you_mean, listed
 from linkage_ros.joint_state import head_of, JointStateReader, Rejection
 from linkage_ros.scene.scene import Scene
 
@@ -89,7 +89,7 @@ def find_crank_topic(
     if good:
         raise BagError(
             bag.path,
-            f'holds samples of {", ".join(inputs)} on {" and ".join(good)}',
+            f'holds samples of {listed(inputs)} on {listed(good, " and ")}',
             'name one with --crank-topic',
         )
     raise _none(bag, inputs, list(readers), list(names))
@@ -104,7 +104,7 @@ def _candidates(
             raise BagError(
                 bag.path,
                 f'holds no topic {typed} of {JOINT_STATE}',
-                did_you_mean(typed, held, f'it holds {", ".join(held) or "none"}'),
+                did_you_mean(typed, held, f'it holds {listed(held) or "none"}'),
             )
         return [typed]
     commanded = recorded is not None and any(
@@ -122,10 +122,10 @@ def _none(
 ) -> BagError:
     """Return what is missing, and what is there."""
     missing = [name for name in inputs if name not in names] or inputs
-    where = f' on {", ".join(topics)}' if topics else f'; it has no topic of {JOINT_STATE}'
-    there = f', which has {", ".join(names)}' if names else ''
+    where = f' on {listed(topics)}' if topics else f'; it has no topic of {JOINT_STATE}'
+    there = f', which has {listed(names)}' if names else ''
     return BagError(
         bag.path,
-        f'holds no samples of {", ".join(missing)}{where}{there}',
+        f'holds no samples of {listed(missing)}{where}{there}',
         'name a scene whose inputs it holds, or another topic with --crank-topic',
     )

@@ -35,7 +35,7 @@ from threading import Event
 from linkage_ros.cli.plot import draw
 from linkage_ros.cli.run import add_run_arguments, run_scene
 from linkage_ros.cli.tables import show, Table
-from linkage_ros.errors import did_you_mean, LinkageError
+from linkage_ros.errors import did_you_mean, LinkageError, listed
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Member, Scene
 from linkage_ros.shipped import shipped
@@ -134,7 +134,7 @@ def _file(name: str) -> Path:
     files = _files()
     if name in files:
         return files[name]
-    remedy = did_you_mean(name, files, f'there are: {", ".join(files)}')
+    remedy = did_you_mean(name, files, f'there are: {listed(files)}')
     raise LinkageError(name, 'there is no such scene', remedy)
 
 

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from itertools import islice
 from pathlib import Path
 import sys
@@ -49,8 +49,8 @@ from linkage_ros.cli.tick_rows import (
     survey,
     TIME,
 )
-from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
-from linkage_ros.replay import recorded_scene
+from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError, listed
+from linkage_ros.replay import own_joint_states, recorded_scene
 from linkage_ros.scene.scene import Scene
 from linkage_ros.stop import StoppedError
 
@@ -149,8 +149,9 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
     """Return what to write, as it was asked for or as the bag says."""
     types = {each.name: each.type for each in bag.topics}
     readable = {name: kind for name, kind in types.items() if kind in TYPES}
+    run = run_or_blank(bag)
     if topic is not None:
-        others = f'name {" or ".join(readable) or "another bag"}'
+        others = f'name {listed(readable, " or ") or "another bag"}'
         if topic not in types:
             raise BagError(
                 bag.path, f'holds no topic {topic}', did_you_mean(topic, readable, others)
@@ -159,47 +160,25 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
             raise BagError(
                 bag.path, f'{topic} is of {types[topic]}, which is not about joints', others
             )
-        return Source(bag, {topic: types[topic]}, (), _any)
-    run = run_or_blank(bag)
+        # Commands of a crank may name joints that follow from it, without a number for them.
+        dependent: frozenset[str] = frozenset()
+        if scene is not None and topic == run.crank_topic:
+            dependent = scene.dependent_joints
+        return Source(bag, {topic: types[topic]}, (), {}, dependent)
     joint_states = run.joint_states_topic
     if joint_states not in readable:
         joint_states = _only_joint_states(bag, readable)
-        return Source(bag, {joint_states: JOINT_STATE}, (), _any)
+        return Source(bag, {joint_states: JOINT_STATE}, (), {})
     written = [joint_states, *(name for name in run.extras if name in readable)]
-    own = _Own(scene) if scene is not None and run.crank_topic == joint_states else _any
+    wanted = {}
+    if scene is not None and run.crank_topic == joint_states:
+        wanted[joint_states] = own_joint_states(scene)
     return Source(
         bag,
         {name: types[name] for name in written},
         {run.crank_topic, run.faults_topic, run.withheld_topic, run.resets_topic},
-        own,
+        wanted,
     )
-
-
-def _any(_names: Sequence[str]) -> bool:
-    return True
-
-
-class _Own:
-    """
-    Tells joint states of a scene from crank samples on the same topic, by their joints.
-
-    Parameters
-    ----------
-    scene
-        The scene; of its linkages some may be left out of a message.
-
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        self._members = [member.joints for member in scene.members]
-
-    def __call__(self, names: Sequence[str]) -> bool:
-        left = tuple(names)
-        for joints in self._members:
-            count = len(joints)
-            if left[:count] == joints:
-                left = left[count:]
-        return not left
 
 
 def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
@@ -207,13 +186,11 @@ def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
     if len(found) == 1:
         return found[0]
     if found:
-        raise BagError(
-            bag.path, f'holds joint states on {", ".join(found)}', 'name one with --topic'
-        )
+        raise BagError(bag.path, f'holds joint states on {listed(found)}', 'name one with --topic')
     raise BagError(
         bag.path,
         f'holds no topic of {JOINT_STATE}',
-        f'name {" or ".join(readable)} with --topic' if readable else 'name another bag',
+        f'name {listed(readable, " or ")} with --topic' if readable else 'name another bag',
     )
 
 
@@ -222,7 +199,7 @@ def _nothing(source: Source, found: Found) -> BagError:
     why = f' ({reasons[0][1]} left out: {reasons[0][0][1]})' if reasons else ''
     return BagError(
         source.bag.path,
-        f'holds no message on {", ".join(source.types)} to write{why}',
+        f'holds no message on {listed(source.types)} to write{why}',
         'name another topic with --topic, or another bag',
     )
 

@@ -24,7 +24,7 @@ from threading import Event
 
 from linkage_ros import __version__
 from linkage_ros.cli.outlet import clean_output
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import LinkageError, missing_packages_reported
 from linkage_ros.stop import end_soon, raising, stop_on_signals, StoppedError
 
 COMMANDS = {
@@ -43,6 +43,7 @@ COMMANDS = {
     'check': 'say what a linkage is: freedom, loops, ranges, toggles, transmission angles',
     'solve': 'solve a linkage at some inputs or over its range, to a table, CSV or JSON',
     'draw': 'draw a linkage, and its joints over its range',
+    'compile': 'write a linkage as source in C, JavaScript or Python that needs nothing else',
     'urdf': 'write a linkage or a scene as URDF, for robot_state_publisher and RViz',
     'mjcf': 'write a linkage or a scene as MJCF, for MuJoCo, with its closed loops',
     'import': 'make a linkage file of a URDF and the pins that close it',
@@ -93,11 +94,12 @@ def _run(arguments: list[str], stop: Event) -> int:
     parser.add_argument('command', choices=COMMANDS, metavar='COMMAND')
     name = parser.parse_args(arguments[:1]).command
 
-    module = import_module(module_of(name))
-    subparser = argparse.ArgumentParser(prog=f'linkage {name}', description=module.__doc__)
-    module.add_arguments(subparser)
     try:
-        return int(module.run(subparser.parse_args(arguments[1:]), stop))
+        with missing_packages_reported():
+            module = import_module(module_of(name))
+            subparser = argparse.ArgumentParser(prog=f'linkage {name}', description=module.__doc__)
+            module.add_arguments(subparser)
+            return int(module.run(subparser.parse_args(arguments[1:]), stop))
     except LinkageError as error:
         print(f'linkage {name}: {error}', file=sys.stderr)
         return 2

@@ -25,7 +25,8 @@ as ``~/pin_forces``; of these what acts in the plane: forces in x and y, moment 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
+from functools import partial
 from operator import itemgetter
 from struct import error as StructError
 from struct import Struct
@@ -128,13 +129,18 @@ class MessageValues:
     ----------
     message_type
         One of `JOINT_STATE`, `TRAJECTORY` and `WRENCHES`; messages of others tell nothing.
+    dependent
+        Names of joints that nobody can command. A JointState may name them without a number, as
+        `JointEffortReader` takes it.
 
     """
 
     __slots__ = ('_layout', '_parse')
 
-    def __init__(self, message_type: str) -> None:
+    def __init__(self, message_type: str, dependent: Collection[str] = ()) -> None:
         self._parse = _PARSERS.get(message_type, _others)
+        if message_type == JOINT_STATE:
+            self._parse = partial(_joint_state, dependent=dependent)
         self._layout: _Layout | None = None
 
     def read(self, data: bytes) -> Values | str:
@@ -208,17 +214,19 @@ def _pick(places: Sequence[int]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]
     return itemgetter(*places)
 
 
-def _joint_state(data: bytes) -> _Parsed | str:
+def _joint_state(data: bytes, dependent: Collection[str] = ()) -> _Parsed | str:
     found = arrays_of(data)
     if isinstance(found, Rejection):
         return found.value
     order, encoded, places = found
     names = [_text(name) for name in encoded]
+    able = [name for name in names if name not in dependent]
     arrays = []
     for quantity, (count_at, n, first) in zip((POSITION, RATE, EFFORT), places, strict=True):
-        if n not in (0, len(names)):
+        told = next((some for some in ((), names, able) if len(some) == n), None)
+        if told is None:
             return UNEQUAL
-        arrays.append(_Array(count_at, first, [(name, quantity) for name in names] if n else []))
+        arrays.append(_Array(count_at, first, [(name, quantity) for name in told]))
     return order, names, arrays
 
 

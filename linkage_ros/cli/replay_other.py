@@ -31,8 +31,8 @@ from linkage_ros.cli.proof import turning_joints
 from linkage_ros.cli.replay_account import bag_account, joints_account, topic_account
 from linkage_ros.cli.replay_comparison import At, Comparison
 from linkage_ros.cli.what_if import check_drives, Remade, WhatIf
-from linkage_ros.errors import LinkageError
-from linkage_ros.replay import own_head, recorded_scene
+from linkage_ros.errors import LinkageError, listed
+from linkage_ros.replay import own_joint_states, recorded_scene
 from linkage_ros.scene.scene import Scene
 
 
@@ -72,7 +72,7 @@ def replayed_with(
     shared = [name for name in (run.joint_states_topic, *run.extras) if name and name in kinds]
     comparison = Comparison([(name, kinds[name]) for name in shared])
     new_bag = NewBag(output, source, scene, what_if, names) if output is not None else None
-    own = own_head(recorded) if recorded is not None else b''
+    own = own_joint_states(recorded) if recorded is not None else bool
     begin: list[int] = []
     published = 0
     try:
@@ -123,7 +123,7 @@ def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path |
         return
     raise LinkageError(
         scene.members[0].content.file,
-        f'publishes {", ".join(scene.joints)}, and {bag.path} holds {", ".join(recorded.joints)}: '
+        f'publishes {listed(scene.joints)}, and {bag.path} holds {listed(recorded.joints)}: '
         'nothing to compare',
         'write a new bag with -o',
     )

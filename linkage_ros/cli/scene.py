@@ -28,7 +28,7 @@ from threading import Event
 from linkage_ros.cli.parameter_tables import REGISTRIES, table_of
 from linkage_ros.cli.scene_tables import tables
 from linkage_ros.cli.tables import show
-from linkage_ros.errors import did_you_mean, FileError, LinkageError
+from linkage_ros.errors import did_you_mean, FileError, LinkageError, listed
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.linkage_schema import linkage_schema
 from linkage_ros.scene.load import kind_of, load_scene
@@ -99,7 +99,7 @@ def _named(names: list[str]) -> Iterator[tuple[str, str]]:
             raise LinkageError(
                 f'--list {name}',
                 'there is no such drive, effect, fault or solver',
-                did_you_mean(name, words, f'known: {", ".join(words)}'),
+                did_you_mean(name, words, f'known: {listed(words)}'),
             )
         yield from found
 

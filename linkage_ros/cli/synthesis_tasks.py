@@ -25,7 +25,7 @@ from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.cli.progress import Told
 from linkage_ros.cli.typed_numbers import numbers_of
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import LinkageError, listed
 from linkage_ros.synthesis.defects import assess, Assessment
 from linkage_ros.synthesis.design import Design
 from linkage_ros.synthesis.needs import misses, Needs
@@ -104,9 +104,9 @@ def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
     named = [option for option, value in tasks.items() if value]
     if len(named) != 1:
         raise LinkageError(
-            ' and '.join(named) or 'linkage synthesize',
+            listed(named, ' and ') or 'linkage synthesize',
             'stand for two tasks' if named else 'nothing is asked for',
-            f'name one of {", ".join(tasks)}',
+            f'name one of {listed(tasks)}',
         )
     work = {'--pair': _pairs, '--function': _function, '--path': _path, '--pose': _motion}
     return work[named[0]](typed, search)

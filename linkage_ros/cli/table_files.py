@@ -32,7 +32,7 @@ import os
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import LinkageError, listed
 
 Row = Sequence[float | int | None]
 Write = Callable[[Sequence[Row]], None]
@@ -99,7 +99,7 @@ def check_kind(file: Path) -> None:
         raise LinkageError(
             str(file),
             f'ends in {ending!r}' if ending else 'has no ending',
-            f'name a file that ends in {" or ".join(KINDS)}',
+            f'name a file that ends in {listed(KINDS, " or ")}',
         )
     if ending == '.parquet':
         _check_pyarrow()

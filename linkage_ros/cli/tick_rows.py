@@ -58,14 +58,17 @@ class Source(NamedTuple):
     closing
         Topics whose messages end a tick.
     wanted
-        Tells by the names in a JointState whether it is one; others of its topic are passed over.
+        Of a topic with messages of others, what tells which are of the rows.
+    dependent
+        Names of joints that nobody can command, as for `MessageValues`.
 
     """
 
     bag: Bag
     types: Mapping[str, str]
     closing: Collection[str]
-    wanted: Callable[[Sequence[str]], bool]
+    wanted: Mapping[str, Callable[[bytes], bool]]
+    dependent: Collection[str] = ()
 
 
 class Found(NamedTuple):
@@ -177,7 +180,9 @@ def rows_of(source: Source, keys: Sequence[Key], told: Told) -> Iterator[Row]:
 
 def _ticks(source: Source, left_out: Counter[tuple[str, str]], told: Told) -> Iterator[_Tick]:
     """Yield the ticks of a bag; count the messages that are left out."""
-    readers = {topic: MessageValues(kind) for topic, kind in source.types.items()}
+    readers = {
+        topic: MessageValues(kind, source.dependent) for topic, kind in source.types.items()
+    }
     closing, wanted = source.closing, source.wanted
     tick: _Tick | None = None
     read = 0
@@ -189,7 +194,7 @@ def _ticks(source: Source, left_out: Counter[tuple[str, str]], told: Told) -> It
         values = reader.read(data) if reader is not None else None
         if isinstance(values, str):
             left_out[topic, values] += 1
-        elif values is not None and wanted(values.names):
+        elif values is not None and (topic not in wanted or wanted[topic](data)):
             if tick is not None:
                 if tick.published == published and topic not in tick.messages:
                     tick.messages[topic] = values

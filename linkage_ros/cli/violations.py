@@ -22,7 +22,7 @@ from re import search
 from typing import Any, TYPE_CHECKING
 
 from jsonschema import Draft202012Validator
-from linkage_ros.errors import did_you_mean, FileError, quoted
+from linkage_ros.errors import did_you_mean, FileError, listed, quoted
 from linkage_ros.scene.schema import Schema
 from linkage_ros.scene.section import LinedDict, Section
 
@@ -93,13 +93,13 @@ def _said(error: ValidationError, whole: Schema) -> Iterator[_Said]:
             yield path, f'the key {missing!r} is missing', f'add {missing}: {meaning or "…"}'
         case 'maxProperties':
             others = f'leave all but {wanted} out'
-            yield path, f'{", ".join(value)} stand beside each other', others
+            yield path, f'{listed(value)} stand beside each other', others
         case 'minProperties':
             yield path, 'is empty', 'name one at least'
         case 'oneOf':
             kinds = [kind['required'][0] for kind in wanted]
             named = [kind for kind in kinds if kind in value]
-            yield path, f'{len(named)} kinds', f'name one of {", ".join(kinds)}'
+            yield path, f'{len(named)} kinds', f'name one of {listed(kinds)}'
         case 'not':
             one, other = wanted['required']
             yield (*path, other), f'stands beside {one}', 'write one of the two'
@@ -159,7 +159,7 @@ def _meaning(schema: Schema, whole: Schema) -> str:
 
 
 def _near(key: str, known: Sequence[str]) -> str:
-    otherwise = f'known: {", ".join(sorted(known))}' if known else 'leave it out'
+    otherwise = f'known: {listed(sorted(known))}' if known else 'leave it out'
     return did_you_mean(key, known, otherwise)
 
 

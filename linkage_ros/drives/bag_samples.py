@@ -28,7 +28,7 @@ from collections.abc import Mapping
 from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.bag.reading.run_events import run_said
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
-from linkage_ros.errors import BagError
+from linkage_ros.errors import BagError, listed
 from linkage_ros.joint_state import JointStateReader, Rejection
 
 _TYPE = 'sensor_msgs/msg/JointState'
@@ -115,7 +115,7 @@ def read_samples(
     """
     of_type = [each.name for each in bag.topics if each.type == _TYPE]
     if topic and topic not in of_type:
-        known = ', '.join(of_type) or 'no other'
+        known = listed(of_type) or 'no other'
         raise BagError(bag.path, f'holds no topic {topic!r} of {_TYPE}', f'it holds {known}')
     own = topic or _crank_topic_of_run(bag)
     found = {
@@ -131,12 +131,12 @@ def read_samples(
     if good:
         raise BagError(
             bag.path,
-            f'holds crank samples on {", ".join(good)}',
+            f'holds crank samples on {listed(good)}',
             'name one of them as drive.bag.topic',
         )
     raise BagError(
         bag.path,
-        f'holds no crank sample of {", ".join(inputs)}{_why(found)}',
+        f'holds no crank sample of {listed(inputs)}{_why(found)}',
         'name another bag, or its topic as drive.bag.topic',
     )
 

@@ -27,7 +27,7 @@ from typing import TypeVar
 
 from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.drives.limits import refuse_beyond
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.written import Lines
 
 LARGEST = 1e10
@@ -129,7 +129,7 @@ def build_clocked(
     if inputs and len(inputs) == len(names):
         raise DefinitionError(
             f'{where}.inputs',
-            f'names every input ({", ".join(names)}), so that what stands beside it has no part',
+            f'names every input ({listed(names)}), so that what stands beside it has no part',
             f'leave one of them out: it follows what stands beside {where}.inputs',
         )
     curves = []

@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 
 
@@ -188,4 +188,4 @@ def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None
 
 
 def _one_of(names: Iterable[str]) -> str:
-    return f'name one of {", ".join(sorted(names))}'
+    return f'name one of {listed(sorted(names))}'

@@ -43,7 +43,7 @@ from math import hypot
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Stage, yielding
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.parameters import each, Number
 
 _SMALLEST = 1e-12
@@ -82,7 +82,7 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
             raise DefinitionError(
                 f'effects.clearance.pins.{name}',
                 f'{name!r} is a slider, and what leans is a pin in its hole',
-                f'name pins: {", ".join(sorted(pins))}',
+                f'name pins: {listed(sorted(pins))}',
             )
     plays = tuple(
         (number, parameters.pins[joint.name])

@@ -39,7 +39,7 @@ from typing import NamedTuple
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Stage, yielding
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.kinematics.structure import Joint
 from linkage_ros.parameters import each, Number
 
@@ -131,7 +131,7 @@ def _bar(context: Context, link: str, stiffness: float) -> _Bar:
             _check(link, joint)
             ends.setdefault(joint.name, []).append((number, 1.0 if joint.link == link else -1.0))
     if len(ends) != 2:
-        raise _error(link, f'has the pins {", ".join(ends)}')
+        raise _error(link, f'has the pins {listed(ends)}')
     near, far = ends
     points = closure.linkage.links[link]
     between = complex(*points[far]) - complex(*points[near])

@@ -40,7 +40,7 @@ from types import ModuleType
 from typing import Any
 
 from linkage_ros.effects.stage import EFFECTS, NEEDS
-from linkage_ros.errors import DefinitionError, did_you_mean, quoted
+from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
 from linkage_ros.parameters import declared
 
 QUANTITIES = ('velocity', 'acceleration', 'effort', 'pin_forces')
@@ -159,12 +159,12 @@ def _check(name: str, module: ModuleType) -> None:
         )
     own = [function for function in FUNCTIONS if hasattr(module, function)]
     if not own:
-        raise DefinitionError(name, 'does nothing', f'define one of {", ".join(FUNCTIONS)}')
+        raise DefinitionError(name, 'does nothing', f'define one of {listed(FUNCTIONS)}')
     topics = [key for key in ('TOPIC', 'MESSAGE', 'writer') if hasattr(module, key)]
     if topics and len(topics) < 3:
         raise DefinitionError(
             name,
-            f'has {" and ".join(topics)} alone',
+            f'has {listed(topics, " and ")} alone',
             'TOPIC, MESSAGE and writer(parameters, context) go together',
         )
     if topics and not str(module.TOPIC).startswith('~/'):
@@ -178,7 +178,7 @@ def _check_order(name: str, module: ModuleType) -> None:
     """Refuse what acts before what it starts from, or where nothing can."""
     after = getattr(module, 'AFTER', None)
     if after not in EFFECTS:
-        known = f'name one of {", ".join(EFFECTS)}'
+        known = f'name one of {listed(EFFECTS)}'
         said = f'AFTER is {quoted(after)}' if after is not None else 'does not say AFTER which'
         remedy = did_you_mean(after, EFFECTS, known) if isinstance(after, str) else known
         raise DefinitionError(name, f'{said}: that is no effect', remedy)
@@ -186,7 +186,7 @@ def _check_order(name: str, module: ModuleType) -> None:
     for need in needs:
         if need not in QUANTITIES:
             raise DefinitionError(
-                name, f'NEEDS {quoted(need)}', f'of quantities there are {", ".join(QUANTITIES)}'
+                name, f'NEEDS {quoted(need)}', f'of quantities there are {listed(QUANTITIES)}'
             )
     last = max((_ORDER.index(need) for need in needs), default=0)
     if last > _ORDER.index(after):

@@ -20,7 +20,7 @@ from __future__ import annotations
 from itertools import combinations
 from math import inf, isfinite, isnan
 
-from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.linkage import (
     GROUND,
     Input,
@@ -96,7 +96,7 @@ def _check_points(linkage: Linkage) -> None:
         if len(shared) > 1:
             raise DefinitionError(
                 f'links.{other}',
-                f'shares the points {", ".join(shared)} with {one!r}',
+                f'shares the points {listed(shared)} with {one!r}',
                 'two links have one pin between them; rename the points that are not pins',
             )
     carriers: dict[str, int] = {}
@@ -130,7 +130,7 @@ def _check_slider(linkage: Linkage, name: str, slider: Slider) -> None:
     if not carriers or slider.along in carriers:
         raise DefinitionError(
             f'{key}.point',
-            f'{quoted(slider.point)} is named on {", ".join(carriers) or "no link"}',
+            f'{quoted(slider.point)} is named on {listed(carriers) or "no link"}',
             f'name a point of a link other than {slider.along!r}',
         )
     if slider.block and slider.block not in carriers:
@@ -227,4 +227,4 @@ def _check_link(linkage: Linkage, key: str, name: str) -> None:
 
 
 def _one_of(names: object) -> str:
-    return f'name one of {", ".join(sorted(names))}'  # type: ignore[call-overload]
+    return f'name one of {listed(sorted(names))}'  # type: ignore[call-overload]

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.limits import Bound
 from linkage_ros.kinematics.machine_ranges import within_own, within_published
@@ -54,7 +54,7 @@ def check_limits(closure: Closure) -> None:
     if len(linkage.inputs) == 1:
         _check_single(closure)
     elif not (linkage.pose and joints) and not _met_on_grid(closure):
-        names = ', '.join(map(quoted, linkage.limits))
+        names = listed(map(quoted, linkage.limits))
         raise DefinitionError(
             'input.limits',
             f'no state was found within the limits of {names}',
@@ -84,7 +84,7 @@ def _check_single(closure: Closure) -> None:
                 'widen them',
             )
     if bounds.joints and not within_published(closure, ranges, bounds.joints):
-        names = ', '.join(quoted(bound.name) for bound in bounds.joints)
+        names = listed(quoted(bound.name) for bound in bounds.joints)
         raise DefinitionError(
             'joints',
             f'the limits of {names} are met, but never together',

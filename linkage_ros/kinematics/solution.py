@@ -22,7 +22,7 @@ from dataclasses import replace
 from math import inf
 from typing import NamedTuple
 
-from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.diagonal import AnyDiagonal
 from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
@@ -115,7 +115,7 @@ class Planner(KnownLinks):
             raise DefinitionError(
                 f'assembly.{name}',
                 f'{quoted(name)} does not close a dyad that has two assemblies',
-                f'name {", ".join(map(repr, self._keys))}' if self._keys else 'leave it out',
+                f'name {listed(map(repr, self._keys))}' if self._keys else 'leave it out',
             )
 
     def _drive(self, driven: Driven) -> None:

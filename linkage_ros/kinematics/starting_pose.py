@@ -21,7 +21,7 @@ from cmath import phase, rect
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.kinematics.linkage import Linkage
 
 
@@ -80,7 +80,7 @@ def starting_pose(
     if linkage.pose is None:
         raise DefinitionError(
             'pose',
-            f'is missing: no dyad covers {", ".join(links)}, they are solved by iteration',
+            f'is missing: no dyad covers {listed(links)}, they are solved by iteration',
             'give inputs, and where points of these links lie then: '
             'pose: {inputs: [...], points: {...}}',
         )
@@ -123,7 +123,7 @@ def starting_pose(
                     raise DefinitionError(
                         'pose.points',
                         f'does not say where {link!r} lies',
-                        f'give two of its points: {", ".join(points[link])}',
+                        f'give two of its points: {listed(points[link])}',
                     )
                 angles[link] = found
         return angles[link]

@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from linkage_ros.errors import did_you_mean, FileError, quoted
+from linkage_ros.errors import did_you_mean, FileError, listed, quoted
 from linkage_ros.models.urdf_robot import MOVING, UrdfFile
 
 _LINE = '_line'
@@ -88,7 +88,7 @@ def find_closings(
                     urdf.file,
                     f'--close {"=".join(pair)}',
                     f'there is no link {quoted(link)}',
-                    did_you_mean(link, urdf.links, f'name two of {", ".join(urdf.links)}'),
+                    did_you_mean(link, urdf.links, f'name two of {listed(urdf.links)}'),
                 )
         if pair[0] == pair[1]:
             raise FileError(

@@ -23,7 +23,7 @@ from dataclasses import replace
 from math import hypot, inf, tau
 from typing import NamedTuple
 
-from linkage_ros.errors import DefinitionError, did_you_mean, FileError
+from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed
 from linkage_ros.kinematics.linkage import (
     GROUND,
     Input,
@@ -107,7 +107,7 @@ class _Import:
                     raise self._error(
                         f'{option} {name}',
                         'is no joint that moves',
-                        did_you_mean(name, moving, f'name one of {", ".join(moving)}'),
+                        did_you_mean(name, moving, f'name one of {listed(moving)}'),
                     )
         self._inputs = tuple(inputs) or urdf.inputs
         self._loops = find_loops(urdf, self._closings, self._inputs)
@@ -149,7 +149,7 @@ class _Import:
             raise self._error(
                 '',
                 'does not say which joint drives it',
-                f'write --input JOINT, one of {", ".join(made.joints)}',
+                f'write --input JOINT, one of {listed(made.joints)}',
             )
         frames = self._frames()
         self._check_met(frames)
@@ -175,7 +175,7 @@ class _Import:
         return Input(name, joint.parent, joint.child)
 
     def _one_of(self, but: str = '') -> str:
-        return f'name one of {", ".join(each for each in self._skeleton.joints if each != but)}'
+        return f'name one of {listed(each for each in self._skeleton.joints if each != but)}'
 
     def _frames(self) -> dict[str, tuple[complex, float]]:
         """Return place and angle of every body in the pose, in the frame of the root."""

@@ -30,7 +30,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
-from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.models.names import free_name, Names, PrefixedNames
 from linkage_ros.models.orientation import named_joints, Orientations, Turn
@@ -293,6 +293,6 @@ def _missing(linkage: Linkage) -> DefinitionError:
     return DefinitionError(
         'joints',
         f'the published ones do not tell where link{"s" if several else ""} '
-        f'{" and ".join(map(quoted, lost))} {"stand" if several else "stands"}',
+        f'{listed(map(quoted, lost), " and ")} {"stand" if several else "stands"}',
         f'add to joints: {", ".join(joint_text(name, joint) for name, joint in added.items())}',
     )

@@ -24,10 +24,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
+import re
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from linkage_ros.errors import DefinitionError
+from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.linkage import GROUND, Limits, Mass, NO_LIMITS
 from linkage_ros.kinematics.survey import usual_inputs
 from linkage_ros.models.bodies import bodies, Body
@@ -46,6 +47,9 @@ FARTHEST = 1e9
 """In [rad]: where an angle is limited that goes on and on to this side, and to the other not."""
 
 _ROOT = 'world'
+
+_EXPRESSION = re.compile(r'\$[{(]')
+"""What xacro evaluates (https://wiki.ros.org/xacro)."""
 
 
 class _Model(NamedTuple):
@@ -73,7 +77,8 @@ def urdf(name: str, parts: Sequence[Part]) -> bytes:
     Raises
     ------
     PartError
-        Where the published joints of one do not tell where all its links are.
+        Where the published joints of one do not tell where all its links are, or xacro would
+        evaluate one of its names.
 
     """
     names, own = prefixed([(part.prefix, part.closure.linkage) for part in parts])
@@ -98,9 +103,32 @@ def urdf(name: str, parts: Sequence[Part]) -> bytes:
                 model.names.joint('mount'), 'fixed', root, model.names.own(GROUND), 0j
             )
             _joint(robot, mount, None, NO_LIMITS)
-    for model in models:
+    _refuse_expressions(0, robot, of_linkage=False)
+    for count, model in enumerate(models):
+        before = len(robot)
         _write(robot, model)
+        for element in robot[before:]:
+            _refuse_expressions(count, element)
     return document(robot)
+
+
+def _refuse_expressions(number: int, element: ET.Element, *, of_linkage: bool = True) -> None:
+    """
+    Refuse names that xacro would evaluate.
+
+    A launch file reads a URDF by way of xacro or as it is; what is escaped for the one is another
+    name in the other.
+    """
+    for each in element.iter():
+        for text in each.attrib.values():
+            if _EXPRESSION.search(text):
+                raise PartError(
+                    number,
+                    '',
+                    f'xacro would evaluate the name {quoted(text)}',
+                    'choose a name without ${ and $(',
+                    of_linkage=of_linkage,
+                )
 
 
 def _head(models: Sequence[_Model]) -> Iterator[str]:

@@ -21,7 +21,7 @@ from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 from xml.etree import ElementTree as ET
 
-from linkage_ros.errors import FileError, quoted
+from linkage_ros.errors import FileError, listed, quoted
 from linkage_ros.kinematics.linkage import Limits, NO_LIMITS
 from linkage_ros.models.urdf_robot import Inertial, MOVING, UrdfFile, UrdfJoint, UrdfLink, Vector
 
@@ -154,13 +154,13 @@ class _Reader:
         where, kind = f'joint {name}', element.get('type', '')
         if kind not in _KINDS:
             raise self._error(
-                where, f'type={quoted(kind)} is none', f'write {", ".join(MOVING)} or fixed'
+                where, f'type={quoted(kind)} is none', f'write {listed(MOVING)} or fixed'
             )
         if kind in ('floating', 'planar'):
             raise self._error(
                 where,
                 f'is {kind}, which no pin or slider of a planar linkage is',
-                f'write {", ".join(MOVING)} or fixed, or leave it out with what hangs on it',
+                f'write {listed(MOVING)} or fixed, or leave it out with what hangs on it',
             )
         parent, child = (self._end(element, end, where, links) for end in ('parent', 'child'))
         axis = self._vector(element.find('axis'), 'xyz', where, '1 0 0')
@@ -255,7 +255,7 @@ class _Reader:
             held[joint.child] = joint
         roots = [link for link in links if link not in held]
         if len(roots) != 1:
-            reason = f'has {len(roots)} roots ({", ".join(roots)})' if roots else 'has no root'
+            reason = f'has {len(roots)} roots ({listed(roots)})' if roots else 'has no root'
             raise self._error('', reason, 'join all links by joints to one that is held by none')
         ordered = list(_below(roots[0], joints))
         for joint in joints.values():

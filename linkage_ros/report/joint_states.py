@@ -58,15 +58,12 @@ class JointBlock(NamedTuple):
         In [ns]; 0 where it was not read.
     numbers
         Of shape (messages, 3, joints): positions, rates and efforts; NaN where there is none.
-    heads
-        Which have the bytes that were asked for behind the stamp.
 
     """
 
     good: Flags
     stamps: Times
     numbers: Numbers
-    heads: Flags
 
 
 class JointStates:
@@ -77,8 +74,6 @@ class JointStates:
     ----------
     joints
         Those that come first; others follow as they turn up.
-    head
-        What may stand behind the stamp of some of them: it tells those of one publisher.
     others
         Whether others may follow; where not, they are passed over.
 
@@ -91,14 +86,11 @@ class JointStates:
 
     """
 
-    def __init__(
-        self, joints: Sequence[str] = (), head: bytes = b'', *, others: bool = True
-    ) -> None:
+    def __init__(self, joints: Sequence[str] = (), *, others: bool = True) -> None:
         self.joints = list(joints)
         self._most = max(len(self.joints), MOST_JOINTS) if others else len(self.joints)
         self._others = others
         self.left_out: Counter[str] = Counter()
-        self._head = head
 
     def read(self, messages: Sequence[bytes]) -> JointBlock:
         """Return messages as arrays."""
@@ -132,10 +124,7 @@ class JointStates:
             for quantity, values in found:
                 under = [columns[i] for i in kept]
                 numbers[which[:, None], quantity, under] = values[:, kept]
-        heads = np.zeros(n, bool)
-        if self._head:
-            heads[:] = [message.startswith(self._head, 12) for message in messages]
-        return JointBlock(good, stamps, numbers, heads)
+        return JointBlock(good, stamps, numbers)
 
     def _alike(
         self, table: NDArray[np.uint8], first: bytes

@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from linkage_ros.report.arrays import Times
@@ -53,7 +53,10 @@ class Rows(NamedTuple):
 
 
 def rows_of(
-    block: Mapping[str, list[Entry]], topics: Mapping[str, str], head: bytes, clock: RunClock
+    block: Mapping[str, list[Entry]],
+    topics: Mapping[str, str],
+    own: Callable[[bytes], bool] | None,
+    clock: RunClock,
 ) -> dict[str, Rows]:
     """
     Return the messages of a block by kind.
@@ -64,9 +67,8 @@ def rows_of(
         The messages of each topic.
     topics
         The kind of each; others are left out.
-    head
-        What the run's own joint states have behind their stamp, where the samples share their
-        topic; else nothing.
+    own
+        Tells the run's own joint states from the samples, where these share their topic.
     clock
         The run's.
 
@@ -74,21 +76,21 @@ def rows_of(
     kinds: dict[str, list[Entry]] = {kind: [] for kind in KINDS}
     for topic, entries in block.items():
         kind = topics.get(topic)
-        if kind == 'states' and head:
+        if kind == 'states' and own is not None:
             for entry in entries:
-                kinds['states' if entry[3].startswith(head, 12) else 'samples'].append(entry)
+                kinds['states' if own(entry[3]) else 'samples'].append(entry)
         elif kind is not None:
             kinds[kind] = entries
     numbers = np.array([entry[0] for found in kinds.values() for entry in found], np.int64)
     logged = times_of([entry[1] for found in kinds.values() for entry in found])
     if len(numbers):
         clock.start(int(logged[numbers.argmin()]))
-    own = len(numbers) - len(kinds[_BESIDE])
-    order = np.argsort(numbers[:own])
+    in_turn = len(numbers) - len(kinds[_BESIDE])
+    order = np.argsort(numbers[:in_turn])
     passed = np.empty_like(logged)
     passed[order] = clock.passed(logged[order])
-    behind = np.searchsorted(numbers[order], numbers[own:])
-    passed[own:] = clock.beside(logged[own:], behind)
+    behind = np.searchsorted(numbers[order], numbers[in_turn:])
+    passed[in_turn:] = clock.beside(logged[in_turn:], behind)
     rows, at = {}, 0
     for kind, entries in kinds.items():
         part = slice(at, at + len(entries))

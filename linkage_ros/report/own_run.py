@@ -22,7 +22,7 @@ from linkage_ros.bag.reading.beginning import lost_beginning
 from linkage_ros.bag.reading.contents import Contents
 from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.bag.reading.run_events import run_said, RunAccount
-from linkage_ros.replay import own_head
+from linkage_ros.replay import own_joint_states
 from linkage_ros.report.arrays import Flags, Numbers
 from linkage_ros.report.blocks import Entry
 from linkage_ros.report.clock import RunClock
@@ -88,7 +88,8 @@ class OwnRun:
             run.joint_states_topic: 'states',
         }
         self._topics.pop('', None)
-        self._head = own_head(scene) if run.crank_topic == run.joint_states_topic else b''
+        shared = run.crank_topic == run.joint_states_topic
+        self._own = own_joint_states(scene) if shared else None
         self._linkages = [
             LinkageRun(
                 member.name,
@@ -127,7 +128,7 @@ class OwnRun:
 
     def take(self, block: Mapping[str, list[Entry]]) -> None:
         """Take the messages of a block."""
-        rows = rows_of(block, self._topics, self._head, self._clock)
+        rows = rows_of(block, self._topics, self._own, self._clock)
         for time, by in self._clock.jumps():
             self._lanes['jump'].add(time, time, f'by {by / 1e9:.6g} s')
         states, withheld, health = rows['states'], rows['withheld'], rows['health']

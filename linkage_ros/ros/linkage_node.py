@@ -20,7 +20,8 @@ from __future__ import annotations
 from importlib import import_module
 import sys
 
-from linkage_ros.stop import stop_on_signals
+from linkage_ros.errors import LinkageError, missing_packages_reported
+from linkage_ros.stop import stop_on_signals, StoppedError
 
 
 def main() -> int:
@@ -28,8 +29,15 @@ def main() -> int:
     # First of all, and before the second that rclpy takes to load: a signal at any moment is
     # heeded.
     stop = stop_on_signals()
-    run = import_module('linkage_ros.ros.run')
-    return int(run.run_linkage_node(stop, sys.argv[1:]))
+    try:
+        with missing_packages_reported():
+            run = import_module('linkage_ros.ros.run')
+            return int(run.run_linkage_node(stop, sys.argv[1:]))
+    except LinkageError as error:
+        print(f'linkage_node: {error}', file=sys.stderr)
+        return 2
+    except StoppedError:
+        return 0  # as a signal ends a node at any other moment
 
 
 if __name__ == '__main__':

@@ -33,9 +33,10 @@ from typing import Any, TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticArray
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
+from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import own_joint_states
 from linkage_ros.ros import pacing
 from linkage_ros.ros.bag_topics import bag_topic
 from linkage_ros.ros.diagnostics import CLOCK_PATIENCE, Health, no_clock, Snapshot
@@ -145,7 +146,7 @@ class LinkageNode(LifecycleNode):
     # Transitions.
 
     @_reporting
-    def on_configure(self, _: LifecycleState) -> TransitionCallbackReturn:
+    def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """Load the scene and prove that it can be built."""
         file = self.get_parameter('scene').value
         try:
@@ -156,6 +157,10 @@ class LinkageNode(LifecycleNode):
             scene = load_scene(file)
             pipeline = Pipeline(scene)  # what it calls for is proven now, not at the first tick
             self._scene_topics.connect(pipeline)
+            for closure in pipeline.closures:
+                # Found before the first tick, which would wait for it: iterated links are followed
+                # there.
+                _ = closure.singular_inputs
             if scene.robot_description:
                 self._scene_topics.describe(scene, pipeline)
         except LinkageError as error:
@@ -229,16 +234,12 @@ class LinkageNode(LifecycleNode):
         shared = self.crank_topic == self._joint_states.topic_name
         pipeline = Pipeline(scene, self._closures)
         closures, injection = pipeline.closures, pipeline.injection
-        for closure in closures:
-            # Found before the first tick, which would wait for it: iterated links are followed
-            # there.
-            _ = closure.singular_inputs
         crank = self._scene_topics.crank
         return TickLoop(
             partial(Pipeline, scene, closures, injection),
             self._scene_topics.take,
             self._joint_states.handle.publish_raw,
-            JointStateWriter(scene.joints).names if shared else b'',
+            own_joint_states(scene) if shared else None,
             [extra.handle.publish_raw for extra in self._scene_topics.extras],
             self._scene_topics.publish_change,
             # A queue without bounds is taken from for as long as a tick may.

@@ -28,7 +28,7 @@ from typing import Protocol
 
 from linkage_ros.ros.node import LinkageNode
 from linkage_ros.ros.transports import leave_out_shared_memory
-from linkage_ros.stop import bounded_end
+from linkage_ros.stop import bounded_end, raising, StoppedError
 import rclpy
 from rclpy.executors import (
     ExternalShutdownException,
@@ -90,6 +90,11 @@ def run_linkage_node(
         0; 1 where the recording failed or the tick ended early; 2 for a configuration that is
         wrong.
 
+    Raises
+    ------
+    StoppedError
+        A signal came before the node was configured.
+
     """
     # The tick shares the interpreter with executor and recorder: at the default of 5 ms it would
     # wait for them that long.
@@ -132,7 +137,10 @@ def _spin(
     """Start the node unless it is told not to, and see it through."""
     autostart = node.get_parameter('autostart').value
     if autostart:
-        node.trigger_configure()
+        with raising():
+            if stop.is_set():  # by a signal that came before
+                raise StoppedError
+            node.trigger_configure()
         if node.failure is not None:
             return EXIT_CONFIGURATION
     with _no_garbage_in_ticks():

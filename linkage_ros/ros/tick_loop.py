@@ -98,8 +98,7 @@ class TickLoop:
     publish
         Publishes a serialized JointState.
     own
-        What the node's own messages have behind the stamp where they come back on the crank's
-        topic, so that they can be told; empty where they do not.
+        Tells the node's own messages from others, where they come back on the crank's topic.
     publish_extras
         For each of the pipeline's extras what publishes it, serialized.
     publish_change
@@ -114,7 +113,7 @@ class TickLoop:
         build: Callable[[], Pipeline],
         take: Take | None,
         publish: Callable[[bytes], None],
-        own: bytes = b'',
+        own: Callable[[bytes], bool] | None = None,
         publish_extras: Sequence[Callable[[bytes], None]] = (),
         publish_change: Callable[[Change], bytes] | None = None,
         depth: int = 100,
@@ -198,7 +197,7 @@ class TickLoop:
 
     def _offer(self, message: bytes, info: dict[str, Any], now: int) -> bool:
         """Record a message and offer it to the pipeline; return whether it was good."""
-        if self._own and message.startswith(self._own, 12):
+        if self._own is not None and self._own(message):
             return False
         counts = self.counts
         counts.received += 1

@@ -25,6 +25,7 @@ from collections.abc import Sequence
 from math import inf
 from time import monotonic
 
+from linkage_ros.errors import listed
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe
@@ -89,7 +90,7 @@ class Warnings:
             Least time between two such warnings, in [s].
 
         """
-        names = ', '.join(inputs)
+        names = listed(inputs)
         if counts.ignored and counts.ignored == counts.received:
             line = f'{crank_topic}: {counts.ignored} messages, none with {names}: '
             self.say('ignored', line + 'name the joint so there, or remap the topic', period)

@@ -21,6 +21,7 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
+from linkage_ros.errors import listed
 from linkage_ros.faults.fault import Fault, FAULTS
 from linkage_ros.scene.read import parts_of, read_parameters
 from linkage_ros.scene.scene import Member
@@ -54,7 +55,7 @@ def _fault(content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
             if key in (*_WHEN, *FAULTS):
                 content.taken(key)
         content.finish((*_WHEN, *FAULTS))
-        raise content.error('', f'{len(kinds)} kinds', f'name one of {", ".join(FAULTS)}')
+        raise content.error('', f'{len(kinds)} kinds', f'name one of {listed(FAULTS)}')
     parameters: Any = read_parameters(
         content.section(kinds[0]), import_module(FAULTS[kinds[0]]).PARAMETERS, parts
     )

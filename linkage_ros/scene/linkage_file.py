@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.limit_checks import check_limits
 from linkage_ros.kinematics.linkage import (
@@ -168,7 +168,7 @@ def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
         if name not in links:
             moving = sorted({*links} - {GROUND})
             raise content.error(
-                name, f'{quoted(name)} is not a link', f'name one of {", ".join(moving)}'
+                name, f'{quoted(name)} is not a link', f'name one of {listed(moving)}'
             )
         link = content.section(name)
         masses[name] = Mass(
@@ -233,7 +233,7 @@ def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
     for name in own:
         if name not in joints:
             raise own.error(
-                name, f'{quoted(name)} is no joint of it', f'name one of {", ".join(joints)}'
+                name, f'{quoted(name)} is no joint of it', f'name one of {listed(joints)}'
             )
     places = [(driven, content.section('input', required=False))]
     places += [(joints[name], own.section(name)) for name in own]

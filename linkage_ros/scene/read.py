@@ -22,7 +22,7 @@ from dataclasses import MISSING
 from os.path import join
 from typing import Any
 
-from linkage_ros.errors import did_you_mean, quoted
+from linkage_ros.errors import did_you_mean, listed, quoted
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.parameters import (
     Choice,
@@ -140,7 +140,7 @@ def _known(content: Section, key: str, name: str, kind: str, parts: Parts) -> st
     """Return a name, if there is such a part."""
     if name in parts[kind]:
         return name
-    known = ', '.join(parts[kind]) or 'none'
+    known = listed(parts[kind]) or 'none'
     raise content.error(
         key,
         f'there is no {kind} {quoted(name)}',

@@ -162,6 +162,11 @@ class Scene:
         return tuple(joint for member in self.members for joint in member.joints)
 
     @property
+    def dependent_joints(self) -> frozenset[str]:
+        """Return the names of the published joints that follow from others."""
+        return frozenset(self.joints).difference(*(member.inputs for member in self.members))
+
+    @property
     def not_imported(self) -> tuple[str, ...]:
         """Return the effects of one's own that it names and that were not imported."""
         named = (effect for member in self.members for effect in member.not_imported)

@@ -22,7 +22,7 @@ from math import inf, isfinite, isnan
 from re import fullmatch
 from typing import Any, cast
 
-from linkage_ros.errors import did_you_mean, FileError, quoted
+from linkage_ros.errors import did_you_mean, FileError, listed, quoted
 
 
 class LinedDict(dict[str, Any]):
@@ -151,9 +151,9 @@ class Section:
 
     def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
         """Return one of several words."""
-        value = self._take(key, default, ' or '.join(choices))
+        value = self._take(key, default, listed(choices, ' or '))
         if value not in choices:
-            raise self.error(key, f'{quoted(value)} is none', f'write {" or ".join(choices)}')
+            raise self.error(key, f'{quoted(value)} is none', f'write {listed(choices, " or ")}')
         return cast(str, value)
 
     def point(self, key: str, *, most: float = inf) -> tuple[float, float]:
@@ -280,7 +280,7 @@ class Section:
         for key in self._content:
             if key not in self._taken:
                 names = sorted(self._taken | set(known))
-                known_names = f'known: {", ".join(names)}' if names else 'leave it out'
+                known_names = f'known: {listed(names)}' if names else 'leave it out'
                 remedy = did_you_mean(key, names, known_names)
                 raise self.error(key, 'unknown key', remedy)
 

@@ -21,7 +21,7 @@ from dataclasses import MISSING
 from importlib import import_module
 from typing import Any
 
-from linkage_ros.errors import did_you_mean, quoted
+from linkage_ros.errors import did_you_mean, listed, quoted
 from linkage_ros.parameters import declared
 from linkage_ros.scene.read import Parts, read_parameters
 from linkage_ros.scene.section import Section
@@ -69,7 +69,7 @@ def read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
         raise solvers.error(named[1], 'is a second solver', f'leave it, or {named[0]}, out')
     if not named or named[0] not in SOLVERS:
         solvers.finish(tuple(SOLVERS))
-        raise solvers.error('', 'names none', f'write one of {", ".join(SOLVERS)}')
+        raise solvers.error('', 'names none', f'write one of {listed(SOLVERS)}')
     (name,) = named
     parameters = import_module(SOLVERS[name]).PARAMETERS
     return name, read_parameters(solvers.section(name), parameters, parts)
@@ -78,7 +78,7 @@ def read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
 def _named(where: Section) -> tuple[str, Any]:
     name = where.text('solver')
     if name not in SOLVERS:
-        known = f'known: {", ".join(SOLVERS)}'
+        known = f'known: {listed(SOLVERS)}'
         raise where.error(
             'solver', f'there is no {quoted(name)}', did_you_mean(name, SOLVERS, known)
         )

@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import degrees, inf, log, pi
 from typing import NamedTuple
 
-from linkage_ros.errors import did_you_mean, SynthesisError
+from linkage_ros.errors import did_you_mean, listed, SynthesisError
 from linkage_ros.synthesis.course import Array, Flags, mobility
 from linkage_ros.synthesis.defects import Assessment
 import numpy as np
@@ -102,7 +102,7 @@ class Needs(NamedTuple):
             raise SynthesisError(
                 self.kind,
                 'is no kind of four-bar',
-                did_you_mean(self.kind, _WORDS, f'name one of {", ".join(_WORDS)}'),
+                did_you_mean(self.kind, _WORDS, f'name one of {listed(_WORDS)}'),
             )
 
 

@@ -15,9 +15,9 @@
 """
 Bags that an earlier version has recorded replay to the same bytes.
 
-They were recorded on 22 November 2026, before linkages were compiled: all shipped linkages with one
-input and a closed form, through their ranges and a little beyond; forces, friction and play; a
-torque drive; a cylinder behind a delay.
+They were recorded on 22 November 2026, before linkages were compiled: all shipped linkages with
+one input and a closed form, through their ranges and a little beyond; forces, friction and play;
+a torque drive; a cylinder behind a delay.
 """
 
 from __future__ import annotations

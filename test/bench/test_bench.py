@@ -23,7 +23,6 @@ import re
 import subprocess
 import sys
 
-from bench.kinematics_compiled import compiler
 from bench.kinematics_pylinkage import AVAILABLE
 from bench.report import Table
 from bench.spread import percentile, ratios, spread
@@ -52,6 +51,7 @@ def test_table_is_the_same_as_text_and_as_markdown():
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_latency_is_measured_against_the_relay(tmp_path):
     kept = _bench(tmp_path, '--only', 'c')
@@ -64,6 +64,7 @@ def test_latency_is_measured_against_the_relay(tmp_path):
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_ticks_are_measured_against_the_bare_loop(tmp_path):
     kept = _bench(tmp_path, '--only', 'b')
@@ -74,6 +75,7 @@ def test_ticks_are_measured_against_the_bare_loop(tmp_path):
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_ticks_are_measured_against_the_idiomatic_node(tmp_path):
     kept = _bench(tmp_path, '--only', 'a')
@@ -82,6 +84,7 @@ def test_ticks_are_measured_against_the_idiomatic_node(tmp_path):
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_a_hundred_linkages_are_measured(tmp_path):
     cells = _row(_bench(tmp_path, '--only', 'many'), '100 four-bars in one node, 1 kHz')
@@ -89,6 +92,7 @@ def test_a_hundred_linkages_are_measured(tmp_path):
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_ticks_under_load_are_measured_with_and_without_what_the_system_gives(tmp_path):
     kept = _bench(tmp_path, '--only', 'real_time')
@@ -99,6 +103,7 @@ def test_ticks_under_load_are_measured_with_and_without_what_the_system_gives(tm
 
 
 @pytest.mark.ros
+@pytest.mark.alone
 @pytest.mark.timeout(90)
 def test_subscribers_that_come_and_go_are_measured_for_each_way_to_carry_messages(tmp_path):
     kept = _bench(tmp_path, '--only', 'comers')
@@ -136,13 +141,11 @@ def test_compiled_linkages_are_measured_beside_their_plain_steps_and_by_their_dy
 
 
 @pytest.mark.timeout(90)
-def test_solving_is_measured_against_straight_line_c_and_pylinkage(tmp_path):
+def test_solving_is_measured_against_straight_line_and_pylinkage(tmp_path):
     kept = _bench(tmp_path, '--only', 'kinematics')
     names = ['µs a state: four-bar / straight line', 'µs a state: Jansen leg / four-bar']
     if AVAILABLE:
         names += ['µs a state: pylinkage / four-bar', 'Mstates/s: numpy / pylinkage']
-    if compiler():
-        names += ['Mstates/s: numpy / C']
     for name in names:
         cells = _row(kept, name)
         assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))

@@ -20,6 +20,7 @@ import random
 
 from campaigns.attacks import files, signals
 from campaigns.attacks.mutations import mutated
+from linkage_ros.cli.main import COMMANDS
 import pytest
 
 SEED = 20261122
@@ -32,6 +33,21 @@ def test_changed_files_are_answered() -> None:
     assert sum(tried.values()) == 60
     assert any(how.endswith(': 0') for how in tried)
     assert any(how.endswith(': 2') for how in tried)
+
+
+def test_every_command_that_takes_a_linkage_gets_changed_ones() -> None:
+    without = {
+        'demo',
+        'play',
+        'plot',
+        'info',
+        'report',
+        'export',
+        'recover',
+        'import',
+        'synthesize',
+    }
+    assert set(files.COMMANDS) == set(COMMANDS) - without
 
 
 def test_signals_end_commands() -> None:
@@ -54,6 +70,17 @@ def test_files_are_changed_in_many_ways() -> None:
         ('check', 2, 'linkage check: x: is wrong; correct it\n', False),
         ('scene', 2, 'linkage scene: one\nlinkage scene: other\n', False),
         ('synthesize', 1, '', False),
+        (
+            'replay',
+            0,
+            'linkage replay: nothing to compare with: bag: carries no run.json\n',
+            False,
+        ),
+        ('accuracy', 0, 'accuracy of x: 4 of 30\n', False),
+        ('accuracy', 2, 'accuracy of x: 4 of 30\nlinkage accuracy: x: is wrong\n', False),
+        ('replay', 2, 'linkage replay: one\nlinkage replay: other\n', True),
+        ('replay', 0, 'RuntimeWarning: overflow', True),
+        ('run', 2, '', True),
         ('check', 2, 'one\nother\n', True),
         ('check', 2, '', True),
         ('check', 2, 'x' * 2000, True),

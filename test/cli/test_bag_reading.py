@@ -18,8 +18,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from threading import Event
 
-from linkage_ros.cli.bag_reading import beside
+from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.cli.bag_reading import beside, opened
 import pytest
 
 
@@ -44,3 +46,23 @@ def test_a_folder_without_a_name(
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
     assert beside(Path(here), '.png') == tmp_path / file
+
+
+def test_attachments_that_are_not_read_are_told_in_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = {'note': ('', b'a'), 'huge\n': ('', bytes(64 * 2**20)), 'scene.yaml': ('', b'b: 1')}
+    BagWriter(tmp_path / 'bag', [], files).close()
+    bag = opened(tmp_path / 'bag', Event())
+    assert bag.attachments == {'note': b'a', 'scene.yaml': b'b: 1'}
+    assert capsys.readouterr().err == (
+        f'linkage: {tmp_path}/bag: attachments beyond 64 MiB are not read: huge\\n\n'
+    )
+
+
+def test_of_a_bag_that_is_read_as_a_whole_nothing_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    BagWriter(tmp_path / 'bag', [], {'note': ('', b'a')}).close()
+    opened(tmp_path / 'bag', Event())
+    assert capsys.readouterr().err == ''

@@ -245,6 +245,13 @@ def test_a_linkage_without_a_reading_leaves_its_cells_empty(
     assert not any(row[6] is None for row in rows)
 
 
+def test_on_a_shared_topic_the_pin_forces_are_in_the_rows(tmp_path: Path, exported: Any) -> None:
+    scene = scene_file(tmp_path, EVERYTHING, FOUR_BAR)
+    heads, rows = exported(Recorded(tmp_path / 'bag', scene, crank, '/joint_states').run(20))
+    force = heads.index('A force x [N]')
+    assert [row[force] is None for row in rows] == [row[4] is None for row in rows] != []
+
+
 @pytest.mark.parametrize(
     ('said', 'crank'),
     [
@@ -357,6 +364,30 @@ def test_any_name_is_a_heading(tmp_path: Path, exported: Any) -> None:
     heads, rows = exported(foreign(tmp_path / 'bag', joint_state(1, names, range(6))))
     assert heads[4:] == [f'{name} [rad or m]' for name in names]
     assert rows[0][4:] == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+def test_a_command_has_a_row_though_the_joints_that_follow_have_no_effort(
+    tmp_path: Path, exported: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = ['rocker_joint', 'crank_joint']
+    scene = scene_file(tmp_path, 'rate: 100\n')
+    run = {'scene': 's', 'joint_states_topic': '/js', 'crank_topic': '/crank_commands'}
+    writer = BagWriter(
+        tmp_path / 'bag',
+        [topic('/js', JOINT_STATE), topic('/crank_commands', JOINT_STATE)],
+        {
+            RUN_FILE: ('', json.dumps(run).encode()),
+            'scene.yaml': ('', scene.read_bytes()),
+            'linkage.yaml': ('', (tmp_path / 'l.yaml').read_bytes()),
+        },
+    )
+    for time, efforts in enumerate(([0.5, 1.5], [2.5], [3.5])):
+        writer.write(1, BEGIN + time, BEGIN + time, joint_state(time, names, (), (), efforts))
+    writer.close()
+    heads, rows = exported(tmp_path / 'bag', '--topic', '/crank_commands')
+    assert heads[4:] == ['rocker_joint effort [N·m]', 'crank_joint effort [N·m]']
+    assert [row[4:] for row in rows] == [[0.5, 1.5], [None, 2.5], [None, 3.5]]
+    assert capsys.readouterr().err == ''
 
 
 def test_messages_that_tell_nothing_sure_are_left_out_and_counted(

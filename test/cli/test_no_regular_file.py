@@ -28,6 +28,7 @@ READS = {
     'check': ['check', 'FILE'],
     'solve': ['solve', 'FILE'],
     'draw': ['draw', 'FILE'],
+    'compile': ['compile', '-o', 'x.c', 'FILE'],
     'urdf': ['urdf', 'FILE'],
     'mjcf': ['mjcf', 'FILE'],
     'scene': ['scene', 'FILE'],

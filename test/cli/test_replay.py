@@ -134,6 +134,19 @@ def test_a_run_comes_to_the_same_bytes(tmp_path, capsys, name):
     assert 'identical' in capsys.readouterr().out
 
 
+def test_on_a_shared_topic_messages_without_an_open_linkage_are_compared(tmp_path, capsys):
+    def cranks(number: int) -> Mapping[str, tuple[float, float]]:
+        first = {'a_crank_joint': (0.01 * number, 10.0)}
+        return first | ({'b_crank_joint': (0.02 * number, 20.0)} if number > 40 else {})
+
+    scene = scene_file(tmp_path, f'{TWO}effects: {{velocity: {{}}}}\n', LINKAGE)
+    bag = Recorded(tmp_path / 'bag', scene, cranks, '/joint_states').run(80)
+    code, account = told(capsys, bag)
+    assert (code, account['verdict']) == (0, 'identical')
+    (states,) = account['topics']
+    assert states['same'] == states['recorded'] == 80
+
+
 def test_two_linkages_that_withhold_at_one_tick_say_so_twice(tmp_path, capsys):
     # As the tick loop has it: for each linkage without a reading, where no other has one.
     bag = recorded(tmp_path, SCENES['two that withhold'])

@@ -34,6 +34,7 @@ READS = {
     'check': (['four.yaml'], PARSE),
     'solve': (['four.yaml', '-o', 'x.csv'], PARSE),
     'draw': (['four.yaml', '-o', 'x.png'], PARSE),
+    'compile': (['four.yaml', '-o', 'x.c'], PARSE),
     'urdf': (['four.yaml', '-o', 'x.urdf'], PARSE),
     'mjcf': (['four.yaml', '-o', 'x.xml'], PARSE),
     'scene': (['four.yaml'], PARSE),
@@ -43,7 +44,7 @@ READS = {
     'import': (['x.urdf', '-o', 'x.yaml'], 'linkage_ros.cli.import_urdf:read_urdf'),
     'synthesize': (['--pairs', 'x.csv'], 'csv:reader'),
 }
-COMPUTE = ('check', 'solve', 'draw', 'urdf', 'mjcf', 'scene', 'cost', 'accuracy')
+COMPUTE = ('check', 'solve', 'draw', 'compile', 'urdf', 'mjcf', 'scene', 'cost', 'accuracy')
 CLOSES = 'linkage_ros.kinematics.closure:Closure.position'
 WRITES = 'os:fsync'
 
@@ -141,6 +142,13 @@ def test_a_command_ends_while_it_reads(folder, command, number) -> None:
 
 
 @pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('at', [PARSE, 'linkage_ros.kinematics.closure:singular_inputs'])
+def test_a_run_ends_before_its_first_tick(folder, at, number) -> None:
+    found = ended_by(stuck_at(folder, at, 'run', 'four.yaml', '--plain'), number)
+    assert found == (1, 'linkage run: stopped\n')
+
+
+@pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('command', COMPUTE)
 def test_a_command_ends_while_it_computes(folder, command, number) -> None:
     before = sorted(folder.iterdir())
@@ -149,7 +157,7 @@ def test_a_command_ends_while_it_computes(folder, command, number) -> None:
     assert sorted(folder.iterdir()) == before
 
 
-@pytest.mark.parametrize('command', ['solve', 'draw', 'urdf', 'mjcf'])
+@pytest.mark.parametrize('command', ['solve', 'draw', 'compile', 'urdf', 'mjcf'])
 def test_a_command_that_is_stopped_while_it_writes_leaves_what_was_there(folder, command) -> None:
     typed, _ = READS[command]
     old = folder / typed[-1]

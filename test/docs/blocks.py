@@ -20,8 +20,8 @@ The fenced blocks of the documentation, and which of them are commands.
 one, and the others are what it shows: ``…`` stands for anything, as a line for lines. A block
 whose fence goes on with ``no-test: WHY`` is not run.
 
-A block of another language whose first line is ``# FILE.yaml`` is that file, which the commands
-behind it on the page find.
+A block of another language whose first line is ``# FILE.yaml`` or ``// FILE.c`` is that file,
+which the commands behind it on the page find.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *(ROOT / 'docs').rglob('*.md')])
 
 _FENCE = re.compile(r'^( *)(`{3,}|:{3,})([^\n`]*)\n(.*?)^\1\2 *$', re.MULTILINE | re.DOTALL)
-_FILE = re.compile(r'# ([\w./-]+\.(?:yaml|py|csv))\n')
+_FILE = re.compile(r'(?:#|//) ([\w./-]+\.(?:yaml|py|csv|c|js))\n')
 COMMANDS = ('sh', 'console')
 
 

@@ -79,6 +79,9 @@ def given_to_the_readme(folder: Path) -> None:
 GIVEN = {'README.md': given_to_the_readme, 'docs/accuracy.md': given_a_scene}
 """What is laid out beforehand, by page."""
 
+NEEDS = {'docs/how_to/compile.md': 'cc'}
+"""Programs that are no part of this package and that a page's commands start."""
+
 
 def environment(folder: Path) -> dict[str, str]:
     clean = {key: value for key, value in os.environ.items() if key != 'PYTHONPATH'}
@@ -139,6 +142,8 @@ def work_through(block: Block, folder: Path, own: dict[str, str]) -> None:
 @pytest.mark.skipif(not (HERE / 'linkage').is_file(), reason='needs an installed linkage')
 @pytest.mark.parametrize('page', WITH_COMMANDS)
 def test_the_commands_of_a_page_do_what_it_says(page, tmp_path):
+    if (needed := NEEDS.get(page)) and shutil.which(needed) is None:
+        pytest.skip(f'needs {needed}')
     folder = tmp_path / 'here'
     folder.mkdir()
     GIVEN.get(page, lambda _folder: None)(folder)

@@ -27,6 +27,8 @@ from types import ModuleType
 from typing import Any
 import warnings
 
+from campaigns.topologies.families import FAMILIES
+from campaigns.topologies.run import make
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import DefinitionError
@@ -40,6 +42,7 @@ from linkage_ros.kinematics import (
 )
 from linkage_ros.kinematics.batch import Batch, CODES
 from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.compiled.linkage import Answer, Compiled
 from linkage_ros.kinematics.compiled.solve import BLOCK
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.status import Status
@@ -50,6 +53,9 @@ import pytest
 from .defects import defect
 from .linkages import four_bar_linkage, Frame, inverted_slider_crank_linkage, placed, PLAIN
 from .test_gallery import closure_of, EXPECTED, KINDS
+
+SEED = 20261122
+"""Not that of the campaign of topologies."""
 
 STATUSES = tuple(Status)
 CLOSED, TOGGLED, OPEN, INDETERMINATE = (
@@ -257,7 +263,7 @@ def check(closure: Closure, inputs: list[Array], slenderness: float = 1.0) -> se
 
     The slenderness is how much longer a link is than another, at which its roundings are seen.
     """
-    rates, pulls = [1.3, 0.7][: len(inputs)], [0.3, -0.4][: len(inputs)]
+    rates, pulls = [1.3, 0.7, 0.4][: len(inputs)], [0.3, -0.4, 0.2][: len(inputs)]
     batch = closure.solve(*inputs, rates=rates, accelerations=pulls)
     for i, state in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
         position = closure.position(*state)
@@ -324,6 +330,36 @@ def test_it_is_solved_as_state_by_state_inside_its_range_and_beyond(name: str) -
     (interval, *_) = closure.input_ranges or (None,)
     if interval is not None and not interval.whole and name != 'class_3':
         assert Status.OPEN in met
+
+
+@pytest.mark.parametrize('family', [name for name in FAMILIES if 'class III' not in name])
+def test_random_linkages_are_solved_as_state_by_state(family: str) -> None:
+    topology, _ = make(SEED, family, 0)
+    closure = Closure(topology.linkage)
+    rng = np.random.default_rng(SEED)
+    inputs = [
+        at + 4.0 * step * rng.uniform(-1.0, 1.0, 60) ** 3
+        for at, step in zip(topology.start, topology.step, strict=True)
+    ]
+    assert Status.CLOSED in check(closure, inputs, slenderness=3.0)
+
+
+@pytest.mark.parametrize('name', [name for name in KINDS if name != 'class_3'])
+def test_the_plain_steps_are_asked_of_less_than_one_state_in_a_hundred(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    closure, inputs = case_of(name)
+    asked = []
+    answer_of = Compiled.__call__
+
+    def answer(linkage: Compiled, *numbers: float) -> Answer:
+        asked.append(numbers)
+        return answer_of(linkage, *numbers)
+
+    monkeypatch.setattr(Compiled, '__call__', answer)
+    batch = closure.solve(*samples(inputs, 10_000), rates=[1.0] * len(inputs))
+    assert len(asked) < 100
+    assert (batch.status == CLOSED).sum() > 5000
 
 
 def test_every_kind_of_step_is_tested() -> None:

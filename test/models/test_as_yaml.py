@@ -22,14 +22,16 @@ launch file comes to through ``yaml.safe_load`` (launch_ros, evaluate_parameters
 
 from __future__ import annotations
 
+import re
 from xml.etree import ElementTree as ET
 
-from hypothesis import example, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from linkage_ros.cli.model_file import model_of
+from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.models.mjcf import mjcf
-from linkage_ros.models.part import Part
+from linkage_ros.models.part import Part, PartError
 from linkage_ros.models.urdf import urdf
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml
@@ -103,11 +105,44 @@ HOSTILE = st.lists(PIECES | LETTERS | st.just(' '), min_size=1, max_size=5).map(
 def test_names_of_any_kind(names, robot):
     if set(names) & {'ground', 'O4', 'coupler_joint'}:
         return
+    assume(not re.search(r'\$[{(]', ''.join([*names, robot])))
     for write in (urdf, mjcf):
         data = write(robot, [Part(named(names))])
         check(data)
         said = {each.get('name') for each in ET.fromstring(data).iter()}
         assert set(names[4:8]) <= said
+
+
+EXPRESSIONS = ['${1+1}', 'a$(pwd)', '$${x}', '$$(x)', '${']
+
+
+@pytest.mark.parametrize('odd', EXPRESSIONS)
+@pytest.mark.parametrize('place', range(9))
+def test_a_name_that_xacro_would_evaluate_is_refused(place, odd):
+    names = [*NAMES]
+    names[place] = odd
+    with pytest.raises(PartError) as caught:
+        urdf('robot', [Part(named(NAMES)), Part(named(names), 'second_')])
+    assert caught.value.number == 1
+    assert odd in caught.value.reason
+    assert caught.value.reason.startswith('xacro would evaluate the name ')
+    assert mjcf('robot', [Part(named(names))])
+
+
+@pytest.mark.parametrize('odd', EXPRESSIONS)
+def test_a_file_whose_name_xacro_would_evaluate_is_refused(odd, tmp_path):
+    file = tmp_path / f'{odd}.yaml'
+    file.write_bytes((LINKAGES / 'four_bar.yaml').read_bytes())
+    with pytest.raises(FileError) as caught:
+        model_of(str(file), urdf)
+    assert str(caught.value) == (
+        f"{file}: xacro would evaluate the name '{odd}'; choose a name without ${{ and $("
+    )
+
+
+@pytest.mark.parametrize('name', ['$', '{$}', '$a', '$[x]', '{}', '()'])
+def test_a_dollar_alone_is_a_letter_of_a_name(name):
+    assert name.encode() in urdf(name, [Part(named(NAMES))])
 
 
 def test_a_file_with_an_odd_name(tmp_path):

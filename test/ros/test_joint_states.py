@@ -128,4 +128,6 @@ def test_on_a_shared_topic_its_own_messages_are_ignored(graph, write_scene, star
     assert len(sent) / 2 < received <= len(sent)
     assert graph.value('crank', 'Samples rejected') == '0'
     assert node.end() == 0
-    assert 'WARN' not in node.log
+    warnings = [line for line in node.log.splitlines() if '[WARN]' in line]
+    # On a busy machine it may see that the crank has ended.
+    assert all(': no message in ' in line for line in warnings)

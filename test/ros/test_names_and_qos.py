@@ -154,7 +154,9 @@ def test_qos_is_what_the_overrides_say(folder, graph, write_scene, start):
         lambda: graph.node.get_publishers_info_by_topic('/joint_states'), 'its publisher'
     )
     assert out.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
-    (into,) = graph.node.get_subscriptions_info_by_topic('/crank_states')
+    (into,) = wait_for(
+        lambda: graph.node.get_subscriptions_info_by_topic('/crank_states'), 'its subscription'
+    )
     assert into.qos_profile.reliability == ReliabilityPolicy.RELIABLE
     publisher = graph.publisher(JointState, '/crank_states')
     states = []

@@ -36,7 +36,7 @@ STUCK = {
     'library': 'c = ctypes.CDLL(None); c.__cxa_atexit(c.sleep, ctypes.c_void_p(600), None)',
 }
 PROGRAM = (
-    'import ctypes, sys; from linkage_ros.ros import linkage_node, node; {}; '
+    'import ctypes, sys, time; from linkage_ros.ros import linkage_node, node; {}; '
     'sys.exit(linkage_node.main())'
 )
 
@@ -83,6 +83,16 @@ def test_at_a_random_moment(start, recorded, number, moment):
     assert 'Traceback' not in node.log
     assert 'Error' not in node.log
     closed_bags(runs)
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+def test_while_it_configures(start, recorded, number):
+    scene, runs = recorded
+    stuck = 'node.load_scene = lambda _: (print("loading", flush=True), time.sleep(600))'
+    node = start(scene, ready='loading', program=('-c', PROGRAM.format(stuck)))
+    assert node.end(number) == 0, node.log
+    assert 'Traceback' not in node.log
+    assert closed_bags(runs) == []
 
 
 @pytest.mark.parametrize('number', SIGNALS)

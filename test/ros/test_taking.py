@@ -24,6 +24,7 @@ from itertools import count
 
 from linkage_ros.joint_state import JointStateWriter, NANOSECONDS, Rejection
 from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import own_joint_states
 from linkage_ros.ros.tick_loop import TickLoop
 from linkage_ros.scene.load import parse_scene
 import pytest
@@ -33,6 +34,7 @@ BEGIN = 1_700_000_000 * NANOSECONDS
 FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
 ONE = 'linkage: l.yaml\n'
 TWO = 'linkages: [{name: left, linkage: l.yaml}, {name: right, linkage: l.yaml}]\n'
+TWO_FILES = {'scene.yaml': TWO.encode(), 'linkage_1.yaml': FOUR_BAR, 'linkage_2.yaml': FOUR_BAR}
 
 
 class Rig:
@@ -132,6 +134,21 @@ def test_of_two_linkages_each_uses_its_newest():
     assert rig.counts() == (6, 2, 3, 1, 0)
     rig.tick(BEGIN + MS)
     assert rig.counts() == (6, 2, 3, 1, 0)
+
+
+def test_its_own_messages_are_told_also_where_a_linkage_is_not_in_them():
+    rig = Rig(TWO, own=own_joint_states(parse_scene('t', 't', TWO_FILES)))
+    rig.send(names=('left_crank_joint',))
+    rig.tick(BEGIN)
+    rig.send(BEGIN + MS, names=('right_crank_joint',))
+    rig.tick(BEGIN + MS)
+    counts = rig.counts()
+    alone, both = rig.published
+    assert (b'left' in alone, b'right' in alone) == (True, False)
+    for message in (alone, both):
+        rig.queue.append((message, {'source_timestamp': BEGIN}))
+    rig.tick(BEGIN + 2 * MS)
+    assert rig.counts() == counts == (2, 2, 0, 0, 0)
 
 
 def test_a_tick_takes_no_more_than_the_queue_holds():

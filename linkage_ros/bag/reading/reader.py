@@ -49,7 +49,8 @@ RUN_FILE = 'run.json'
 
 _RECOVER = 'linkage recover makes a whole bag of what is there'
 
-_MOST_ATTACHED = 64 * 2**20
+MOST_ATTACHED = 64 * 2**20
+"""How many bytes of the attachments of a file are kept in memory."""
 
 _LONGEST_QOS, _MOST_QOS = 1024, 64
 """Of one profile: letters, and values; rosbag2 writes some 320 and 33."""
@@ -82,6 +83,8 @@ class Bag:
         Its topics.
     attachments
         Name to content, up to 64 MiB of them.
+    passed_over
+        Names of the attachments that are not read, since they are beyond that.
     custom
         ``custom_data`` of its metadata, or where these are missing of its last file.
     truncated
@@ -94,6 +97,7 @@ class Bag:
     files: tuple[Path, ...]
     topics: tuple[Topic, ...]
     attachments: Mapping[str, bytes]
+    passed_over: tuple[str, ...]
     custom: Mapping[str, str]
     truncated: bool
 
@@ -156,8 +160,10 @@ def read_bag(
         )
     topics: dict[str, Topic] = {}
     attachments: dict[str, bytes] = {}
+    passed_over: dict[str, None] = {}
     for file, finished in zip(files, whole, strict=True):
-        definitions, attached = _description(file, told, finished=finished)
+        definitions, attached, beyond = _description(file, told, finished=finished)
+        passed_over |= dict.fromkeys(beyond)
         for channel in definitions.channels.values():
             topic = topic_of(channel, definitions.schema_of(channel))
             topics.setdefault(topic.name, topic)
@@ -176,6 +182,7 @@ def read_bag(
         files=tuple(files),
         topics=tuple(topics.values()),
         attachments=attachments,
+        passed_over=tuple(name for name in passed_over if name not in attachments),
         custom=custom,
         truncated=begun or not all(whole) or unfinished,
     )
@@ -183,29 +190,35 @@ def read_bag(
 
 def _description(
     file: Path, told: Told, *, finished: bool
-) -> tuple[Definitions, list[Attachment]]:
-    """Return schemas, channels and attachments of a file; from its index, if it has one."""
+) -> tuple[Definitions, list[Attachment], list[str]]:
+    """
+    Return schemas and channels, attachments, and names of those that are not kept in memory.
+
+    They come from the file's index, if it has one.
+    """
     if finished:
         with _translated(file), file.open('rb') as stream:
             source = Source(stream)
             index = index_of(source)
             if index.definitions.channels:
-                return index.definitions, _kept(
+                return index.definitions, *_kept(
                     attachment_at(source, each.offset)[0] for each in index.attachments
                 )
     definitions = Definitions()
     contents = _contents(file, definitions, told, until_damage=not finished)
-    return definitions, _kept(found for found in contents if isinstance(found, Attachment))
+    return definitions, *_kept(found for found in contents if isinstance(found, Attachment))
 
 
-def _kept(attachments: Iterable[Attachment]) -> list[Attachment]:
-    """Return what is kept in memory; what does not fit is not of a run of ours."""
-    kept, left = [], _MOST_ATTACHED
+def _kept(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str]]:
+    """Return what is kept in memory, and the names of what does not fit: no run of ours has it."""
+    kept, beyond, left = [], [], MOST_ATTACHED
     for attachment in attachments:
         if len(attachment.data) <= left:
             left -= len(attachment.data)
             kept.append(attachment)
-    return kept
+        else:
+            beyond.append(attachment.name)
+    return kept, beyond
 
 
 def _contents(

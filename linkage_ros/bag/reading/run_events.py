@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 import json
 from typing import Any, NamedTuple
 
@@ -205,7 +205,7 @@ def run_said(bag: Bag) -> dict[str, Any]:
 
 def recorded_events(
     run: RunAccount,
-    own: bytes,
+    own: Callable[[bytes], bool],
     messages: Iterable[BagMessage],
     crank_topic: str | None = None,
 ) -> Iterator[Event]:
@@ -217,8 +217,7 @@ def recorded_events(
     run
         The run's account of itself.
     own
-        What the run's joint states have from byte 12 on: it tells them from the crank's samples
-        where both share a topic.
+        Tells the run's joint states from the crank's samples where both share a topic.
     messages
         The bag's.
     crank_topic
@@ -234,7 +233,7 @@ def recorded_events(
     withheld: tuple[int, int] | None = None
     for topic, log_time, publish_time, data in messages:
         output = outputs.get(topic)
-        if shared and output == 0 and not data.startswith(own, 12):
+        if shared and output == 0 and not own(data):
             output = None
         taken = topic == crank and (output is None or crank != run.crank_topic)
         if output is None and not taken and topic not in others:

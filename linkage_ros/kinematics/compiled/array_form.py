@@ -23,7 +23,7 @@ is not asked. Results may differ from those of the path in their last digits.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import inf, tan
+from math import inf, nan, tan
 import operator
 from typing import Any, Final, NamedTuple
 
@@ -44,8 +44,6 @@ class Bounds(NamedTuple):
 
 _ANY = Bounds()
 
-_INVERSE: Final = {'<': '>=', '<=': '>', '>': '<=', '>=': '<', '==': '!=', '!=': '=='}
-
 _COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
     '<': operator.lt,
     '<=': operator.le,
@@ -54,6 +52,8 @@ _COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
     '==': operator.eq,
     '!=': operator.ne,
 }
+
+_TRUTHS: Final = frozenset((*_COMPARED, 'and', 'or', 'not'))
 
 _CLEAR: Final = 1e-9
 """Numbers this far apart, as a part of themselves, are so however they are rounded."""
@@ -82,11 +82,11 @@ class ArrayForm:
     Parameters
     ----------
     given
-        Inputs by name that are constants.
+        Rates and accelerations by name that are 0 or 1.
 
     """
 
-    def __init__(self, given: Mapping[str, float]) -> None:
+    def __init__(self, given: Mapping[str, int]) -> None:
         self._given = given
         self._known: dict[tuple[Any, ...], Operation] = {}
         self._bounds: dict[Operation, Bounds] = {}
@@ -108,22 +108,27 @@ class ArrayForm:
                 self._written[operation] = self._write(operation)
         return self._written[root]
 
-    def holds(self, condition: Number, held: bool) -> Number:
-        """Return the condition that a condition falls as is said."""
-        found = self.number(condition)
-        if not isinstance(found, Operation):
-            return found is held
-        return found if held else self._compare(_INVERSE[found.name], *found.arguments)
+    def opposite(self, condition: Number) -> Number:
+        """Return the condition that one does not hold."""
+        return (not condition) if _constant(condition) else self._new('not', condition)
 
     def both(self, one: Number, other: Number) -> Number:
         """Return the condition that two hold."""
-        if isinstance(one, bool) or isinstance(other, bool):
-            return (other if one is True else one) if one and other else False
+        for first, second in ((one, other), (other, one)):
+            if _constant(first):
+                return second if first else False
         return self._new('and', one, other)
+
+    def either(self, one: Number, other: Number) -> Number:
+        """Return the condition that one of two holds."""
+        for first, second in ((one, other), (other, one)):
+            if _constant(first):
+                return True if first else second
+        return self._new('or', one, other)
 
     def where(self, condition: Number, one: Number, other: Number) -> Number:
         """Return the one number where a condition holds, the other where not."""
-        if isinstance(condition, bool):
+        if _constant(condition):
             return one if condition else other
         if one is other:
             return one
@@ -165,10 +170,7 @@ class ArrayForm:
             case 'abs':
                 return self._absolute(*given)
             case 'sqrt':
-                low, high = self._between(given[0])
-                return self._new(
-                    name, *given, bounds=Bounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5)
-                )
+                return self._root(*given)
         if name in _COMPARED:
             return self._compare(name, *given)
         return self._new(name, *given)
@@ -209,10 +211,9 @@ class ArrayForm:
 
     def _multiply(self, one: Number, other: Number) -> Number:
         (factor, one), (more, other) = _split(one), _split(other)
-        factor *= more
-        if factor == 0.0:
-            return 0.0
-        return self._scaled(factor, self._product(one, other))
+        if _nothing(factor) or _nothing(more):
+            return 0
+        return self._scaled(factor * more, self._product(one, other))
 
     def _product(self, one: Number, other: Number) -> Number:
         if one is None or other is None:
@@ -229,9 +230,14 @@ class ArrayForm:
 
     def _divide(self, one: Number, other: Number) -> Number:
         (factor, one), (divisor, other) = _split(one), _split(other)
+        if _nothing(factor):
+            return 0
+        if divisor == 0.0:
+            # Off the way that the steps take.
+            return nan
         factor /= divisor
-        if factor == 0.0 or other is None:
-            return 0.0 if factor == 0.0 else self._scaled(factor, one)
+        if other is None:
+            return self._scaled(factor, one)
         if one is None:
             return self._new('/', factor, other)
         return self._scaled(factor, self._new('/', one, other))
@@ -248,6 +254,7 @@ class ArrayForm:
         return self._new('*', factor, one, bounds=Bounds(min(ends), max(ends)))
 
     def _power(self, one: Number, power: int) -> Number:
+        """Return a whole power, as products."""
         if power == 1:
             return one
         half = self._power(one, power // 2)
@@ -282,6 +289,12 @@ class ArrayForm:
             return self._negative(one)
         return self._new('abs', one, bounds=Bounds(0.0, max(-low, high)))
 
+    def _root(self, one: Number) -> Number:
+        if not _constant(one) and one.name == '*' and one.arguments[0] is one.arguments[1]:
+            return self._absolute(one.arguments[0])
+        low, high = self._between(one)
+        return self._new('sqrt', one, bounds=Bounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5))
+
     def _compare(self, name: str, one: Number, other: Number) -> Number:
         if _constant(one) and _constant(other):
             return _COMPARED[name](one, other)
@@ -301,7 +314,7 @@ class ArrayForm:
         key = (name, *(a.number if isinstance(a, Operation) else repr(a) for a in arguments))
         found = self._known.get(key)
         if found is None:
-            kind: Kind = 'truth' if name in _COMPARED or name == 'and' else 'real'
+            kind: Kind = 'truth' if name in _TRUTHS else 'real'
             found = Operation(name, arguments, kind, len(self._known), None)
             self._known[key] = found
             self._bounds[found] = bounds
@@ -310,6 +323,11 @@ class ArrayForm:
 
 def _constant(number: Number) -> bool:
     return not isinstance(number, Operation)
+
+
+def _nothing(number: Number) -> bool:
+    """Return whether a number is the 0 of what is given, whose sign does not matter."""
+    return isinstance(number, int) and number == 0
 
 
 def _split(number: Number) -> tuple[float, Number]:

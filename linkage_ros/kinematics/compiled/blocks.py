@@ -37,7 +37,6 @@ _FUNCTIONS: Final[dict[str, Any]] = {
     'sqrt': np.sqrt,
     'atan2': np.arctan2,
     'copysign': np.copysign,
-    'hypot': np.hypot,
     'maximum': np.maximum,
     'minimum': np.minimum,
     '<': np.less,
@@ -47,6 +46,9 @@ _FUNCTIONS: Final[dict[str, Any]] = {
     '==': np.equal,
     '!=': np.not_equal,
     'and': np.logical_and,
+    'or': np.logical_or,
+    'not': np.logical_not,
+    'where': np.where,
 }
 
 
@@ -92,7 +94,8 @@ class BlockFunction:
         head = [f'{", ".join(each)}, = {of}' for each, of in names if each]
         lines = '\n'.join(f'    {line}' for line in (*head, *writer.lines))
         self.source = f'def run(given, out, rows, masks):\n{lines}\n'
-        namespace: dict[str, Any] = {f.__name__: f for f in (*_FUNCTIONS.values(), np.copyto)}
+        functions = (*_FUNCTIONS.values(), np.copyto, np.count_nonzero)
+        namespace: dict[str, Any] = {function.__name__: function for function in functions}
         exec(self.source, namespace)
         self._run = namespace['run']
 
@@ -108,6 +111,7 @@ class BlockFunction:
             The inputs.
         out
             An array for each root; what it gets where the condition does not hold means nothing.
+            Nothing is written where it holds for less than half of the states.
         rows, masks
             Scratch, as long as the block.
 
@@ -157,18 +161,15 @@ class _Writer:
             if isinstance(root, Operation) and not root.is_input:
                 self._wanted.setdefault(root, f'o{k}')
         self._write(condition)
-        if isinstance(condition, Operation):
-            self.lines.append(
-                f'if not {self._names[condition]}.any(): return {self._names[condition]}'
-            )
+        held = self._text(condition) if isinstance(condition, Operation) else None
+        if held:
+            self.lines.append(f'if 2 * count_nonzero({held}) < {held}.size: return {held}')
         for k, root in enumerate(roots):
             self._write(root)
             place = f'o{k}'
             if self._text(root) != place:
                 self.lines.append(f'copyto({place}, {self._text(root)})')
-        self.lines.append(
-            f'return {self._text(condition) if isinstance(condition, Operation) else None}'
-        )
+        self.lines.append(f'return {held}')
 
     def _text(self, number: Number) -> str:
         return self._names[number] if isinstance(number, Operation) else repr(number)
@@ -230,6 +231,13 @@ class _Writer:
     def _choose(self, operation: Operation, texts: Sequence[str]) -> None:
         """Write a choice: the one number over the other, where a condition holds."""
         condition, one, other = texts
-        into = self._into(operation)
-        self.lines += [f'copyto({into}, {other})', f'copyto({into}, {one}, where={condition})']
+        last = operation.arguments[2]
+        if self._left.get(last) == 1 and operation not in self._wanted and other[0] == 'r':
+            # Nobody else needs the other number: it is written over where it stands.
+            into = self._names[operation] = other
+            self._left[last] += 1
+        else:
+            into = self._into(operation)
+            self.lines.append(f'copyto({into}, {other})')
+        self.lines.append(f'copyto({into}, {one}, where={condition})')
         self._done_with(operation.operands())

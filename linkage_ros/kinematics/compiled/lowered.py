@@ -25,7 +25,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.arithmetic import atan2, cos, sin, where
+from linkage_ros.kinematics.arithmetic import atan2, cos, sin, sqrt, where
 from linkage_ros.kinematics.compiled.fates import Fate, Fork
 from linkage_ros.kinematics.compiled.tape import Decision, Operation, Symbol, Tape
 from linkage_ros.kinematics.compiled.trace import Path
@@ -45,7 +45,7 @@ class Lowered(NamedTuple):
     fates: tuple[Fate, ...]
 
 
-def lowered(path: Path, fates: tuple[Fate, ...] = ()) -> Lowered:
+def lowered(path: Path, fates: tuple[Fate, ...] = (), by_squares: bool = False) -> Lowered:
     """
     Return a path in real numbers alone.
 
@@ -55,6 +55,9 @@ def lowered(path: Path, fates: tuple[Fate, ...] = ()) -> Lowered:
         The path.
     fates
         What becomes of the linkage where its decisions fall otherwise.
+    by_squares
+        Whether lengths and quotients are found by squares, which arrays pass through fastest: the
+        last digits are others, and lengths below 1e-154 are lost.
 
     Raises
     ------
@@ -62,7 +65,7 @@ def lowered(path: Path, fates: tuple[Fate, ...] = ()) -> Lowered:
         Where links are iterated.
 
     """
-    lower = _Lower()
+    lower = Lowering(by_squares)
     inputs = tuple(lower.operation(given) for given in path.inputs)
     decisions = tuple(
         Decision(lower.operation(condition), held) for condition, held in path.decisions
@@ -76,11 +79,12 @@ def lowered(path: Path, fates: tuple[Fate, ...] = ()) -> Lowered:
     )
 
 
-class _Lower:
+class Lowering:
     """Writes the operations of one tape on another."""
 
-    def __init__(self) -> None:
+    def __init__(self, by_squares: bool = False) -> None:
         self.tape = Tape()
+        self._formulas = _BY_SQUARES if by_squares else _FORMULAS
         self._known: dict[Operation, Any] = {}
 
     def operation(self, operation: Operation) -> Any:
@@ -127,7 +131,7 @@ class _Lower:
                  for a in operation.arguments]  # fmt: skip
         if not any(isinstance(one, _Parts) for one in given) and name not in _MAKES_PARTS:
             return self.tape.write(name, *given)
-        return _FORMULAS[name](self.tape, *given)
+        return self._formulas[name](self.tape, *given)
 
 
 _MAKES_PARTS = frozenset(('facing', 'vector'))
@@ -135,7 +139,7 @@ _MAKES_PARTS = frozenset(('facing', 'vector'))
 
 def _times(one: Any, other: Any) -> Any:
     """Return a product; 0 where a constant is."""
-    if one is None or other is None or _zero(one) or _zero(other):
+    if not _constants(one, other) and (_zero(one) or _zero(other)):
         return 0.0
     return one * other
 
@@ -144,11 +148,20 @@ def _zero(number: Any) -> bool:
     return isinstance(number, int | float) and number == 0.0
 
 
+def _constants(one: Any, other: Any) -> bool:
+    """Return whether both are constants, of which a zero has its right sign, too."""
+    return isinstance(one, int | float) and isinstance(other, int | float)
+
+
 def _sum(one: Any, other: Any) -> Any:
+    if _constants(one, other):
+        return one + other
     return other if _zero(one) else one if _zero(other) else one + other
 
 
 def _difference(one: Any, other: Any) -> Any:
+    if _constants(one, other):
+        return one - other
     return -other if _zero(one) else one if _zero(other) else one - other
 
 
@@ -187,6 +200,21 @@ def _divide(_: Tape, one: Any, other: Any) -> _Parts:
     return _Parts((first + second * ratio) / scale, across / scale)
 
 
+def _divide_by_squares(tape: Tape, one: Any, other: Any) -> _Parts:
+    if isinstance(other, _Parts):
+        one = _multiply(tape, one, _Parts(other.x, -other.y))
+        other = _square(other)
+    return _divide(tape, one, other)
+
+
+def _length_by_squares(_: Tape, one: _Parts) -> Any:
+    return sqrt(_square(one))
+
+
+def _square(one: _Parts) -> Any:
+    return _sum(_times(one.x, one.x), _times(one.y, one.y))
+
+
 def _negative(_: Tape, one: _Parts) -> _Parts:
     return _Parts(-one.x, -one.y)
 
@@ -204,4 +232,10 @@ _FORMULAS: dict[str, Callable[..., Any]] = {
     'phase': lambda _, one: atan2(one.y, one.x),
     'facing': lambda _, angle: _Parts(cos(angle), sin(angle)),
     'vector': lambda _, x, y: _Parts(x, y),
+}
+
+_BY_SQUARES: dict[str, Callable[..., Any]] = {
+    **_FORMULAS,
+    '/': _divide_by_squares,
+    'abs': _length_by_squares,
 }

@@ -50,8 +50,8 @@ _OPEN, _INDETERMINATE = CODES[Status.OPEN], CODES[Status.INDETERMINATE]
 _CLOSED, _LIMITED = CODES[Status.CLOSED], CODES[Status.LIMITED]
 _TOGGLE = CODES[Status.TOGGLE]
 
-_ASK = -1.0
-"""Said of a state whose status only the plain steps can tell."""
+_LOST = (Status.OPEN, Status.INDETERMINATE)
+"""What is told by the fates beside a path; where only the plain steps can tell, they are asked."""
 
 
 class _Program(NamedTuple):
@@ -62,13 +62,13 @@ class _Program(NamedTuple):
     ----------
     values
         What is asked for, and where the path holds.
-    status
-        The code of each state's status by the fates beside the path.
+    fates
+        Of those where it does not, which are open, and which are indeterminate.
 
     """
 
     values: BlockFunction
-    status: BlockFunction
+    fates: BlockFunction
 
 
 class Solver:
@@ -124,7 +124,7 @@ class Solver:
         batch = _room(self._width, count, derivatives, out)
         numbers: list[Any] = [value if value.ndim else float(value) for value in given]
         # Nothing is worked out of what is 0, and nothing multiplied by 1.
-        kinds = [n if isinstance(n, float) and n in (0.0, 1.0) else type(n) for n in numbers]
+        kinds = [int(n) if isinstance(n, float) and n in (0.0, 1.0) else type(n) for n in numbers]
         programs = self._programs(derivatives, tuple(kinds))
         functions = [function for program in programs for function in program]
         longest = min(count, BLOCK)
@@ -167,7 +167,7 @@ class Solver:
         if iterated(self._closure):
             return []
         return [
-            _program(lowered(path, fates(self._closure, path)), kinds)
+            _program(lowered(path, fates(self._closure, path), by_squares=True), kinds)
             for path in self._compiled(derivatives).paths
         ]
 
@@ -205,27 +205,31 @@ class _Block(NamedTuple):
 
     def pass_through(self, program: _Program, states: Any) -> Any:
         """Pass states through a path, None for all; return those of which it cannot tell."""
-        into = [row for values in self.values for row in values]
-        given = self.given
-        if states is not None:
-            given = self._of(states)
-            into = list(np.empty((len(into), len(states))))
-        holds = self._run(program.values, given, into)
-        if states is not None:
-            numbers = iter(into)
-            for values in self.values:
-                for row in values:
-                    row[states] = next(numbers)
+        holds = self._write(program, states)
         if holds is None or holds.all():
             return np.empty(0, np.intp)
-        off = np.flatnonzero(~holds)
+        on, off = np.flatnonzero(holds), np.flatnonzero(~holds)
         if states is not None:
-            off = states[off]
-        codes = np.empty(len(off))
-        self._run(program.status, self._of(off), [codes])
-        told = codes != _ASK
-        self.status[off[told]] = codes[told]
-        return off[~told]
+            on, off = states[on], states[off]
+        if len(on) < len(off):
+            # Nothing is written: most of it would have been for nothing.
+            self._write(program, on)
+        lost = np.empty((len(_LOST), len(off)), bool)
+        self._run(program.fates, self._of(off), list(lost))
+        for status, those in zip(_LOST, lost, strict=True):
+            self.status[off[those]] = CODES[status]
+        return off[~lost.any(axis=0)]
+
+    def _write(self, program: _Program, states: Any) -> Mask | None:
+        """Write what is asked for of states, None for all; return where the path holds."""
+        rows = [row for values in self.values for row in values]
+        if states is None:
+            return self._run(program.values, self.given, rows)
+        into = np.empty((len(rows), len(states)))
+        holds = self._run(program.values, self._of(states), list(into))
+        for row, numbers in zip(rows, into, strict=True):
+            row[states] = numbers
+        return holds
 
     def put(self, k: int, driven: int, one: Compiled) -> None:
         """Solve a single state."""
@@ -241,7 +245,7 @@ class _Block(NamedTuple):
     def _of(self, states: Any) -> list[Any]:
         return [n[states] if isinstance(n, np.ndarray) else n for n in self.given]
 
-    def _run(self, function: BlockFunction, given: list[Any], into: list[Array]) -> Mask | None:
+    def _run(self, function: BlockFunction, given: list[Any], into: list[Any]) -> Mask | None:
         count = len(into[0]) if into else len(self.status)
         return function(
             given, into, self.rows[: function.rows, :count], self.masks[: function.masks, :count]
@@ -259,32 +263,31 @@ def _program(path: Lowered, kinds: Sequence[Any]) -> _Program:
     (inputs, decisions, outputs, _), ends = path
     names = [given.name for given in inputs]
     each = list(zip(names, kinds, strict=True))
-    form = ArrayForm({name: kind for name, kind in each if isinstance(kind, float)})
+    form = ArrayForm({name: kind for name, kind in each if isinstance(kind, int)})
     arrays = [name for name, kind in each if kind is np.ndarray]
     holds: Number = True
-    status: Number = float(_CLOSED)
-    conditions = [
-        (form.holds(condition, held), fate)
-        for (condition, held), fate in zip(decisions, ends, strict=True)
-        if condition.name != 'finite'
-    ]
-    for condition, _ in conditions:
-        holds = form.both(holds, condition)
-    for condition, fate in reversed(conditions):
-        status = form.where(condition, status, _code(form, fate))
+    lost: list[Number] = [False] * len(_LOST)
+    for (condition, held), fate in zip(decisions, ends, strict=True):
+        if condition.name != 'finite':
+            found = form.number(condition)
+            falls = found if held else form.opposite(found)
+            leaves = form.both(holds, form.opposite(falls))
+            holds = form.both(holds, falls)
+            for k, status in enumerate(_LOST):
+                lost[k] = form.either(lost[k], form.both(leaves, _comes_to(form, fate, status)))
     roots = [form.number(number) for group in outputs for number in group]
-    return _Program(
-        BlockFunction(names, arrays, roots, holds), BlockFunction(names, arrays, [status])
+    return _Program(BlockFunction(names, arrays, roots, holds), BlockFunction(names, arrays, lost))
+
+
+def _comes_to(form: ArrayForm, fate: Fate, status: Status) -> Number:
+    """Return the condition that a fate comes to a status."""
+    if not isinstance(fate, Fork):
+        return fate is status
+    condition = form.number(fate.condition)
+    return form.either(
+        form.both(condition, _comes_to(form, fate.held, status)),
+        form.both(form.opposite(condition), _comes_to(form, fate.failed, status)),
     )
-
-
-def _code(form: ArrayForm, fate: Fate) -> Number:
-    """Return the code of a status that a fate comes to, as a number."""
-    if isinstance(fate, Fork):
-        return form.where(
-            form.number(fate.condition), _code(form, fate.held), _code(form, fate.failed)
-        )
-    return float(CODES[fate]) if fate in (Status.OPEN, Status.INDETERMINATE) else _ASK
 
 
 def _numbers(name: str, values: list[Any], driven: int, count: int | None) -> list[Array]:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from linkage_ros.kinematics.compiled.tape import Operation
@@ -100,6 +101,14 @@ class Writer:
     def name(self, operation: Operation, text: str) -> None:
         """Let an operation, such as an input, be known by a name."""
         self._texts[operation] = Text(text, _ATOM, 0)
+
+    @contextmanager
+    def block(self) -> Iterator[list[str]]:
+        """Collect the lines of a block; the names that it gives are not known behind it."""
+        texts, lines = self._texts, self.lines
+        self._texts, self.lines = dict(texts), []
+        yield self.lines
+        self._texts, self.lines = texts, lines
 
     def write(self, root: Any) -> str:
         """Return the text of a number, after the lines that it needs."""

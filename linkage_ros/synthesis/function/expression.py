@@ -35,7 +35,7 @@ from math import e, isfinite, pi, tau
 import re
 from typing import NamedTuple, overload
 
-from linkage_ros.errors import did_you_mean, quoted, SynthesisError
+from linkage_ros.errors import did_you_mean, listed, quoted, SynthesisError
 import numpy as np
 from numpy.typing import NDArray
 
@@ -299,7 +299,7 @@ class _Reader:
             raise self._wrong(
                 token,
                 'is not known',
-                did_you_mean(name.lower(), known, f'there are {", ".join(known)}'),
+                did_you_mean(name.lower(), known, f'there are {listed(known)}'),
             )
 
     def _inner(self, opening: _Token) -> None:

@@ -16,7 +16,7 @@
 """
 The four-bar's closed form in numbers of 32 bits, inputs and constants included.
 
-The stable form by the half angle, as `linkage_ros.kinematics.dyads.crank_rrr` has it. With
+The stable form by the half angle, as `linkage_ros.kinematics.crank_diagonal` has it. With
 near = 2√(ad)·sin(φ/2) and far = 2√(ad)·cos(φ/2), s² = (d − a)² + near²::
 
     K² = (s² − (b − c)²)·((b + c)² − s²)

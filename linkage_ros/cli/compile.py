@@ -1,0 +1,123 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Write a linkage as source that stands alone: C, a C header, JavaScript or Python.
+
+The source holds one function that solves the linkage as this package does: position for
+--derivatives 0, velocity for 1, motion for 2. It returns a status, and the joints where there are
+any; its head says what it takes and gives.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+import re
+from threading import Event
+
+from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quoted
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiled.c import C
+from linkage_ros.kinematics.compiled.javascript import JavaScript
+from linkage_ros.kinematics.compiled.python_module import PythonModule
+from linkage_ros.kinematics.compiled.source import Language, source, Subject
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import read_yaml
+from linkage_ros.whole_file import write_whole
+
+LANGUAGES: dict[str, Callable[[Subject], Language]] = {
+    '.c': lambda subject: C(subject.name, header=False),
+    '.h': lambda subject: C(subject.name, header=True),
+    '.js': lambda _: JavaScript(),
+    '.py': lambda subject: PythonModule(subject.derivatives),
+}
+"""The languages, by the ending of the file."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('file', help='the linkage file')
+    parser.add_argument(
+        '-o', '--output', type=Path, required=True, metavar='FILE',
+        help=f'source to write; its language is told by the ending: {", ".join(LANGUAGES)}',
+    )  # fmt: skip
+    parser.add_argument(
+        '--derivatives', type=int, choices=(0, 1, 2), default=2,
+        help='0: positions; 1: rates too; 2: accelerations too (default)',
+    )  # fmt: skip
+    parser.add_argument(
+        '--joints', metavar='NAMES', help='only these joints, with commas between them'
+    )
+    parser.add_argument(
+        '--name', help="what the names in C begin with (default: the linkage file's name)"
+    )
+
+
+def run(arguments: argparse.Namespace, _stop: Event) -> int:
+    """Write the source."""
+    output: Path = arguments.output
+    language = LANGUAGES.get(output.suffix)
+    if language is None:
+        raise LinkageError(
+            output,
+            f'ends in {output.suffix!r}' if output.suffix else 'has no ending',
+            f'name a file that ends in {", ".join(LANGUAGES)}',
+        )
+    content, _ = read_yaml(arguments.file)
+    closure = Closure(read_linkage(content))
+    file = Path(arguments.file)
+    in_c = output.suffix in ('.c', '.h')
+    subject = Subject(
+        closure,
+        _name(arguments.file, arguments.name) if in_c else file.stem,
+        file.name,
+        arguments.derivatives,
+        _joints(closure, arguments.joints),
+    )
+    try:
+        text = source(subject, language(subject))
+    except DefinitionError as error:
+        raise content.error(error.where, error.reason, error.remedy) from None
+    write_whole(output, text.encode())
+    print(output)
+    return 0
+
+
+def _name(file: str, typed: str | None) -> str:
+    """Return an identifier: the one that was typed, or what is made of the file's name."""
+    name = re.sub('[^0-9A-Za-z]+', '_', Path(file).stem).strip('_') if typed is None else typed
+    if not re.fullmatch('[A-Za-z][0-9A-Za-z_]*', name):
+        where, wrong = (file, Path(file).stem) if typed is None else ('--name', typed)
+        raise LinkageError(
+            where, f'{quoted(wrong)} makes no name in C', 'write one, as --name four_bar'
+        )
+    return name
+
+
+def _joints(closure: Closure, typed: str | None) -> tuple[str, ...]:
+    """Return the joints that are asked for, each once."""
+    published = closure.linkage.joints
+    if typed is None:
+        return tuple(published)
+    names = tuple(dict.fromkeys(name.strip() for name in typed.split(',')))
+    for name in names:
+        if name not in published:
+            raise LinkageError(
+                '--joints',
+                f'{quoted(name)} is no published joint',
+                did_you_mean(name, published, f'name some of {", ".join(published)}'),
+            )
+    return names

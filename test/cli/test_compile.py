@@ -1,0 +1,117 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``linkage compile``: what it writes runs, and what it cannot write it says in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import shutil
+import subprocess
+
+import pytest
+
+from .conftest import Run
+
+LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
+FOUR_BAR = str(LINKAGES / 'four_bar.yaml')
+
+ODD = {
+    'the end of a comment': 'crank */ #error',
+    'the begin of a comment': 'crank /* //',
+    'a trigraph': 'crank ??/',
+    'a backslash': r'crank \\',
+}
+"""Names of links, as they stand between double quotes in YAML."""
+
+
+def refused(linkage: Run, *typed: str) -> str:
+    """Return the one line by which a command refuses what was typed."""
+    answer = linkage('compile', *typed)
+    assert (answer.returncode, answer.stdout) == (2, '')
+    (line,) = answer.stderr.splitlines()
+    return line.removeprefix('linkage compile: ')
+
+
+@pytest.mark.parametrize(
+    ('typed', 'said'),
+    [
+        (['-o', 'a.cc'], "a.cc: ends in '.cc'; name a file that ends in .c, .h, .js, .py"),
+        (['-o', 'a'], 'a: has no ending; name a file that ends in .c, .h, .js, .py'),
+        (
+            ['-o', 'a.c', '--joints', 'rocker_joint,coupler'],
+            "--joints: 'coupler' is no published joint; did you mean 'coupler_joint'?",
+        ),
+        (
+            ['-o', 'a.c', '--joints', ''],
+            "--joints: '' is no published joint; name some of coupler_joint, rocker_joint",
+        ),
+        (
+            ['-o', 'a.c', '--name', 'four-bar'],
+            "--name: 'four-bar' makes no name in C; write one, as --name four_bar",
+        ),
+        (
+            ['-o', 'no/a.c'],
+            'no/a.c: cannot be written (No such file or directory); name another file',
+        ),
+    ],
+)
+def test_what_is_typed_wrong_is_said_in_a_line(linkage: Run, typed, said) -> None:
+    assert refused(linkage, FOUR_BAR, *typed) == said
+
+
+def test_a_file_whose_name_makes_no_name_in_c_needs_one(linkage: Run, tmp_path: Path) -> None:
+    shutil.copy(FOUR_BAR, tmp_path / '4.yaml')
+    said = "4.yaml: '4' makes no name in C; write one, as --name four_bar"
+    assert refused(linkage, '4.yaml', '-o', 'a.c') == said
+    assert linkage('compile', '4.yaml', '-o', 'a.c', '--name', 'four').stdout == 'a.c\n'
+    assert 'four_motion(' in (tmp_path / 'a.c').read_text()
+    # In a module nothing is named after the file.
+    assert linkage('compile', '4.yaml', '-o', 'a.py').returncode == 0
+
+
+def test_iterated_links_are_named_with_their_line(linkage: Run, tmp_path: Path) -> None:
+    shutil.copy(LINKAGES / 'class_3.yaml', tmp_path)
+    said = refused(linkage, 'class_3.yaml', '-o', 'a.c')
+    assert said.startswith('class_3.yaml:10: links: some are only solved by iteration')
+    assert not (tmp_path / 'a.c').exists()
+
+
+@pytest.mark.skipif(shutil.which('cc') is None, reason='needs cc')
+@pytest.mark.parametrize('odd', ODD)
+@pytest.mark.parametrize('ending', ['c', 'h', 'js', 'py'])
+def test_names_of_links_stay_in_the_comments(
+    linkage: Run, tmp_path: Path, ending: str, odd: str
+) -> None:
+    text = Path(FOUR_BAR).read_text('utf-8').replace('crank:', f'"{ODD[odd]}":')
+    text = text.replace('child: crank', f'child: "{ODD[odd]}"')
+    text = text.replace('parent: crank', f'parent: "{ODD[odd]}"')
+    (tmp_path / 'odd.yaml').write_text(text, 'utf-8')
+    answer = linkage('compile', 'odd.yaml', '-o', f'a.{ending}')
+    assert answer.returncode == 0, answer.stderr
+    source = (tmp_path / f'a.{ending}').read_text('utf-8')
+    assert '#error' in source or '#error' not in ODD[odd]
+    if ending == 'py':
+        compile(source, 'a.py', 'exec')
+    elif ending == 'js':
+        comment, _, code = source.partition('*/')
+        assert 'crank' in comment
+        assert 'crank' not in code.replace('crank_joint', '')
+    else:
+        typed = ['cc', '-std=c99', '-Wall', '-Wextra', '-Wpedantic', '-Werror', '-x', 'c']
+        done = subprocess.run(
+            [*typed, '-c', f'a.{ending}', '-o', 'a.o'], cwd=tmp_path, capture_output=True,
+            text=True, timeout=60, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
