@@ -26,6 +26,7 @@ from cmath import rect
 from collections.abc import Iterable, Mapping
 from math import frexp, hypot, ldexp
 
+from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
 from linkage_ros.kinematics.linkage import GROUND, Linkage, Point
 from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail
@@ -161,8 +162,13 @@ class KnownLinks:
         return Line(start, direction * rect(1.0, -slider.angle), -slider.angle, -1.0)
 
     def arm(self, link: str, start: str, end: str) -> complex:
-        """Return the vector from one point of a link to another."""
-        return self.points[link][end] - self.points[link][start]
+        """Return the vector from one pin of a link to another."""
+        arm = self.points[link][end] - self.points[link][start]
+        if not arm:  # apart in the file, but not beside the size of the linkage
+            raise DefinitionError(
+                f'links.{link}', 'has two pins in one place', 'give them different places'
+            )
+        return arm
 
     def carriers(self, point: str) -> list[str]:
         """Return the known links that carry a point, the ground first."""

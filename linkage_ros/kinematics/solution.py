@@ -183,8 +183,8 @@ class Planner(KnownLinks):
             kind = FoldingRRRDyad
         self.add(kind(diagonal, b, c, sign))
         k = self.new_coordinates(2)
-        self.angles[one] = _facing(one, k, base, one_arm)
-        self.angles[other] = _facing(other, k + 1, base, other_arm)
+        self.angles[one] = _facing(k, base, one_arm)
+        self.angles[other] = _facing(k + 1, base, other_arm)
         self.pin_to(one, first)
         self.pin_to(other, second)
 
@@ -219,7 +219,7 @@ class Planner(KnownLinks):
             sign = hinge.side_at_change_point(diagonal, sign)
         self.add(RPRDyad(diagonal, offset, sign))
         k = self.new_coordinates(2)
-        self.angles[rail] = _facing(rail, k, base, line.direction)
+        self.angles[rail] = _facing(k, base, line.direction)
         self.angles[block] = self.angles[rail].plus(line.angle)
         self.slides[name] = Slide(k + 1, 1.0, -foot.real)
         self.pin_to(rail, first)
@@ -236,7 +236,7 @@ class Planner(KnownLinks):
         base = self.angles[second.to].along(line.direction)
         self.add(RRPDyad(self._rail(first.name, second.to, line, abs(arm)), sign))
         k = self.new_coordinates(2)
-        self.angles[link] = _facing(link, k, base, arm)
+        self.angles[link] = _facing(k, base, arm)
         self.pin_to(link, first)
         self.ride(block, point, second.to, line, Slide(k + 1, 1.0))
         self.slides[name] = Slide(k + 1, line.sign)
@@ -424,11 +424,7 @@ class Planner(KnownLinks):
         return sides[side]
 
 
-def _facing(link: str, coordinate: int, base: Angle, vector: complex) -> Angle:
+def _facing(coordinate: int, base: Angle, vector: complex) -> Angle:
     """Return the angle of a link of which a vector stands at a coordinate, from a base."""
-    if not vector:  # apart in the file, but not beside the size of the linkage
-        raise DefinitionError(
-            f'links.{link}', 'has two pins in one place', 'give them different places'
-        )
     unit = base.unit * (vector / abs(vector)).conjugate()
     return Angle(coordinate, base.constant - phase(vector), unit)

@@ -17,7 +17,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+import re
 
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
 from .conftest import Run
@@ -77,3 +82,31 @@ def test_a_file_without_measure_is_refused_in_a_line(
     assert named in line
     assert len(line) < 1000
     assert answer.stdout == ''
+
+
+BESIDE = re.compile(r'(\w+: \[[^]]*\]), (\w+): \[[^]]*\]')
+"""Two points of a link."""
+
+LINKAGES = [
+    file
+    for file in sorted((Path(__file__).parents[2] / 'config' / 'linkages').glob('*.yaml'))
+    if BESIDE.search(file.read_text())
+]
+
+
+@pytest.mark.parametrize('file', LINKAGES, ids=lambda file: file.stem)
+def test_points_that_are_hardly_apart_are_refused_in_a_line_or_solved(file: Path) -> None:
+    """A point of a link is put next to another one, by the least that a number can be."""
+    text = file.read_text()
+    errors = []
+    for found in BESIDE.finditer(text):
+        one, name = found.groups()
+        x, y = one.partition('[')[2].rstrip(']').split(', ')
+        beside = f'{one}, {name}: [{x if float(x) else "5e-324"}, {y}]'
+        changed = text.replace(found[0], beside)
+        try:
+            Closure(read_linkage(parse_yaml(changed.encode(), file.name)))
+        except LinkageError as error:
+            errors.append(str(error))
+    assert errors
+    assert not any('\n' in error for error in errors)
