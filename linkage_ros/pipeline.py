@@ -22,7 +22,7 @@ Building puts in only what the scene names; a tick asks no scene.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 from importlib import import_module
 from operator import add
 from typing import Any, NamedTuple, TYPE_CHECKING
@@ -266,21 +266,27 @@ class Line:
         ]
         """The topics beside the joint states."""
 
-        self.see: Callable[[int], Look | Seen] = self._see
-        """Returns what the linkage comes to at a time, in [ns]."""
-        self.usual: Straight | None = None
-        """Its usual tick, where all of it can be written as text."""
+        self._read_behind = partial(self._read, first=len(running)) if behind else None
+        self._straight: Straight | None = None
         moved = {effect.name for effect in effects if effect.stage is not None}
-        if type(self.closure) is not Closure or not moved <= _KINEMATIC or self._faults:
-            return
-        compiled = self.closure.compiled(len(moved))
-        if compiled.paths:
-            running_on = angles if running else None
-            usual = straight(self.drive, self._drive_stages, compiled, running_on)
-            read = partial(self._read, first=len(running)) if behind else None
-            self.see = straight_look(usual, read, self.look)
-            if read is None and all(extra.writer.of_reading for extra in self.extras):
-                self.usual = usual
+        if type(self.closure) is Closure and moved <= _KINEMATIC and not self._faults:
+            compiled = self.closure.compiled(len(moved))
+            if compiled.paths:
+                running_on = angles if running else None
+                self._straight = straight(self.drive, self._drive_stages, compiled, running_on)
+
+    @property
+    def whole(self) -> Straight | None:
+        """Return the usual tick up to what is published, if all of it is written as text."""
+        of_reading = all(extra.writer.of_reading for extra in self.extras)
+        return self._straight if self._read_behind is None and of_reading else None
+
+    @cached_property
+    def see(self) -> Callable[[int], Look | Seen]:
+        """Return what says what the linkage comes to at a time, in [ns]."""
+        if self._straight is None:
+            return self._see
+        return straight_look(self._straight, self._read_behind, self.look)
 
     def _see(self, now: int) -> Look:
         """Return what the linkage comes to at a time, in [ns], step by step."""
@@ -555,7 +561,7 @@ class Pipeline:
         self._offered = 0
         self._newest: dict[Line, int] = {}
         self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
-        self.tick: Callable[[int], Tick] = self._straight() or self._tick
+        self.tick = self._ticking()
         """Ticks at a time, in [ns]."""
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
@@ -589,9 +595,6 @@ class Pipeline:
         self._newest.clear()
         return len(numbers)
 
-    def _tick(self, now: int) -> Tick:
-        return self._made(now, [line.see(now) for line in self.lines])
-
     def _made(self, now: int, seen: Sequence[Look | Seen]) -> Tick:
         """Return what a tick comes to; joints are left out that have no reading."""
         extras: tuple[bytes, ...] = ()
@@ -606,13 +609,15 @@ class Pipeline:
         stamp = max([reading.stamp for reading in readings])
         return Tick(writer.write(stamp, *_joined(readings)), extras, seen, self.lines)
 
-    def _straight(self) -> Callable[[int], Tick] | None:
-        """Return the tick as one function, where all of it can be written so."""
-        line = self.lines[0]
-        if len(self.lines) > 1 or line.usual is None:
-            return None
+    def _ticking(self) -> Callable[[int], Tick]:
+        """Return what ticks."""
+        usual = self.lines[0].whole if len(self.lines) == 1 else None
+        if usual is None:
+            see = [line.see for line in self.lines]
+            return lambda now: self._made(now, [look(now) for look in see])
+        (line,) = self.lines
         return straight_tick(
-            line.usual,
+            usual,
             self._writer((True,)),
             [extra.writer.write for extra in self.extras],
             Tick,

@@ -28,7 +28,7 @@ variables touches least.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import chain
+from itertools import chain, islice
 from math import pi
 from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
@@ -124,10 +124,12 @@ def straight(
         bound[f'stage{number}'] = stage
         lines.append(f'{_CRANK} = stage{number}(CrankState({_CRANK}))')
     path, *more_paths = compiled.paths
-    inputs = [given.name for given in path.inputs]
-    n = compiled.driven
-    for order, field in enumerate(CrankState._fields[: 1 + compiled.derivatives]):
-        lines.append(f'{", ".join(inputs[n * order : n * order + n])}, = {field}')
+    inputs = [one.name for one in path.inputs]
+    given = iter(inputs)
+    lines += [
+        f'{", ".join(islice(given, compiled.driven))}, = {field}'
+        for field in CrankState._fields[: 1 + compiled.derivatives]
+    ]
     groups = [
         [f'{letter}{i}' for i in range(len(group))]
         for letter, group in zip('xyz', path.outputs, strict=False)

@@ -100,3 +100,13 @@ def test_a_reset_compiles_nothing(monkeypatch):
     monkeypatch.setattr('linkage_ros.kinematics.compiled.linkage.python_body', None)
     monkeypatch.setattr('builtins.exec', None)
     assert Pipeline(scene, first.closures).tick(BEGIN).message == message
+
+
+def test_a_pose_is_worked_out_for_a_message_that_is_due_and_no_other(monkeypatch):
+    file = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
+    work = pipeline(file.read_bytes(), f'{DRIVES["turning"]}\neffects: {{markers: {{rate: 50}}}}')
+    (line,) = work.lines
+    looked, worked_out = line.looked, []
+    monkeypatch.setattr(line, 'looked', lambda seen: worked_out.append(seen) or looked(seen))
+    drawn = sum(any(tick.extras) for tick in ticks(work))
+    assert drawn == len(worked_out) == TICKS * 50 // 1000

@@ -219,10 +219,8 @@ class Effect:
 
     Attributes
     ----------
-    name
-        As a scene names it.
-    parameters
-        The type of its parameters.
+    name, parameters
+        As a scene names it, and the type of its parameters.
     alter, drive_stage, stage, sensor, writer
         Its functions; see above.
     topic, message

@@ -88,6 +88,13 @@ def test_iterated_links_are_named_with_their_line(linkage: Run, tmp_path: Path) 
     assert not (tmp_path / 'a.c').exists()
 
 
+def test_a_linkage_that_closes_nowhere_is_told_to_say_where(linkage: Run, tmp_path: Path) -> None:
+    text = (LINKAGES / 'five_bar.yaml').read_text('utf-8').replace('O2: [0.120, 0]', 'O2: [9, 0]')
+    (tmp_path / 'apart.yaml').write_text(text, 'utf-8')
+    said = 'no state is found at which the linkage is closed; write one at which it is: pose: '
+    assert said in refused(linkage, 'apart.yaml', '-o', 'a.c')
+
+
 @pytest.mark.skipif(shutil.which('cc') is None, reason='needs cc')
 @pytest.mark.parametrize('odd', ODD)
 @pytest.mark.parametrize('ending', ['c', 'h', 'js', 'py'])

@@ -131,8 +131,10 @@ class C(Language):
         definition = [*signature, '{', *two, *body, '}']
         comment = ['/*', *(f' * {_harmless(line)}'.rstrip() for line in (*head, *_NOTES)), ' */']
         if self._header:
-            guard = f'{function.upper()}_H'
+            guard, once = f'{function.upper()}_H', f'{name.upper()}_STATUS'
             definition[0] = f'static inline {definition[0]}'
+            # Headers of one linkage with other derivatives have the statuses in common.
+            listed = [f'#ifndef {once}', f'#define {once}', *listed, f'#endif  /* {once} */']
             lines = [
                 f'#ifndef {guard}', f'#define {guard}', '', *_CHECK, '', *listed, '', *definition,
                 '', f'#endif  /* {guard} */',

@@ -68,7 +68,7 @@ class PythonModule(Language):
 
     def negated(self, condition: str) -> str:
         """Write that a condition does not hold, which is also so of numbers that are none."""
-        return f'not ({condition})'
+        return f'not {condition}' if condition.isidentifier() else f'not ({condition})'
 
     def block(self, condition: str, lines: Sequence[str]) -> list[str]:
         """Write lines that are run where a condition holds."""

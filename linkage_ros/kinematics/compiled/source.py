@@ -124,7 +124,7 @@ class Language(ABC):
 
     def negated(self, condition: str) -> str:
         """Write that a condition does not hold, which is also so of numbers that are none."""
-        return f'!({condition})'
+        return f'!{condition}' if condition.isidentifier() else f'!({condition})'
 
     def block(self, condition: str, lines: Sequence[str]) -> list[str]:
         """Write lines that are run where a condition holds."""

@@ -27,12 +27,11 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.compiled.linkage import Compiled
+from linkage_ros.kinematics.compiled.linkage import Compiled, iterated
 from linkage_ros.kinematics.compiled.lowered import Lowering
 from linkage_ros.kinematics.compiled.tape import Operation, Tape
-from linkage_ros.kinematics.compiled.trace import joints, moved, Number, number_of, Wanted
+from linkage_ros.kinematics.compiled.trace import moved, Number, number_of, Wanted
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.structure import Iterated
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Closure
@@ -77,7 +76,7 @@ class Program(NamedTuple):
     tree: Tree
 
 
-def program(closure: Closure, derivatives: int, wanted: Wanted = joints) -> Program:
+def program(closure: Closure, derivatives: int, wanted: Wanted) -> Program:
     """
     Return the tree of a linkage, whatever its limits.
 
@@ -96,7 +95,7 @@ def program(closure: Closure, derivatives: int, wanted: Wanted = joints) -> Prog
         Where links are solved by iteration, or no state is found at which the linkage is closed.
 
     """
-    if any(isinstance(group, Iterated) for group in closure.structure.groups):
+    if iterated(closure):
         raise DefinitionError(
             'links',
             'some are only solved by iteration, which is no straight line',
@@ -107,7 +106,7 @@ def program(closure: Closure, derivatives: int, wanted: Wanted = joints) -> Prog
         raise DefinitionError(
             'pose',
             'no state is found at which the linkage is closed',
-            'write one: pose: {inputs: [VALUE]}',
+            'write one at which it is: pose: {inputs: [VALUE, VALUE]}',
         )
     tape = Tape()
     count = len(closure.linkage.inputs)

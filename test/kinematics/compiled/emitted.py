@@ -32,7 +32,6 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiled.c import C
 from linkage_ros.kinematics.compiled.source import FUNCTIONS, source, STATUSES, Subject
 from linkage_ros.kinematics.compiled.trace import moved
-from linkage_ros.kinematics.status import Status
 import pytest
 
 COMPILERS = {'C99': ('cc', '-x', 'c', '-std=c99'), 'C++': ('c++', '-x', 'c++', '-std=c++11')}
@@ -111,18 +110,6 @@ def plain(closure: Closure, state: State) -> Told:
         return Told(status.name, ())
     groups = [part.joints for part in motion if part is not None]
     return Told(status.name, tuple(value for group in groups for value in group))
-
-
-def alike(one: Told, steps: Told) -> bool:
-    """
-    Return whether a source says the same as the steps, to the last bit.
-
-    At a toggle a source does not look further, where the steps may find a loop open.
-    """
-    if one.status == Status.TOGGLE.name:
-        worse = (Status.TOGGLE.name, Status.OPEN.name, Status.INDETERMINATE.name)
-        return not one.values and steps.status in worse
-    return one == steps
 
 
 def run_c(what: Subject, given: Sequence[State], folder: Path, kind: str = 'C99') -> list[Told]:

@@ -26,11 +26,10 @@ from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiled.c import C
 from linkage_ros.kinematics.compiled.source import source
-from linkage_ros.kinematics.linkage import Limits
+from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
 import pytest
 
 from .emitted import (
-    alike,
     build,
     COMPILERS,
     COUNT,
@@ -57,8 +56,7 @@ def told_of(
     given = states(closure, count, seed, start)
     told = run_c(subject(closure), given, folder)
     for state, one in zip(given, told, strict=True):
-        steps = plain(closure, state)
-        assert alike(one, steps), f'{state}: {one}, and the steps: {steps}'
+        assert one == plain(closure, state), state
     return told
 
 
@@ -83,6 +81,22 @@ def test_a_change_point_has_the_values_of_the_motion_that_passes(tmp_path: Path)
         told = run_c(subject(closure), given, tmp_path)
         assert told == [plain(closure, state) for state in given]
         assert name != 'parallelogram' or {one.status for one in told} == {'CHANGE_POINT'}
+
+
+def test_behind_a_toggle_nobody_looks(tmp_path: Path) -> None:
+    rocker = closure_of('double_rocker')
+    links = {name: dict(points) for name, points in rocker.linkage.links.items()}
+    links['ground']['O6'] = (0.15, -0.3)
+    links |= {
+        'arm': {'B': (0.0, 0.0), 'E': (0.08, 0.0)},
+        'lever': {'O6': (0.0, 0.0), 'E': (0.08, 0.0)},
+    }
+    assembly = {**rocker.linkage.assembly, 'E': 'left'}
+    joints = {**rocker.linkage.joints, 'lever_joint': RevoluteJoint('ground', 'lever')}
+    closure = Closure(replace(rocker.linkage, links=links, assembly=assembly, joints=joints))
+    given = [(rocker.closing_ranges[0].lowest, 1.0, 0.0)]
+    assert plain(closure, given[0]).status == 'OPEN'
+    assert run_c(subject(closure), given, tmp_path) == [Told('TOGGLE', ())]
 
 
 def limited(**limits: tuple[float, float]) -> Closure:
@@ -155,6 +169,14 @@ def test_it_compiles_without_a_warning(name, header, kind, tmp_path: Path) -> No
     (tmp_path / 'linkage.h').write_text(text)
     file.write_text('#include "linkage.h"\n' * 2 + 'int nothing;\n' if header else text)
     build([*COMPILERS[kind], '-c'], file, tmp_path / 'linkage.o')
+
+
+@pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
+def test_headers_of_one_linkage_go_together(kind: str, tmp_path: Path) -> None:
+    closure = closure_of('four_bar')
+    texts = [source(subject(closure, i), C('four_bar', header=True)) for i in range(3)]
+    (tmp_path / 'all.c').write_text('\n'.join(texts))
+    build([*COMPILERS[kind], '-Wno-unused-function', '-c'], tmp_path / 'all.c', tmp_path / 'all.o')
 
 
 def test_links_that_are_iterated_are_refused() -> None:

@@ -30,7 +30,7 @@ from linkage_ros.kinematics.compiled.python_module import PythonModule
 from linkage_ros.kinematics.compiled.source import FUNCTIONS, source, Subject
 import pytest
 
-from .emitted import alike, COUNT, needs, NUMBERS, parts, plain, State, states, subject, Told
+from .emitted import COUNT, needs, NUMBERS, parts, plain, State, states, subject, Told
 from .test_c import GALLERY, limited
 from ..test_gallery import closure_of  # noqa: TID252
 
@@ -65,7 +65,7 @@ def test_python_has_the_bits_of_the_steps(name: str) -> None:
     closure = closure_of(name)
     solve = python_of(subject(closure))['motion']
     for state in states(closure, COUNT, name):
-        assert alike(told_by(solve, state), plain(closure, state)), state
+        assert told_by(solve, state) == plain(closure, state), state
 
 
 def test_python_needs_nothing_but_math() -> None:
