@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf, nan
 from typing import Any, Final
 
 from linkage_ros.kinematics.batch import Array, Mask
@@ -95,7 +96,8 @@ class BlockFunction:
         lines = '\n'.join(f'    {line}' for line in (*head, *writer.lines))
         self.source = f'def run(given, out, rows, masks):\n{lines}\n'
         functions = (*_FUNCTIONS.values(), np.copyto, np.count_nonzero)
-        namespace: dict[str, Any] = {function.__name__: function for function in functions}
+        namespace: dict[str, Any] = {'inf': inf, 'nan': nan}
+        namespace |= {function.__name__: function for function in functions}
         exec(self.source, namespace)
         self._run = namespace['run']
 
@@ -172,7 +174,10 @@ class _Writer:
         self.lines.append(f'return {held}')
 
     def _text(self, number: Number) -> str:
-        return self._names[number] if isinstance(number, Operation) else repr(number)
+        if isinstance(number, Operation):
+            return self._names[number]
+        # A linkage may have numbers of numpy's, of which repr() tells the type.
+        return repr(number if isinstance(number, bool) else float(number))
 
     def _write(self, root: Number) -> None:
         """Write what a number needs that is not written yet, and itself."""
