@@ -283,7 +283,7 @@ class Line:
 
     @cached_property
     def see(self) -> Callable[[int], Look | Seen]:
-        """Return what says what the linkage comes to at a time, in [ns]."""
+        """Return a function of the time, in [ns]: what the linkage comes to."""
         if self._straight is None:
             return self._see
         return straight_look(self._straight, self._read_behind, self.look)
@@ -610,7 +610,7 @@ class Pipeline:
         return Tick(writer.write(stamp, *_joined(readings)), extras, seen, self.lines)
 
     def _ticking(self) -> Callable[[int], Tick]:
-        """Return what ticks."""
+        """Return a function of the time, in [ns]: the tick, as one text where it can be."""
         usual = self.lines[0].whole if len(self.lines) == 1 else None
         if usual is None:
             see = [line.see for line in self.lines]

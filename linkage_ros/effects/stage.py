@@ -41,8 +41,8 @@ An effect that publishes a message of its own has also
 ``TOPIC``, ``MESSAGE``
     The topic, and the type of the message: package/msg/Type.
 ``OF_READING``
-    True where the message is made of the reading alone: then it is also published of a reading
-    that a delay brings where the loop has no pose, and the motion is None.
+    True where the message is made of the reading alone: then the motion is None, and the message
+    is also published of a reading that a delay brings where the loop has no pose.
 ``writer(parameters, context) -> Callable[[int, Motion, Reading], bytes]``
     Build what writes the message, given the time of the tick, in [ns]; b'' where there is nothing
     to publish. It is asked only where there is a reading. Where it has a method
