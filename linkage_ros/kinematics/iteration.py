@@ -202,7 +202,8 @@ class Iteration:
         return IteratedPose(Status.TOGGLE, 0.0, values, jacobian)
 
     def _inputs_of(self, known: State) -> list[float]:
-        return known.coordinates[1 : 1 + len(self._inputs)]
+        end = 1 + len(self._inputs)
+        return known.coordinates[1:end]
 
     def branch(self) -> Branch | None:
         """

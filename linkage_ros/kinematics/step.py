@@ -51,11 +51,11 @@ class Pose(Protocol):
 
     @property
     def status(self) -> Status:
-        """Whether it closes."""
+        """Return whether it closes."""
 
     @property
     def gap(self) -> float:
-        """What it misses by where it does not close, else 0, in the unit of the lengths."""
+        """Return what it misses by where it does not close, else 0, in the unit of the lengths."""
 
 
 class Placed(NamedTuple):

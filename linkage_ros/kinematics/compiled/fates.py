@@ -82,7 +82,8 @@ def _fate(closure: Closure, path: Path, decided: Sequence[bool]) -> Fate:
             break
         if len(tape.decisions) >= len(decided):
             break
-    made = tape.decisions[len(decided) :]
+    count = len(decided)
+    made = tape.decisions[count:]
     for number in reversed(range(len(made))):
         before = [*decided, *(decision.held for decision in made[:number])]
         other = _fate(closure, path, [*before, not made[number].held])

@@ -163,8 +163,7 @@ class Compiled:
 
     def plain(self, *numbers: float) -> Answer:
         """Return the answer of the plain steps."""
-        n = self.driven
-        given = [numbers[i * n : (i + 1) * n] for i in range(1 + self.derivatives)]
+        given = list(zip(*[iter(numbers)] * self.driven, strict=True))
         motion = moved(self._closure, given, self._within_limits)
         status, gap = motion.position.status, motion.position.gap
         found = tuple(tuple(group) for group in self._wanted(motion))

@@ -270,12 +270,12 @@ class Symbol:
 
     @property
     def real(self) -> Any:
-        """The part along x; of a real number itself."""
+        """Return the part along x; of a real number itself."""
         return self if self.operation.kind == 'real' else self.tape.write('real', self)
 
     @property
     def imag(self) -> Any:
-        """The part along y."""
+        """Return the part along y."""
         return 0.0 if self.operation.kind == 'real' else self.tape.write('imag', self)
 
     def conjugate(self) -> Any:
