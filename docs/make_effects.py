@@ -52,14 +52,13 @@ _STANDS = {
     'drive_stage': 'the crank, before the loops are closed',
     'stage': 'the mechanism, once its loops are closed',
     'sensor': 'what is read',
-    'begin': 'the mechanism, once its loops are closed',
     'writer': 'nothing: it draws what the mechanism does',
     'friction': 'whatever works with forces; no part of the tick of its own',
     'clock': 'the time by which a tick goes',
     'message': 'the messages of the crank',
     'mechanism': 'the loop, once it is closed',
 }
-"""What a module works on that has this function."""
+"""What a module works on that has this function, or whose parameters have this."""
 
 
 class Section(NamedTuple):
@@ -164,7 +163,14 @@ def place(kind: str, name: str) -> str:
     """Return what a drive, an effect or a fault is, and its place."""
     module = import_module(REGISTRIES[kind][name])
     said = [f'*{_summary(kind, name)}*', '']
-    works_on = next((what for has, what in _STANDS.items() if hasattr(module, has)), '')
+    works_on = next(
+        (
+            w
+            for has, w in _STANDS.items()
+            if hasattr(module, has) or hasattr(module.PARAMETERS, has)
+        ),
+        '',
+    )
     if kind == 'drive':
         topic = getattr(module, 'TOPIC', '')
         listens = f'Listens to `{topic}`, sensor_msgs/msg/JointState.' if topic else ''

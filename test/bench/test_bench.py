@@ -123,11 +123,15 @@ def test_subscribers_that_come_and_go_are_measured_for_each_way_to_carry_message
 
 
 @pytest.mark.timeout(90)
-def test_the_empty_scene_is_measured_against_its_bare_closure(tmp_path):
+def test_the_empty_scene_is_measured_against_the_same_by_hand(tmp_path):
     kept = _bench(tmp_path, '--only', 'empty')
-    cells = _row(kept, 'µs a tick: empty scene / bare closure and packing')
-    assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))
-    assert cells[4] == '≤ 1.05'
+    for name, target in (
+        ('empty scene / straight line and packing', '≤ 1.5'),
+        ('with velocity / empty scene', '≤ 1.25'),
+    ):
+        cells = _row(kept, f'µs a tick: {name}')
+        assert all(isfinite(value) and value > 0.0 for value in _numbers(cells[1:4]))
+        assert cells[4] == target
 
 
 @pytest.mark.timeout(90)
