@@ -118,8 +118,7 @@ SPEED = 40.0
 
 def turned(loaded, method, seconds, steps):
     """Return the states of a crank that turns freely, at the end of each step."""
-    position, terms = loaded.closure.position, loaded.terms
-    crank = OneFreedom(lambda angle: terms(position(angle)), STEP[method])
+    crank = OneFreedom(loaded.equation, STEP[method])
     motion = crank.at(BEGIN, SPEED)
     motions = [motion]
     for _ in range(steps):

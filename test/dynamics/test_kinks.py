@@ -149,8 +149,7 @@ def loaded(coulomb):
 
 def turned(mechanics, method, steps):
     """Return where a crank comes to in `SECONDS`, in a number of steps."""
-    position, terms = mechanics.closure.position, mechanics.terms
-    crank = OneFreedom(lambda angle: terms(position(angle)), STEP[method])
+    crank = OneFreedom(mechanics.equation, STEP[method])
     motion = crank.at(BEGIN, SPEED)
     for _ in range(steps):
         motion = crank.advance(motion, SECONDS / steps, 0.0)
@@ -188,8 +187,8 @@ def test_the_gallery_keeps_the_highest_order_with_friction_in_every_joint(name):
     mechanics = Mechanics(closure, Loads((0.0, -GRAVITY), (), 0.5), friction)
     ends, start = [], STATES[name][0][0]
     for steps in (50, 100, 400):
-        motions, position, terms = [], closure.position, mechanics.terms
-        crank = OneFreedom(lambda q: terms(position(q)), STEP['gauss_legendre'])  # noqa: B023
+        motions = []
+        crank = OneFreedom(mechanics.equation, STEP['gauss_legendre'])
         motion = crank.at(start, 15.0)
         for _ in range(steps):
             motions.append(motion)
@@ -245,8 +244,7 @@ def test_without_coulomb_friction_no_slip_is_looked_at(method):
 
 
 def spun(mechanics, method, rate, seconds, steps):
-    position, terms = mechanics.closure.position, mechanics.terms
-    crank = OneFreedom(lambda angle: terms(position(angle)), STEP[method])
+    crank = OneFreedom(mechanics.equation, STEP[method])
     motion = crank.at(0.1, rate)
     for _ in range(steps):
         motion = crank.advance(motion, seconds / steps, 0.0)

@@ -44,7 +44,7 @@ from .reference import four_bar, Quantity, turned
 from .samples import FOUR_BARS, four_bars, FourBarCase
 from .tolerance import ANGLE, RATE, TOGGLE, Worst
 
-COUNT = 300
+COUNT = 500
 ACCELERATED = 60
 
 ACCELERATION = 4.0

@@ -144,11 +144,10 @@ def free_motion(member: Member) -> FreeMotion:
 def integrate(motion: FreeMotion, method: str, step: float) -> Integrated:
     """Integrate a motion once, and time it without the looks at its energy."""
     mechanics = motion.mechanics
-    position, terms = mechanics.closure.position, mechanics.terms
-    freedom = OneFreedom(lambda value: terms(position(value)), import_module(METHODS[method]).step)
+    freedom = OneFreedom(mechanics.equation, import_module(METHODS[method]).step)
     at = freedom.at(*motion.start)
     assert at is not None, 'the reference has moved it'
-    whole = mechanics.energy(position(at.value), at.rate)
+    whole = _energy(mechanics, at)
     count = round(SECONDS / step)
     looks = {count * k // _LOOKS for k in range(1, _LOOKS + 1)}
     spent = worst = 0.0
