@@ -49,7 +49,7 @@ import pytest
 SEED = 20261122
 """Not the campaign's own: its findings went into the code."""
 
-WANTED = {KINEMATICS: 3, CHECK: 90, CHECK_SPOILT: 90, FILE: 6}
+WANTED = {KINEMATICS: 2, CHECK: 90, CHECK_SPOILT: 90, FILE: 6}
 
 
 @pytest.fixture(scope='module')
