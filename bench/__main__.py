@@ -90,7 +90,8 @@ def main() -> int:
             if arguments.only in (None, 'many'):
                 tables.append(_many(graph, folder, arguments.quick))
             if arguments.only in (None, 'real_time'):
-                tables += [_real_time(graph, folder, r, arguments.quick) for r in (SLOW, FAST)]
+                rates = (SLOW,) if arguments.quick else (SLOW, FAST)
+                tables += [_real_time(graph, folder, rate, arguments.quick) for rate in rates]
             if arguments.only == 'comers':
                 say('subscribers that come and go')
                 rates = (SLOW,) if arguments.quick else (SLOW, FAST)

@@ -97,10 +97,9 @@ def test_a_hundred_linkages_are_measured(tmp_path):
 @pytest.mark.timeout(90)
 def test_ticks_under_load_are_measured_with_and_without_what_the_system_gives(tmp_path):
     kept = _bench(tmp_path, '--only', 'real_time')
-    for rate in (1, 10):
-        for more in ('', ' + thread_priority', ' + thread_priority + cpu_affinity'):
-            cells = _row(kept, f'linkage_node{more}, {rate} kHz')
-            assert all(isfinite(value) for value in _numbers(cells[1:4]))
+    for more in ('', ' + thread_priority', ' + thread_priority + cpu_affinity'):
+        cells = _row(kept, f'linkage_node{more}, 1 kHz')
+        assert all(isfinite(value) for value in _numbers(cells[1:4]))
 
 
 @pytest.mark.ros
