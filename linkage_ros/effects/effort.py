@@ -47,7 +47,7 @@ PARAMETERS = EffortParameters
 
 def stage(_parameters: EffortParameters, context: Context) -> Stage:
     """Build the stage."""
-    efforts_of = context.mechanics.drive_efforts
+    efforts_of = context.mechanics.efforts
 
     def effort(motion: Motion) -> Motion:
         velocity, acceleration = motion.velocity, motion.acceleration
