@@ -269,7 +269,7 @@ class Line:
         self._read_behind = partial(self._read, first=len(running)) if behind else None
         self._straight: Straight | None = None
         moved = {effect.name for effect in effects if effect.stage is not None}
-        if type(self.closure) is Closure and moved <= _KINEMATIC and not self._faults:
+        if self.closure.by_steps and moved <= _KINEMATIC and not self._faults:
             compiled = self.closure.compiled(len(moved))
             if compiled.paths:
                 running_on = angles if running else None

@@ -24,7 +24,7 @@ from __future__ import annotations
 from cmath import rect
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import Any, ClassVar, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import quoted
 from linkage_ros.kinematics.arithmetic import all_finite
@@ -145,6 +145,9 @@ class Closure:
         Where the parts do not make a linkage that the inputs move, or that closes nowhere.
 
     """
+
+    by_steps: ClassVar[bool] = True
+    """Whether its steps close it, which can be compiled; other solvers have a way of their own."""
 
     def __init__(self, linkage: Linkage) -> None:
         check(linkage)

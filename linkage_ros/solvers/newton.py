@@ -108,6 +108,8 @@ class NewtonClosure(Solver):
 
     """
 
+    by_steps = False
+
     def __init__(self, linkage: Linkage, tolerance: float, warm: bool | None = None) -> None:
         super().__init__(Closure(linkage))
         self.tolerance = tolerance

@@ -144,6 +144,8 @@ class TableClosure(Solver):
 
     """
 
+    by_steps = False
+
     def __init__(
         self,
         linkage: Linkage,
