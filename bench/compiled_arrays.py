@@ -34,8 +34,8 @@ from bench.spread import ratios, spread
 from linkage_ros.kinematics.batch import Array
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiled.c import C
-from linkage_ros.kinematics.compiled.linkage import iterated
 from linkage_ros.kinematics.compiled.source import source, Subject
+from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 import numpy as np

@@ -160,11 +160,15 @@ def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:
     return tuple(InputRange(low, high) for low, high in intervals)
 
 
+def iterated(closure: Closure) -> bool:
+    """Return whether a linkage has links that only iteration solves."""
+    return any(hasattr(step, 'branch') for step in closure.steps)
+
+
 def whole_turns(closure: Closure) -> int:
     """Return how many whole turns of the inputs change nothing, 0 where each turn is another."""
-    iterated = any(hasattr(step, 'branch') for step in closure.steps)
     if len(closure.linkage.inputs) > 1:
-        return 0 if iterated else 1
+        return 0 if iterated(closure) else 1
     return lcm(*(branch.interval.period if branch else 1 for branch in _branches(closure)))
 
 

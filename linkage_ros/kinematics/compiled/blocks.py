@@ -24,6 +24,7 @@ from linkage_ros.kinematics.batch import Array, Mask
 from linkage_ros.kinematics.compiled.array_form import Number
 from linkage_ros.kinematics.compiled.tape import Operation
 from linkage_ros.kinematics.compiled.writer import uses
+from linkage_ros.written import written
 import numpy as np
 
 _FUNCTIONS: Final[dict[str, Any]] = {
@@ -98,8 +99,7 @@ class BlockFunction:
         functions = (*_FUNCTIONS.values(), np.copyto, np.count_nonzero)
         namespace: dict[str, Any] = {'inf': inf, 'nan': nan}
         namespace |= {function.__name__: function for function in functions}
-        exec(self.source, namespace)
-        self._run = namespace['run']
+        self._run = written(self.source, 'run', namespace)
 
     def __call__(
         self, given: Sequence[Array | float], out: Sequence[Array], rows: Array, masks: Mask

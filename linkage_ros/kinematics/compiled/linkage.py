@@ -23,6 +23,7 @@ from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.compiled.python import Body, python_body, python_function, Values
 from linkage_ros.kinematics.compiled.trace import joints, moved, Path, traced, Wanted
+from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.survey import usual_inputs
 
@@ -169,11 +170,6 @@ class Compiled:
         found = tuple(tuple(group) for group in self._wanted(motion))
         groups = len(self.paths[0].outputs) if self.paths else 1 + self.derivatives
         return Answer(status, gap, (*found, *((),) * (groups - len(found))))
-
-
-def iterated(closure: Closure) -> bool:
-    """Return whether a linkage has links that only iteration solves."""
-    return any(hasattr(step, 'branch') for step in closure.steps)
 
 
 def _first_of(

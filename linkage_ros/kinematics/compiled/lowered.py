@@ -24,11 +24,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.arithmetic import atan2, cos, sin, sqrt, where
 from linkage_ros.kinematics.compiled.fates import Fate, Fork
 from linkage_ros.kinematics.compiled.tape import Decision, Operation, Symbol, Tape
-from linkage_ros.kinematics.compiled.trace import Path
+from linkage_ros.kinematics.compiled.trace import Number, Path
 
 
 class _Parts(NamedTuple):
@@ -47,7 +46,7 @@ class Lowered(NamedTuple):
 
 def lowered(path: Path, fates: tuple[Fate, ...] = (), by_squares: bool = False) -> Lowered:
     """
-    Return a path in real numbers alone.
+    Return a path in real numbers alone; links that are iterated have none.
 
     Parameters
     ----------
@@ -59,21 +58,13 @@ def lowered(path: Path, fates: tuple[Fate, ...] = (), by_squares: bool = False) 
         Whether lengths and quotients are found by squares, which arrays pass through fastest: the
         last digits are others, and lengths below 1e-154 are lost.
 
-    Raises
-    ------
-    DefinitionError
-        Where links are iterated.
-
     """
     lower = Lowering(by_squares)
     inputs = tuple(lower.operation(given) for given in path.inputs)
     decisions = tuple(
         Decision(lower.operation(condition), held) for condition, held in path.decisions
     )
-    outputs = tuple(
-        tuple(lower.operation(n) if isinstance(n, Operation) else n for n in group)
-        for group in path.outputs
-    )
+    outputs = tuple(tuple(map(lower.operation, group)) for group in path.outputs)
     return Lowered(
         Path(inputs, decisions, outputs, lower.tape), tuple(lower.fate(fate) for fate in fates)
     )
@@ -87,9 +78,9 @@ class Lowering:
         self._formulas = _BY_SQUARES if by_squares else _FORMULAS
         self._known: dict[Operation, Any] = {}
 
-    def operation(self, operation: Operation) -> Any:
-        """Return a real operation on the new tape, or a constant that it has become."""
-        found = self._number(operation)
+    def operation(self, root: Number) -> Any:
+        """Return a real number on the new tape, or a constant that it is or has become."""
+        found = self._number(root)
         return found.operation if isinstance(found, Symbol) else found
 
     def fate(self, fate: Fate) -> Fate:
@@ -121,12 +112,6 @@ class Lowering:
         name = operation.name
         if operation.is_input:
             return self.tape.given(name, operation.value)
-        if name in ('call', 'item', 'found'):
-            raise DefinitionError(
-                'links',
-                'some are only solved by iteration, which is no straight line',
-                'compile a linkage of dyads',
-            )
         given = [self._known.get(a) if isinstance(a, Operation) else self._number(a)
                  for a in operation.arguments]  # fmt: skip
         if not any(isinstance(one, _Parts) for one in given) and name not in _MAKES_PARTS:

@@ -43,7 +43,6 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     'hypot': lambda x, y: abs(complex(x, y)),
 }
 _ATTRIBUTES = frozenset(('real', 'imag'))
-_NEGATIONS = {'<': '>=', '<=': '>', '>': '<=', '>=': '<', '==': '!=', '!=': '=='}
 
 
 class Body(NamedTuple):

@@ -33,9 +33,10 @@ from linkage_ros.kinematics.batch import Array, Batch, CODES, Codes, Mask
 from linkage_ros.kinematics.compiled.array_form import ArrayForm, Number
 from linkage_ros.kinematics.compiled.blocks import BlockFunction
 from linkage_ros.kinematics.compiled.fates import Fate, fates, Fork
-from linkage_ros.kinematics.compiled.linkage import Compiled, iterated
+from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.kinematics.compiled.lowered import Lowered, lowered
 from linkage_ros.kinematics.compiled.trace import joints, Wanted
+from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 import numpy as np
 from numpy.typing import ArrayLike

@@ -27,10 +27,11 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.compiled.linkage import Compiled, iterated
+from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.kinematics.compiled.lowered import Lowering
 from linkage_ros.kinematics.compiled.tape import Operation, Tape
 from linkage_ros.kinematics.compiled.trace import moved, Number, number_of, Wanted
+from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
@@ -198,9 +199,6 @@ def _lowered(tree: Tree, lowering: Lowering) -> Tree:
     if isinstance(tree, Solved):
         return Solved(
             tree.status,
-            tuple(
-                tuple(lowering.operation(n) if isinstance(n, Operation) else n for n in group)
-                for group in tree.outputs
-            ),
+            tuple(tuple(map(lowering.operation, group)) for group in tree.outputs),
         )
     return tree

@@ -29,10 +29,9 @@ from linkage_ros.accuracy.solving.methods.method import (
     RATE,
 )
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.structure import Iterated
 
 NAME, ITERATED = 'closed form', 'iteration from knots'
 NAMES = (NAME, ITERATED)
@@ -44,8 +43,7 @@ _CLOSED = Status.CLOSED
 def closed_form(linkage: Linkage) -> Method:
     """Return it; links that no dyad covers are iterated, as the node does."""
     closure = Closure(linkage)
-    iterated = any(isinstance(group, Iterated) for group in closure.structure.groups)
-    poses, motions = Compiled(closure, 0), Compiled(closure, 2)
+    poses, motions = closure.compiled(0), closure.compiled(2)
     fast, fast_motion = poses.fast, motions.fast
     more = (*[RATE] * len(linkage.inputs), *[ACCELERATION] * len(linkage.inputs))
 
@@ -63,7 +61,7 @@ def closed_form(linkage: Linkage) -> Method:
         joints, rates, accelerations = values
         return joints, rates, accelerations
 
-    of_closure = closure_method(closure, ITERATED if iterated else NAME)
+    of_closure = closure_method(closure, ITERATED if iterated(closure) else NAME)
     return of_closure._replace(position=position, motion=motion)
 
 
