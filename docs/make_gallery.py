@@ -27,11 +27,12 @@ from pathlib import Path
 import sys
 
 from linkage_ros.cli.check import describe_group
-from linkage_ros.cli.linkage_file import angle_text, fixed, open_linkage
+from linkage_ros.cli.linkage_file import angle_text, fixed
 from linkage_ros.drawing.figure import picture, view
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.structure import Driven
 from linkage_ros.kinematics.survey import conditionings, transmission_angles, usual_inputs, Way
+from linkage_ros.scene.linkage_file import load
 from PIL import Image
 
 DOCS = Path(__file__).resolve().parent
@@ -60,7 +61,7 @@ def main() -> int:
     page = [_INTRODUCTION]
     large = []
     for file in files:
-        closure = open_linkage(str(file))
+        closure = load(file)
         drawn = _draw(closure, file.stem, folder)
         if drawn.stat().st_size > LARGEST:
             large.append(drawn)

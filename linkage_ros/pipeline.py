@@ -22,6 +22,7 @@ Building puts in only what the scene names; a tick asks no scene.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from importlib import import_module
 from operator import add
@@ -430,7 +431,7 @@ def _silent_beyond(close: Callable[..., Position], closure: Closure) -> Callable
     def within(*inputs: float) -> Position:
         position = close(*inputs)
         if position.joints and closure.bounds.exceeded(inputs, position.joints) is not None:
-            return position._replace(status=Status.LIMITED, joints=())
+            return replace(position, status=Status.LIMITED, joints=())
         return position
 
     return within

@@ -18,10 +18,11 @@
 from __future__ import annotations
 
 import os
+from os import PathLike
 from pathlib import Path
 import sys
 
-from linkage_ros.errors import FileError
+from linkage_ros.errors import FileError, listed, quoted
 
 
 def share_folders(package: str) -> list[Path]:
@@ -40,14 +41,14 @@ def share_folders(package: str) -> list[Path]:
 
 def shipped(name: str) -> Path:
     """
-    Return the path of a file under ``config/``.
+    Return the path of a file or folder under ``config/``.
 
     A checkout comes first, since an editable install's copies go stale.
 
     Raises
     ------
     FileError
-        Where the file is not installed.
+        Where it is not installed.
 
     """
     checkout = Path(__file__).parent.parent
@@ -55,6 +56,57 @@ def shipped(name: str) -> Path:
     if (checkout / 'package.xml').is_file():
         folders.insert(0, checkout)
     for folder in folders:
-        if (folder / 'config' / name).is_file():
+        if (folder / 'config' / name).exists():
             return folder / 'config' / name
     raise FileError(f'config/{name}', '', 'is not installed', 'install linkage_ros again')
+
+
+def linkage_names() -> list[str]:
+    """Return the names of the linkages that come with the package."""
+    return _names('linkages')
+
+
+def scene_names() -> list[str]:
+    """Return the names of the scenes that come with the package."""
+    return _names('scenes')
+
+
+def named_file(named: str | PathLike[str], folder: str) -> Path:
+    """
+    Return the path of a file that is named by its path, or comes with the package.
+
+    Parameters
+    ----------
+    named
+        A path; or the name of a shipped file, without folder and ending.
+    folder
+        Where that file lies under ``config/``.
+
+    Raises
+    ------
+    FileError
+        Where it is neither.
+    TypeError
+        Where it cannot be a path.
+
+    """
+    try:
+        path = Path(named)
+    except TypeError:
+        message = f'{quoted(named)} is neither a path nor a name; name a file, or one of '
+        raise TypeError(message + listed(_names(folder))) from None
+    if named != path.stem or path.is_file():
+        return path
+    names = _names(folder)
+    if named in names:
+        return shipped(f'{folder}/{named}.yaml')
+    raise FileError(
+        named or "''",
+        '',
+        'is neither a file nor a name of what comes with the package',
+        f'name a file, or one of {listed(names)}',
+    )
+
+
+def _names(folder: str) -> list[str]:
+    return sorted(file.stem for file in shipped(folder).glob('*.yaml'))

@@ -22,7 +22,7 @@ from collections.abc import Iterator, Mapping
 from math import isfinite, tau
 from threading import Event
 
-from linkage_ros.cli.linkage_file import angle_text, open_linkage, value_text
+from linkage_ros.cli.linkage_file import angle_text, value_text
 from linkage_ros.cli.tables import show, Table
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.four_bars import four_bars
@@ -38,6 +38,7 @@ from linkage_ros.kinematics.survey import (
     Way,
     worst_residual,
 )
+from linkage_ros.scene.linkage_file import load
 
 _SINGULAR = (
     ('toggles', Status.TOGGLE),
@@ -57,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Check the linkage; a file with an error in it has been refused when this returns."""
-    closure = open_linkage(arguments.file)
+    closure = load(arguments.file)
     for number, table in enumerate(tables(closure, arguments.file)):
         if number:
             print()

@@ -21,9 +21,10 @@ import argparse
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli.linkage_file import add_at, inputs, open_linkage
+from linkage_ros.cli.linkage_file import add_at, inputs
 from linkage_ros.drawing.figure import picture, view
 from linkage_ros.kinematics.survey import usual_inputs
+from linkage_ros.scene.linkage_file import load
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Draw the linkage."""
-    closure = open_linkage(arguments.file)
+    closure = load(arguments.file)
     typed = [inputs(closure.linkage, at, '--at') for at in arguments.at]
     pose, *ghosts = typed or [usual_inputs(closure)]
     name = Path(arguments.file).stem

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What the commands that look at one linkage share: its file, and values of its inputs."""
+"""What the commands that look at one linkage share: values of its inputs, typed and told."""
 
 from __future__ import annotations
 
@@ -22,16 +22,7 @@ from collections.abc import Sequence
 from math import degrees, isfinite, pi, radians, remainder, tau
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
-
-
-def open_linkage(file: str) -> Closure:
-    """Read a linkage file, ready to be solved."""
-    content, _ = read_yaml(file)
-    return Closure(read_linkage(content))
 
 
 def add_at(parser: argparse.ArgumentParser, text: str) -> None:

@@ -32,11 +32,12 @@ import sys
 from threading import Event
 from typing import Any, NamedTuple
 
-from linkage_ros.cli.linkage_file import add_at, fixed, inputs, open_linkage, values, wrapped
+from linkage_ros.cli.linkage_file import add_at, fixed, inputs, values, wrapped
 from linkage_ros.cli.tables import show, Table, text
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import Way
+from linkage_ros.scene.linkage_file import load
 from linkage_ros.whole_file import write_whole
 
 _STEPS = 36
@@ -100,7 +101,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
     """Solve the linkage."""
-    closure = open_linkage(arguments.file)
+    closure = load(arguments.file)
     question = _question(closure, arguments)
     columns = list(_columns(closure, question))
     rows = [_row(closure, question, state) for state in question.states]

@@ -53,7 +53,7 @@ FACES = {
     'ground': '#ffffff',
 }
 _STEPS = (1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 90.0, 180.0)
-_STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
+STROKES = {'rail': (INK, 1.3), 'hatch': (INK, 0.7), 'slot': ('#ffffff', 2.2)}
 _SETTINGS: Any = {'font.size': 8.0, 'svg.hashsalt': 'linkage_ros', 'axes.linewidth': 0.6}
 
 
@@ -153,7 +153,7 @@ def paint(axes: Any, drawn: Sequence[Shape]) -> None:
                 )
             )
         else:
-            colour, width = _STROKES[shape.role]
+            colour, width = STROKES[shape.role]
             axes.plot(
                 [shape.start.real, shape.end.real],
                 [shape.start.imag, shape.end.imag],

@@ -23,7 +23,7 @@ does not say, and a pose would be invented.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.faults.fault import Switch
@@ -52,6 +52,6 @@ def mechanism(
     def broken(position: Position) -> Position:
         if not switch.on:
             return position
-        return position._replace(status=Status.INDETERMINATE, gap=0.0, joints=())
+        return replace(position, status=Status.INDETERMINATE, gap=0.0, joints=())
 
     return broken

@@ -22,11 +22,14 @@ Position first; what a scene calls for beyond it starts from the position and re
 from __future__ import annotations
 
 from cmath import rect
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Real
+from operator import mul
 from typing import Any, ClassVar, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.errors import quoted
+from linkage_ros.errors import clean, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.cylinder import without_mirrored, zero_length
@@ -54,9 +57,54 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-class Position(NamedTuple):
+class _JointValues(Mapping[str, float]):
+    """A value for each published joint, by its name: ``found['rocker_joint']``."""
+
+    __slots__ = ()
+
+    joints: tuple[float, ...]
+    closure: Closure
+
+    def __getitem__(self, joint: str) -> float:
+        """
+        Return the value of a joint.
+
+        Raises
+        ------
+        KeyError
+            Where the linkage publishes no joint of this name.
+        ValueError
+            Where the linkage has no pose.
+
+        """
+        names = self.closure.joint_names
+        if joint not in names:
+            raise KeyError(f'{quoted(joint)} is not a published joint; use {listed(names)}')
+        if not self.joints:
+            raise ValueError(f'{joint}: {self!r} has no joint values; check its status first')
+        return self.joints[names.index(joint)]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.closure.joint_names)
+
+    def __len__(self) -> int:
+        return len(self.closure.joint_names)
+
+    def __repr__(self) -> str:
+        values = zip(self.closure.joint_names, self.joints, strict=False)
+        shown = listed(f'{name} {value:.6g}' for name, value in values)
+        return f'<{self._title}: {shown}>' if shown else f'<{self._title}>'
+
+    @property
+    def _title(self) -> str:
+        return type(self).__name__
+
+
+# Not frozen: that takes five times as long, and the tick of a scene with forces makes three.
+@dataclass(slots=True, repr=False)
+class Position(_JointValues):
     """
-    The linkage at one state of its inputs.
+    The linkage at one state of its inputs; ``position['rocker_joint']`` is a joint's value.
 
     Attributes
     ----------
@@ -71,6 +119,8 @@ class Position(NamedTuple):
         What the steps have found.
     poses
         The steps' own poses; the last one is that of the step that failed, if one did.
+    closure
+        The closure that found it.
 
     """
 
@@ -79,11 +129,41 @@ class Position(NamedTuple):
     joints: tuple[float, ...]
     state: State
     poses: list[Pose]
+    closure: Closure = field(compare=False)
+
+    @property
+    def inputs(self) -> tuple[float, ...]:
+        """Values of the driven joints, in [rad] or [m]."""
+        return self.closure.inputs_of(self.state)
+
+    @property
+    def points(self) -> dict[str, complex]:
+        """
+        Every named point in the frame of the ground, as x + iy, in [m].
+
+        Raises
+        ------
+        ValueError
+            Where the linkage has no pose.
+
+        """
+        return {point: place for (_, point), place in self.closure.points(self).items()}
+
+    @property
+    def _title(self) -> str:
+        by = f' by {self.gap:.3g} m' if self.gap else ''
+        return f'Position {self.status.value}{by}'
+
+    def _repr_svg_(self) -> str | None:
+        from linkage_ros import svg  # local import: only a notebook asks for pictures
+
+        return svg(self) if self.joints else None
 
 
-class Velocity(NamedTuple):
+@dataclass(slots=True, repr=False)
+class Velocity(_JointValues):
     """
-    The rates of a linkage.
+    The rates of a linkage; ``velocity['rocker_joint']`` is that of a joint.
 
     Attributes
     ----------
@@ -91,17 +171,21 @@ class Velocity(NamedTuple):
         Of the published joints, in [rad/s] or [m/s].
     state, rates
         What the steps have found.
+    closure
+        The closure that found them.
 
     """
 
     joints: tuple[float, ...]
     state: State
     rates: list[Any]
+    closure: Closure = field(compare=False)
 
 
-class Acceleration(NamedTuple):
+@dataclass(slots=True, repr=False)
+class Acceleration(_JointValues):
     """
-    The accelerations of a linkage.
+    The accelerations of a linkage; ``acceleration['rocker_joint']`` is that of a joint.
 
     Attributes
     ----------
@@ -109,11 +193,14 @@ class Acceleration(NamedTuple):
         Of the published joints, in [rad/s²] or [m/s²].
     state
         What the steps have found.
+    closure
+        The closure that found them.
 
     """
 
     joints: tuple[float, ...]
     state: State
+    closure: Closure = field(compare=False)
 
 
 def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
@@ -138,6 +225,8 @@ class Closure:
     ----------
     linkage
         What to solve.
+    name
+        What to call it; of a file its name without the ending.
 
     Raises
     ------
@@ -149,9 +238,14 @@ class Closure:
     by_steps: ClassVar[bool] = True
     """Whether its steps close it, which can be compiled; other solvers have a way of their own."""
 
-    def __init__(self, linkage: Linkage) -> None:
+    def __init__(self, linkage: Linkage, name: str = '') -> None:
         check(linkage)
         self.linkage = linkage
+        self.name = name
+        self.input_names = tuple(given.joint for given in linkage.inputs)
+        """Names of the driven joints, in the order in which `position` takes their values."""
+        self.joint_names = tuple(linkage.joints)
+        """Names of the published joints, in the order of `Position.joints`."""
         self.structure: Structure = find_groups(linkage)
         planner = Planner(linkage, self.structure)
         self.scale = planner.scale
@@ -175,13 +269,22 @@ class Closure:
         self.steps = steps
         needed = len(steps)
         self._more_steps = tuple(planner.steps[needed:])
-        self._driven = len(linkage.inputs)
         factors = [1.0 / self.scale if given.slider else 1.0 for given in linkage.inputs]
         self._factors = None if set(factors) == {1.0} else factors
         self.bounds = Bounds(linkage)
         """The limits between which its joints stay."""
         self._keep_limits()
         self._compiled: dict[int, Compiled] = {}
+
+    def __repr__(self) -> str:
+        counts = ((len(self.input_names), 'input'), (len(self.joint_names), 'joint'))
+        has = ', '.join(f'{n} {what}{"s" * (n != 1)}' for n, what in counts)
+        return f'<{" ".join(filter(None, (type(self).__name__, clean(self.name))))}: {has}>'
+
+    def _repr_svg_(self) -> str:
+        from linkage_ros import svg  # local import: only a notebook asks for pictures
+
+        return svg(self)
 
     def _keep_limits(self) -> None:
         """Let positions tell of limits; where there are none, nothing is asked at any."""
@@ -209,7 +312,8 @@ class Closure:
         """
         x = self._coordinates('inputs', inputs)
         if x is None:
-            return Position(Status.INDETERMINATE, 0.0, (), State([0.0, *inputs], []), [])
+            state = State([0.0, *self._scaled(inputs)], [])
+            return Position(Status.INDETERMINATE, 0.0, (), state, [], self)
         state = State(x, [])
         poses: list[Pose] = []
         status = Status.CLOSED
@@ -219,13 +323,13 @@ class Closure:
             found = pose.status
             if found is not Status.CLOSED:
                 if not found.has_pose:
-                    return Position(found, pose.gap * self.scale, (), state, poses)
+                    return Position(found, pose.gap * self.scale, (), state, poses, self)
                 if status.has_rates:
                     status = found
         joints: tuple[float, ...] = ()
         for i, j, factor, constant in self._terms:
             joints += (factor * (x[i] - x[j]) + constant,)
-        return Position(status, 0.0, joints, state, poses)
+        return Position(status, 0.0, joints, state, poses, self)
 
     def known(self, *inputs: float) -> State:
         """Return what is known before the first step: the ground's coordinate and the inputs'."""
@@ -252,9 +356,11 @@ class Closure:
             Where the position has no rates, as at a toggle, a rate is not finite, or there is not
             one for each driven joint.
         TypeError
-            Where a rate is no number.
+            Where a rate is no number, or the position is not one of this closure.
 
         """
+        if getattr(position, 'closure', None) is not self:
+            self._check_own('position', position)
         v = self._coordinates('rates', rates)
         if v is None or not position.status.has_rates:
             raise _no_motion('rates', rates, position.status)
@@ -262,7 +368,7 @@ class Closure:
         found = []
         for step, pose in zip(self.steps, position.poses, strict=True):
             found.append(step.rates(pose, position.state, speeds))
-        return Velocity(self._joints(v), speeds, found)
+        return Velocity(self._joints(v), speeds, found, self)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -283,13 +389,15 @@ class Closure:
             As `velocity` raises them.
 
         """
+        if getattr(velocity, 'closure', None) is not self:
+            self._check_own('velocity', velocity)
         a = self._coordinates('accelerations', accelerations)
         if a is None:
             raise _no_motion('accelerations', accelerations, position.status)
         changes = State(a, [])
         for step, pose, rate in zip(self.steps, position.poses, velocity.rates, strict=True):
             step.accelerations(pose, rate, position.state, velocity.state, changes)
-        return Acceleration(self._joints(a), changes)
+        return Acceleration(self._joints(a), changes, self)
 
     def compiled(self, derivatives: int) -> Compiled:
         """
@@ -351,7 +459,22 @@ class Closure:
         return Solver(self, len(self.linkage.joints))
 
     def points(self, position: Position) -> dict[tuple[str, str], complex]:
-        """Return every point of every link, by link and name, in the ground's frame, in [m]."""
+        """
+        Return every point of every link, by link and name, in the ground's frame.
+
+        Returns
+        -------
+        points : dict
+            For each pair of names its place x + iy, in [m].
+
+        Raises
+        ------
+        ValueError
+            Where the linkage has no pose.
+
+        """
+        if not position.status.has_pose:
+            raise ValueError(f'points: {position!r} has none; check its status first')
         places = self._all(position).pins
         return {key: places[i] * self.scale for key, i in self._point_index.items()}
 
@@ -399,9 +522,7 @@ class Closure:
 
     def beyond(self, position: Position) -> str:
         """Return of a pose which joint is beyond its limits, in words; '' where none is."""
-        factors = self._factors or [1.0] * len(self.linkage.inputs)
-        driven = zip(position.state.coordinates[1:], factors, strict=False)
-        inputs = [value / factor for value, factor in driven]
+        inputs = position.inputs
         joints = position.joints or self.position(*inputs).joints
         bound = self.bounds.exceeded(inputs, joints) if joints else None
         if bound is None:
@@ -409,6 +530,12 @@ class Closure:
         driven_one = bound in self.bounds.inputs
         value = bound.turned((inputs if driven_one else joints)[bound.number])
         return f'{bound.name} at {value:.6g}, limits {self.linkage.limits[bound.name]}'
+
+    def inputs_of(self, state: State) -> tuple[float, ...]:
+        """Return the driven joints in a state, or their rates, in [rad] or [m]."""
+        factors = self._factors or [1.0] * len(self.input_names)
+        driven = zip(state.coordinates[1:], factors, strict=False)
+        return tuple(value / factor for value, factor in driven)
 
     def residual(self, position: Position) -> float:
         """
@@ -473,19 +600,30 @@ class Closure:
 
     def _coordinates(self, what: str, values: tuple[float, ...]) -> list[float] | None:
         """Return the ground's coordinate and the inputs'; nothing where one is not finite."""
-        if len(values) != self._driven:
-            names = ', '.join(given.joint for given in self.linkage.inputs)
-            raise ValueError(f'{what}: {len(values)} given; give {self._driven}: {names}')
+        if len(values) != len(self.input_names):
+            names = listed(self.input_names)
+            raise ValueError(f'{what}: {len(values)} given; give {len(self.input_names)}: {names}')
         try:
             if not all_finite(values):
                 return None
         except (TypeError, ValueError):
-            wrong = next(value for value in values if not isinstance(value, (int, float)))
+            numbers = [isinstance(value, Real) for value in values]
+            wrong = values[numbers.index(False)]
             message = f'{what}: {quoted(wrong)} is not a number; solve() takes arrays'
             raise TypeError(message) from None
-        if self._factors is None:
-            return [0.0, *values]
-        return [0.0, *(v * factor for v, factor in zip(values, self._factors, strict=True))]
+        return [0.0, *self._scaled(values)]
+
+    def _scaled(self, values: tuple[float, ...]) -> Iterable[float]:
+        """Return values of the inputs, or their rates, in the unit of the steps."""
+        factors = self._factors
+        return values if factors is None else map(mul, values, factors)
+
+    def _check_own(self, what: str, found: Position | Velocity) -> None:
+        """Refuse what was found for another linkage: the steps would read its numbers."""
+        closure = getattr(found, 'closure', None)
+        if getattr(closure, 'linkage', None) is not self.linkage:
+            message = f'{what}: {quoted(found)} is not of {self!r}; give what that returned'
+            raise TypeError(message)
 
     def _joints(self, values: list[float]) -> tuple[float, ...]:
         """Return the derivatives of the published joints."""

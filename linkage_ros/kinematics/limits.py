@@ -23,6 +23,8 @@ that of its turns which lies nearest to the middle of its limits, since it is th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import wraps
 from math import inf, pi, remainder, tau
 from typing import NamedTuple, TYPE_CHECKING
 
@@ -151,10 +153,11 @@ def limited(position: Callable[..., Position], bounds: Bounds) -> Callable[..., 
     """Return what closes the loops, and says of a pose that it is beyond the limits."""
     exceeded = bounds.exceeded
 
+    @wraps(position)
     def close(*inputs: float) -> Position:
         found = position(*inputs)
         if found.status in _UNDISTURBED and exceeded(inputs, found.joints) is not None:
-            return found._replace(status=Status.LIMITED)
+            return replace(found, status=Status.LIMITED)
         return found
 
     return close

@@ -18,6 +18,7 @@
 from __future__ import annotations
 
 from math import inf
+from os import PathLike
 from typing import Any
 
 from linkage_ros.errors import DefinitionError, listed, quoted
@@ -35,6 +36,8 @@ from linkage_ros.kinematics.linkage import (
     Slider,
 )
 from linkage_ros.scene.section import Section
+from linkage_ros.scene.yaml_file import read_yaml
+from linkage_ros.shipped import named_file
 
 _KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose', 'masses')
 _MOST_LINKS, _MOST_POINTS = 400, 10_000
@@ -55,9 +58,44 @@ def looks_like_linkage(content: Section) -> bool:
     return any(key in content for key in ('links', *_SHORTHANDS))
 
 
+def load(linkage: str | PathLike[str]) -> Closure:
+    """
+    Load a linkage, ready to be solved.
+
+    Parameters
+    ----------
+    linkage
+        Path of a linkage file, or the name of a linkage that comes with the package, such as
+        ``'jansen_leg'``; `linkage_names` lists them.
+
+    Raises
+    ------
+    FileError
+        Where there is no such file or name, or the file is wrong: with file, line, key and remedy.
+    TypeError
+        Where it is neither a name nor a path.
+
+    """
+    file = named_file(linkage, 'linkages')
+    content, _ = read_yaml(file)
+    return read_closure(content, file.stem)
+
+
 def read_linkage(content: Section) -> Linkage:
+    """Read a linkage as `read_closure` does; return its parts."""
+    return read_closure(content).linkage
+
+
+def read_closure(content: Section, name: str = '') -> Closure:
     """
     Read a linkage and prove that it closes.
+
+    Parameters
+    ----------
+    content
+        The linkage file.
+    name
+        What to call the linkage.
 
     Raises
     ------
@@ -71,11 +109,12 @@ def read_linkage(content: Section) -> Linkage:
             written_out = _limited(expand(short), short)
             short.finish()
             content.finish()
-            return _closable(content, _linkage(Section(content.file, '', written_out)), shorthand)
+            linkage = _linkage(Section(content.file, '', written_out))
+            return _closable(content, linkage, name, shorthand)
     for key in _KEYS:
         content.taken(key)
     content.finish(tuple(_SHORTHANDS))
-    return _closable(content, _linkage(content))
+    return _closable(content, _linkage(content), name)
 
 
 def _linkage(content: Section) -> Linkage:
@@ -207,9 +246,9 @@ def _joint(content: Section) -> RevoluteJoint | SlideJoint:
     return joint
 
 
-def _closable(content: Section, linkage: Linkage, shorthand: str = '') -> Linkage:
+def _closable(content: Section, linkage: Linkage, name: str, shorthand: str = '') -> Closure:
     try:
-        closure = Closure(linkage)
+        closure = Closure(linkage, name)
         if len(linkage.inputs) == 1 and not closure.closing_ranges:
             raise DefinitionError(
                 'links',
@@ -223,7 +262,7 @@ def _closable(content: Section, linkage: Linkage, shorthand: str = '') -> Linkag
             # Of what a shorthand stands for, it says the limits alone itself.
             where = f'{shorthand}.{where}' if where.endswith('.limits') else shorthand
         raise content.error(where, error.reason, error.remedy) from None
-    return linkage
+    return closure
 
 
 def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from importlib import import_module
+from os import PathLike
 from os.path import isfile
 from pathlib import Path
 from typing import Any, Literal
@@ -39,6 +40,7 @@ from linkage_ros.scene.section import Section
 from linkage_ros.scene.solving import read_solver, read_solving
 from linkage_ros.scene.storage import read_storage
 from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
+from linkage_ros.shipped import named_file
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
 """Names of the files of a scene where a bag carries them; further linkages are numbered."""
@@ -53,28 +55,32 @@ Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
 
 
-def load_scene(file: str | Path) -> Scene:
+def load_scene(file: str | PathLike[str]) -> Scene:
     """
     Read a scene and the linkages that it names; a linkage file stands for one that moves it.
 
     Parameters
     ----------
     file
-        The scene file; paths in it are relative to its folder. Or a linkage file.
+        The scene file; paths in it are relative to its folder. Or a linkage file; or the name of
+        a scene that comes with the package, such as ``'demo'``.
 
     Raises
     ------
     FileError
         With file, line, key, value and remedy.
+    TypeError
+        Where it is neither a path nor a name.
 
     """
+    file = named_file(file, 'scenes')
     content, data = read_yaml(file)
-    name, folder = Path(file).stem, str(Path(file).parent)
+    name, folder = file.stem, str(file.parent)
     if kind_of(content) == 'linkage':
         return _stand_in(name, content, data, folder)
 
     def open_linkage(where: Section) -> tuple[Section, bytes]:
-        linkage = Path(file).parent / where.text('linkage')
+        linkage = file.parent / where.text('linkage')
         if not isfile(linkage):  # noqa: PTH113 (Path's raises where a name is too long)
             raise where.error(
                 'linkage',

@@ -35,7 +35,7 @@ depends, within the tolerance, on those before it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import copysign
 from typing import Any, TYPE_CHECKING
 
@@ -167,7 +167,7 @@ class NewtonClosure(Solver):
         joints: tuple[float, ...] = ()
         for i, j, factor, constant in self._terms:
             joints += (factor * (x[i] - x[j]) + constant,)
-        return Position(_CLOSED, 0.0, joints, state, poses)
+        return Position(_CLOSED, 0.0, joints, state, poses, self)
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
         """
@@ -181,7 +181,7 @@ class NewtonClosure(Solver):
             Of the driven joints, in [rad/s] or [m/s].
 
         """
-        _, _, _, state, poses = position
+        state, poses = position.state, position.poses
         if not isinstance(poses, _Found):
             return self.closed.velocity(position, *rates)
         v = self._coordinates('rates', rates)
@@ -196,7 +196,7 @@ class NewtonClosure(Solver):
                 part.rates(x, pins, v, speeds.pins)
             else:
                 found.append(part.rates(next(others, PLACED), state, speeds))
-        return Velocity(self._joints(v), speeds, found)
+        return Velocity(self._joints(v), speeds, found, self)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -212,13 +212,13 @@ class NewtonClosure(Solver):
             Of the driven joints, in [rad/s²] or [m/s²].
 
         """
-        _, _, _, state, poses = position
+        state, poses = position.state, position.poses
         if not isinstance(poses, _Found):
             return self.closed.acceleration(position, velocity, *accelerations)
         a = self._coordinates('accelerations', accelerations)
         if a is None:
             return self.closed.acceleration(position, velocity, *accelerations)
-        _, speeds, rates = velocity
+        speeds, rates = velocity.state, velocity.rates
         changes = State(a, [])
         others, moving = iter(poses), iter(rates)
         for part in self._plan:
@@ -227,7 +227,7 @@ class NewtonClosure(Solver):
             else:
                 pose, rate = next(others, PLACED), next(moving)
                 part.accelerations(pose, rate, state, speeds, changes)
-        return Acceleration(self._joints(a), changes)
+        return Acceleration(self._joints(a), changes, self)
 
     def solve(
         self,
@@ -252,7 +252,7 @@ class NewtonClosure(Solver):
         for step in self.steps:
             if isinstance(step, PLACING):
                 step.close(state)
-        return position._replace(state=state)
+        return replace(position, state=state)
 
     def _exact(self, inputs: tuple[float, ...]) -> Position:
         """Return the state in closed form, from which the next one starts."""

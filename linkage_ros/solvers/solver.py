@@ -82,7 +82,7 @@ class Solver(Closure):
 
     def exact(self, position: Position) -> Position:
         """Return what the closed form has at the inputs of a position."""
-        return self.closed.position(*self._given(position.state.coordinates))
+        return self.closed.position(*position.inputs)
 
     def placed(self, position: Position) -> Position:
         """Return a position that knows angles, slides and pins of all links."""
@@ -105,8 +105,8 @@ class Solver(Closure):
     ) -> dict[tuple[str, str], PointMotion]:
         """Return place, velocity and acceleration of every point of every link."""
         exact = self.exact(position)
-        rates = self.closed.velocity(exact, *self._given(velocity.state.coordinates))
-        changes = self._given(acceleration.state.coordinates)
+        rates = self.closed.velocity(exact, *self.inputs_of(velocity.state))
+        changes = self.inputs_of(acceleration.state)
         accelerations = self.closed.acceleration(exact, rates, *changes)
         return self.closed.point_motion(exact, rates, accelerations)
 
@@ -128,9 +128,3 @@ class Solver(Closure):
     def nearness(self, position: Position) -> Nearness:
         """Return how near trouble a closed position is."""
         return self.closed.nearness(self.exact(position))
-
-    def _given(self, coordinates: list[float]) -> list[float]:
-        """Return the inputs among coordinates, or their rates, in [rad] or [m]."""
-        factors = self._factors or [1.0] * len(self.linkage.inputs)
-        given = zip(coordinates[1:], factors, strict=False)
-        return [value / factor for value, factor in given]

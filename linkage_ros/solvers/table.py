@@ -229,7 +229,7 @@ class TableClosure(Solver):
                 joints += (c[i] + t * c[i + 1],)
         given = x if self._factors is None else x * self._factors[0]
         state = State([0.0, given], self._no_pins)
-        return Position(_CLOSED, 0.0, joints, state, cast('Any', _Place(c, t, density)))
+        return Position(_CLOSED, 0.0, joints, state, cast('Any', _Place(c, t, density)), self)
 
     def residual(self, position: Position) -> float:
         """
@@ -278,7 +278,7 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (factor * c[i + 1],)
         given = rate if self._factors is None else rate * self._factors[0]
-        return Velocity(joints, State([0.0, given], self._no_pins), [factor])
+        return Velocity(joints, State([0.0, given], self._no_pins), [factor], self)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -308,7 +308,7 @@ class TableClosure(Solver):
             for i in self._joint_places:
                 joints += (pull * c[i + 1],)
         given = change if self._factors is None else change * self._factors[0]
-        return Acceleration(joints, State([0.0, given], self._no_pins))
+        return Acceleration(joints, State([0.0, given], self._no_pins), self)
 
     def solve(
         self,

@@ -20,7 +20,7 @@ from __future__ import annotations
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-from linkage_ros.cli.linkage_file import open_linkage
+from linkage_ros.scene.linkage_file import load
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -41,7 +41,7 @@ def page() -> str:
 @pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
 def test_a_linkage_is_told_as_its_file_has_it(page: str, file: Path) -> None:
     picture = ROOT / 'docs' / 'gallery' / f'{file.stem}.png'
-    chapter = make_gallery.chapter(open_linkage(str(file)), file, picture)
+    chapter = make_gallery.chapter(load(file), file, picture)
     assert '\n'.join(chapter) in page, 'make gallery makes it anew'
     assert picture.read_bytes().startswith(PNG)
     assert picture.stat().st_size < make_gallery.LARGEST

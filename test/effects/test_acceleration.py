@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf, isfinite, nan
 
 from hypothesis import given
@@ -102,7 +103,8 @@ def test_next_to_a_toggle_it_is_finite_or_none(exponent):
 def test_what_is_no_number_is_left_out(value):
     class Overflowing:
         def acceleration(self, *_):
-            return FOUR_BAR.acceleration(POSITION, VELOCITY, 0.0)._replace(joints=(1.0, value))
+            found = FOUR_BAR.acceleration(POSITION, VELOCITY, 0.0)
+            return replace(found, joints=(1.0, value))
 
     context = Context(Overflowing(), 1000.0, True, 'seed', None, None)
     stage = acceleration.stage(acceleration.AccelerationParameters(), context)

@@ -22,7 +22,6 @@ from xml.etree import ElementTree as ET
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.cli.linkage_file import open_linkage
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits
@@ -31,7 +30,7 @@ from linkage_ros.models.mjcf import mjcf
 from linkage_ros.models.part import Part
 from linkage_ros.models.urdf import urdf
 from linkage_ros.models.urdf_file import read_urdf
-from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_file import load, read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml
 import mujoco
 import pytest
@@ -75,7 +74,7 @@ def test_the_same_limits_come_back(name):
 
 @pytest.mark.parametrize('name', [*GALLERY, 'five_bar'])
 def test_what_gives_none_comes_back_with_none(name):
-    closure = open_linkage(str(LINKAGES / f'{name}.yaml'))
+    closure = load(LINKAGES / f'{name}.yaml')
     made = imported(read_urdf(urdf('it', [Part(closure)]), 'it.urdf')).linkage
     assert made.limits == closure.linkage.limits
 

@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from cmath import rect
 
-from linkage_ros.cli.linkage_file import open_linkage
 from linkage_ros.cli.model_file import model_of
 from linkage_ros.dynamics.loads import Loads, Spring
 from linkage_ros.dynamics.mechanics import Mechanics
@@ -33,6 +32,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.survey import usual_inputs
 from linkage_ros.models.mjcf import mjcf
 from linkage_ros.models.part import Part
+from linkage_ros.scene.linkage_file import load
 import numpy as np
 import pytest
 
@@ -154,7 +154,7 @@ def test_it_moves_as_the_closure_says(name):
 
 def test_gravity_and_springs_are_those_of_the_scene():
     """What holds the crank against them, by virtual work over MuJoCo's forces, is our effort."""
-    closure = open_linkage(str(LINKAGES / 'stephenson_3.yaml'))
+    closure = load(LINKAGES / 'stephenson_3.yaml')
     spring = Spring('coupler', 'C', 'ground', 'O6', 40.0, 0.03, 1.5, 'pull')
     loads = Loads((1.2, -9.81), (spring,), 0.01)
     model, state = started(mjcf('it', [Part(closure, '', loads)]))

@@ -19,14 +19,13 @@ from __future__ import annotations
 
 from math import remainder, tau
 
-from linkage_ros.cli.linkage_file import open_linkage
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import samples, Way
 from linkage_ros.models.imported import imported
 from linkage_ros.models.part import Part
 from linkage_ros.models.urdf import urdf
 from linkage_ros.models.urdf_file import read_urdf
-from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_file import load, read_linkage
 from linkage_ros.scene.linkage_text import linkage_text
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
@@ -67,7 +66,7 @@ def differences(one, other):
 
 @pytest.mark.parametrize('name', [*GALLERY, 'five_bar'])
 def test_the_gallery(name):
-    closure = open_linkage(str(LINKAGES / f'{name}.yaml'))
+    closure = load(LINKAGES / f'{name}.yaml')
     again = back(closure)
     assert list(again.linkage.joints) == list(closure.linkage.joints)
     assert [e.joint for e in again.linkage.inputs] == [e.joint for e in closure.linkage.inputs]

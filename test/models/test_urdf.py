@@ -21,7 +21,6 @@ from collections import Counter
 from math import pi
 from xml.etree import ElementTree as ET
 
-from linkage_ros.cli.linkage_file import open_linkage
 from linkage_ros.cli.model_file import model_of
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter
@@ -30,7 +29,7 @@ from linkage_ros.kinematics.survey import samples, usual_inputs, Way
 from linkage_ros.models.part import Part, PartError
 from linkage_ros.models.urdf import urdf
 from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_file import load, read_linkage
 from linkage_ros.scene.load import load_scene, parse_scene
 from linkage_ros.scene.robot_model import scene_model
 from linkage_ros.scene.yaml_file import parse_yaml
@@ -46,7 +45,7 @@ URDF_KINDS = {'revolute', 'continuous', 'prismatic', 'fixed'}
 
 
 def closure(name):
-    return closure_of(name) if name in ODD else open_linkage(str(LINKAGES / f'{name}.yaml'))
+    return closure_of(name) if name in ODD else load(LINKAGES / f'{name}.yaml')
 
 
 def numbers(element, key):

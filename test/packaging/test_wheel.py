@@ -89,9 +89,14 @@ def test_what_pages_are_made_with_is_there(prefix, root, room):
         assert (packages[0] / file.name).read_bytes() == file.read_bytes()
 
 
+def test_type_checkers_find_that_it_is_typed(prefix):
+    (package,) = prefix.glob('lib/python*/site-packages/linkage_ros')
+    assert {'py.typed', '__init__.pyi'} <= {file.name for file in package.iterdir()}
+
+
 def test_tests_and_benchmarks_stay_out(prefix):
     packages = {path.name for path in prefix.glob('lib/python*/site-packages/*')}
-    assert not {'test', 'bench', 'launch'} & packages
+    assert not {'test', 'bench', 'examples', 'launch'} & packages
 
 
 @pytest.mark.parametrize('name', ['linkage_node', 'crank_source', 'pd_controller', 'linkage'])

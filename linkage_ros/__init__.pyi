@@ -1,0 +1,66 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+# What `linkage_ros` exports, for type checkers: at run time a name is imported when it is used.
+
+from linkage_ros.bag.reading.reader import (
+    Bag as Bag,
+    BagMessage as BagMessage,
+    read_bag as read_bag,
+)
+from linkage_ros.drawing.svg import svg as svg
+from linkage_ros.errors import (
+    BagError as BagError,
+    DefinitionError as DefinitionError,
+    FileError as FileError,
+    LinkageError as LinkageError,
+    SynthesisError as SynthesisError,
+)
+from linkage_ros.joint_state import JointStateReader as JointStateReader, Rejection as Rejection
+from linkage_ros.kinematics.batch import Batch as Batch
+from linkage_ros.kinematics.closure import (
+    Acceleration as Acceleration,
+    Closure as Closure,
+    Position as Position,
+    Velocity as Velocity,
+)
+from linkage_ros.kinematics.linkage import (
+    Input as Input,
+    Limits as Limits,
+    Linkage as Linkage,
+    Mass as Mass,
+    RevoluteJoint as RevoluteJoint,
+    SlideJoint as SlideJoint,
+    Slider as Slider,
+)
+from linkage_ros.kinematics.ranges import InputRange as InputRange
+from linkage_ros.kinematics.status import Status as Status
+from linkage_ros.pipeline import Pipeline as Pipeline, Tick as Tick
+from linkage_ros.replay import recorded_scene as recorded_scene
+from linkage_ros.scene.linkage_file import load as load
+from linkage_ros.scene.load import load_scene as load_scene
+from linkage_ros.scene.scene import Scene as Scene
+from linkage_ros.shipped import linkage_names as linkage_names, scene_names as scene_names
+from linkage_ros.synthesis.defects import assess as assess, Assessment as Assessment
+from linkage_ros.synthesis.design import Design as Design
+from linkage_ros.synthesis.function.generate import generate_function as generate_function
+from linkage_ros.synthesis.motion.generate import (
+    from_fixed_pivots as from_fixed_pivots,
+    from_moving_pivots as from_moving_pivots,
+)
+from linkage_ros.synthesis.motion.poses import Pose as Pose
+from linkage_ros.synthesis.path.generate import generate_path as generate_path
+from linkage_ros.synthesis.path.task import PathTask as PathTask
+
+__version__: str

@@ -1,0 +1,98 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A linkage as SVG text, for notebooks and scripts; it needs no matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from xml.sax.saxutils import escape
+
+from linkage_ros.drawing.figure import all_places, symbol_size, view
+from linkage_ros.drawing.painting import COLOURS, corners, FACES, GHOST, INK, outline, STROKES
+from linkage_ros.drawing.shapes import Circle, Polygon, shapes, skeleton
+from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.survey import usual_inputs
+
+_LONGER_SIDE = 420.0
+"""Of a picture, in pixels."""
+
+
+def svg(shown: Closure | Position) -> str:
+    """
+    Draw a linkage as SVG.
+
+    Other poses of its range are grey, and the paths of its traced points are dashed.
+
+    Parameters
+    ----------
+    shown
+        A position; or a closure, which is drawn where it starts.
+
+    Returns
+    -------
+    text : str
+        The SVG document.
+
+    Raises
+    ------
+    LinkageError
+        Where the position has no pose.
+
+    """
+    position = shown.position(*usual_inputs(shown)) if isinstance(shown, Closure) else shown
+    closure = position.closure
+    seen = view(closure, position.inputs)
+    size = symbol_size(seen)
+    drawn = shapes(closure, position, size, seen.sweep.travels)
+    low, high = corners([*all_places(seen), *(p for shape in drawn for p in outline(shape))])
+    margin = complex(2.0, 2.0) * size
+    low, high = low - margin, high + margin
+    scale = _LONGER_SIDE / max((high - low).real, (high - low).imag)
+    width, height = scale * (high - low).real, scale * (high - low).imag
+
+    def line(places: Iterable[complex], style: str) -> str:
+        pixels = (((p - low).real * scale, (high - p).imag * scale) for p in places)
+        points = ' '.join(f'{x:.1f},{y:.1f}' for x, y in pixels)
+        return f'<polyline points="{points}" {style}/>'
+
+    lines = [
+        line(outline(bar), f'stroke="{GHOST}"')
+        for ghost in seen.ghosts
+        for bar in skeleton(closure, ghost)
+    ]
+    for number, path in enumerate(seen.sweep.paths.values()):
+        colour = COLOURS[number % len(COLOURS)]
+        lines.append(line(path, f'stroke="{colour}" stroke-dasharray="5 2"'))
+    for shape in drawn:
+        if isinstance(shape, Polygon):
+            colour, opacity = FACES[shape.role][:7], int(FACES[shape.role][7:] or 'ff', 16) / 255
+            style = f'fill="{colour}" fill-opacity="{opacity:.2f}" stroke="{INK}"'
+            lines.append(line(outline(shape), style))
+        elif isinstance(shape, Circle):
+            centre, radius = shape.centre - low, shape.radius * scale
+            lines.append(
+                f'<circle cx="{centre.real * scale:.1f}" cy="{height - centre.imag * scale:.1f}" '
+                f'r="{radius:.1f}" fill="#ffffff" stroke="{INK}"/>'
+            )
+        else:
+            colour, weight = STROKES[shape.role]
+            lines.append(line(outline(shape), f'stroke="{colour}" stroke-width="{weight}"'))
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
+        f'viewBox="0 0 {width:.1f} {height:.1f}" fill="none" stroke-linejoin="round">'
+    )
+    title = f'<title>{escape(repr(shown))}</title>'
+    return '\n'.join((head, title, *lines, '</svg>\n'))

@@ -1,0 +1,69 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Function generation: a four-bar whose rocker follows a function of its crank."""
+
+from __future__ import annotations
+
+from linkage_ros.synthesis.design import Design
+from linkage_ros.synthesis.function.expression import Expression
+from linkage_ros.synthesis.function.task import chebyshev, FunctionTask, pairs, Range
+from linkage_ros.synthesis.pairs.freudenstein import exact
+
+
+def generate_function(
+    function: str,
+    x_range: Range,
+    crank_range: Range,
+    rocker_range: Range,
+    *,
+    points: int = 3,
+    ground: float = 1.0,
+) -> Design:
+    """
+    Design a four-bar that works out a function.
+
+    With three precision points it has them exactly, by Freudenstein's equation; with more it comes
+    as near to them as a four-bar can, which needs scipy.
+
+    Parameters
+    ----------
+    function
+        Of x, such as ``'log10(x)'``.
+    x_range
+        Where x begins and ends.
+    crank_range, rocker_range
+        Angles of crank and rocker there, in [rad].
+    points
+        How many precision points, spaced as `chebyshev` says.
+    ground
+        Length of the ground, in [m].
+
+    Raises
+    ------
+    SynthesisError
+        Where the function or a range cannot be used, or no four-bar of finite links does it.
+    LinkageError
+        Where scipy is needed and not installed.
+
+    """
+    task = FunctionTask(Expression(function), x_range, crank_range, rocker_range)
+    crank, rocker = pairs(task, chebyshev(*x_range, points))
+    if points > 3:
+        from linkage_ros.synthesis.pairs.angle_fit import nearest  # local import: to fit only
+
+        return nearest(crank, rocker, ground)
+    design, _ = exact(crank, rocker, ground)
+    return design

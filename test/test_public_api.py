@@ -1,0 +1,220 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What `import linkage_ros` offers: names, errors with a remedy, short texts, pictures."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+import doctest
+import json
+from pathlib import Path
+import pydoc
+import re
+import subprocess
+import sys
+from typing import Any
+import xml.etree.ElementTree as ET
+
+import linkage_ros as lr
+from linkage_ros.solvers.table import TableClosure
+import pytest
+
+PACKAGE = Path(lr.__file__).parent
+FOUR_BAR, FIVE_BAR = lr.load('four_bar'), lr.load('five_bar')
+ROCKER = lr.load('double_rocker')
+POSITION, OPEN = FOUR_BAR.position(0.7), ROCKER.position(2.5)
+VELOCITY = FOUR_BAR.velocity(POSITION, 3.0)
+
+
+def test_the_tour_of_the_docstring_runs_as_it_is_written() -> None:
+    failed, tried = doctest.testmod(lr)
+    assert failed == 0
+    assert tried > 15
+
+
+@pytest.mark.parametrize(
+    ('program', 'absent'),
+    [
+        ('import linkage_ros', ('linkage_ros.errors', 'yaml')),
+        ('import linkage_ros as lr; lr.load("jansen_leg").position(0.7)["leg_joint"]', ()),
+        ('import linkage_ros as lr; lr.svg(lr.load("four_bar"))', ('matplotlib',)),
+    ],
+    ids=['import', 'position', 'picture'],
+)
+def test_nothing_is_imported_that_is_not_used(program: str, absent: tuple[str, ...]) -> None:
+    absent = (*absent, 'numpy', 'rclpy')
+    program += f'; import sys; assert not {{*{absent!r}}} & {{*sys.modules}}'
+    subprocess.run([sys.executable, '-c', program], check=True)
+
+
+def test_type_checkers_see_the_names_that_are_there() -> None:
+    stub = ast.parse((PACKAGE / '__init__.pyi').read_text('utf-8'))
+    homes = {
+        name.asname: (node.module, name.name)
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom)
+        for name in node.names
+    }
+    assert {*homes} == {*lr.__all__}
+    for name, (module, original) in homes.items():
+        assert getattr(lr, name) is getattr(sys.modules[module], original)
+    assert (PACKAGE / 'py.typed').exists()
+
+
+def test_dir_and_help_show_every_name() -> None:
+    assert {*lr.__all__, '__version__'} <= {*dir(lr)}
+    text = pydoc.plain(pydoc.render_doc(lr))
+    assert [name for name in lr.__all__ if not re.search(rf'\b{name}\b', text)] == []
+    assert 'Close the loops.' in text
+
+
+def test_a_position_is_a_mapping_of_joint_names_to_values() -> None:
+    acceleration = FOUR_BAR.acceleration(POSITION, VELOCITY, 0.5)
+    for found in (POSITION, VELOCITY, acceleration):
+        assert dict(found) == dict(zip(FOUR_BAR.linkage.joints, found.joints, strict=True))
+        assert found['rocker_joint'] == found.joints[1]
+    assert 'rocker_joint' in POSITION
+    assert 'crank_joint' not in POSITION
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'elliptic_trammel', 'five_bar', 'class_3'])
+def test_a_position_knows_its_inputs_and_points(name: str) -> None:
+    closure = lr.load(name)
+    inputs = tuple(0.5 * (r.lowest + r.highest) for r in closure.input_ranges[:1]) or (2.0, 1.0)
+    position = closure.position(*inputs)
+    assert position.inputs == inputs
+    for (_, point), place in closure.points(position).items():
+        assert position.points[point] == pytest.approx(place, abs=1e-12)
+
+
+def test_positions_are_equal_whoever_has_found_them() -> None:
+    again = lr.load('four_bar')
+    assert again.position(0.7) == POSITION != again.position(0.8)
+    assert again.velocity(again.position(0.7), 3.0) == VELOCITY
+
+
+@pytest.mark.parametrize(
+    ('shown', 'text'),
+    [
+        (FOUR_BAR, '<Closure four_bar: 1 input, 2 joints>'),
+        (FIVE_BAR, '<Closure five_bar: 2 inputs, 2 joints>'),
+        (lr.Closure(FOUR_BAR.linkage), '<Closure: 1 input, 2 joints>'),
+        (TableClosure(FOUR_BAR.linkage, knots=64), '<TableClosure: 1 input, 2 joints>'),
+        (POSITION, '<Position closed: coupler_joint -0.346042, rocker_joint 1.00103>'),
+        (OPEN, '<Position open by 0.0619 m>'),
+        (VELOCITY, '<Velocity: coupler_joint -3.49184, rocker_joint 0.843928>'),
+    ],
+)
+def test_what_a_prompt_shows_is_short(shown: object, text: str) -> None:
+    assert repr(shown) == text
+
+
+@pytest.mark.parametrize('name', lr.linkage_names())
+def test_every_linkage_is_a_picture_in_a_notebook(name: str) -> None:
+    closure = lr.load(name)
+    root = ET.fromstring(closure._repr_svg_())
+    box = [float(number) for number in root.attrib['viewBox'].split()]
+    assert 400.0 < max(box) < 440.0
+    title, *shapes = root
+    assert title.text == repr(closure)
+    assert {shape.tag.rpartition('}')[2] for shape in shapes} == {'polyline', 'circle'}
+    pixels = [
+        tuple(map(float, pixel.split(',')))
+        for shape in shapes
+        for pixel in shape.get('points', '').split()
+    ]
+    assert all(0.0 <= x <= box[2] and 0.0 <= y <= box[3] for x, y in pixels)
+
+
+def test_a_picture_puts_the_pins_where_they_are() -> None:
+    root = ET.fromstring(POSITION._repr_svg_())
+    circles = [shape for shape in root if shape.tag.endswith('circle')]
+    pins = [complex(float(pin.attrib['cx']), -float(pin.attrib['cy'])) for pin in circles]
+    points = [POSITION.points[name] for name in ('O2', 'O4', 'A', 'B')]
+    scale = abs(pins[1] - pins[0]) / abs(points[1] - points[0])
+    for pin, point in zip(pins, points, strict=True):
+        assert pin - pins[0] == pytest.approx(scale * (point - points[0]), abs=0.2)
+
+
+def test_what_has_no_pose_has_no_picture() -> None:
+    assert OPEN._repr_svg_() is None
+    with pytest.raises(lr.LinkageError, match='open, the links miss each other'):
+        lr.svg(OPEN)
+
+
+ERRORS: list[tuple[Callable[[], Any], type[Exception], str]] = [
+    (lambda: lr.laod, AttributeError, "module 'linkage_ros' has no attribute 'laod'"),
+    (lambda: lr.load('jansen'), lr.FileError, 'jansen: is neither a file nor a name'),
+    (lambda: lr.load('jansen'), lr.FileError, 'or one of andrews_squeezer, class_3, '),
+    (lambda: lr.load('none.yaml'), lr.FileError, 'none.yaml: cannot be read'),
+    (lambda: lr.load(''), lr.FileError, "'': is neither a file nor a name"),
+    (lambda: lr.load(3), TypeError, '3 is neither a path nor a name; name a file, or one of a'),
+    (lambda: lr.load_scene('dem'), lr.FileError, 'or one of bare, demo, '),
+    (FOUR_BAR.position, ValueError, 'inputs: 0 given; give 1: crank_joint'),
+    (lambda: FOUR_BAR.position(1.0, 2.0), ValueError, 'inputs: 2 given; give 1: crank_joint'),
+    (lambda: FIVE_BAR.position(1.0), ValueError, 'inputs: 1 given; give 2: left_crank_joint, '),
+    (lambda: FOUR_BAR.position('1'), TypeError, "inputs: '1' is not a number; solve() takes"),
+    (lambda: FIVE_BAR.position(1, None), TypeError, 'inputs: None is not a number; solve()'),
+    (lambda: FOUR_BAR.position(1j), TypeError, 'inputs: 1j is not a number; solve()'),
+    (lambda: POSITION['rocker'], KeyError, "'rocker' is not a published joint; use coupler_joint"),
+    (lambda: POSITION[1], KeyError, '1 is not a published joint; use coupler_joint, rocker_joint'),
+    (lambda: OPEN['coupler_joint'], ValueError, '<Position open by 0.0619 m> has no joint values'),
+    (
+        lambda: OPEN.points,
+        ValueError,
+        'points: <Position open by 0.0619 m> has none; check its st',
+    ),
+    (lambda: ROCKER.velocity(OPEN, 1.0), ValueError, 'rates: a linkage that is open has none'),
+    (lambda: FOUR_BAR.velocity(0.7, 1.0), TypeError, 'position: 0.7 is not of <Closure four_bar'),
+    (lambda: FOUR_BAR.velocity(OPEN, 1.0), TypeError, 'position: <Position open by 0.0619 m> is'),
+    (
+        lambda: FOUR_BAR.acceleration(POSITION, POSITION.joints, 0.0),
+        TypeError,
+        'velocity: (-0.3460422454115175, 1.001032173019738) is not of <Closure four_bar',
+    ),
+    (
+        lambda: lr.generate_function('log10(', (1, 2), (0.8, 1.8), (2.4, 3.9)),
+        lr.SynthesisError,
+        'log10(',
+    ),
+]
+
+
+@pytest.mark.parametrize(('call', 'kind', 'text'), ERRORS)
+def test_what_is_wrong_is_told_with_a_remedy(
+    call: Callable[[], Any], kind: type[Exception], text: str
+) -> None:
+    with pytest.raises(kind) as caught:
+        call()
+    assert text in str(caught.value).replace('\\', '')
+    assert '\n' not in str(caught.value)
+
+
+def test_a_file_comes_before_a_shipped_linkage_of_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('hoeken').write_text(json.dumps({'four_bar': {'a': 1, 'b': 3, 'c': 2, 'd': 2.5}}))
+    assert lr.load('hoeken').joint_names == ('coupler_joint', 'rocker_joint')
+    assert lr.load(Path('hoeken')).linkage == lr.load('hoeken').linkage
+
+
+def test_more_than_three_points_of_a_function_are_met_as_near_as_can_be() -> None:
+    pytest.importorskip('scipy')
+    ranges = ((1.0, 2.0), (0.8, 1.8), (2.4, 3.9))
+    design = lr.generate_function('log10(x)', *ranges, points=7)
+    assert len(design.wanted) == 7
+    assert max(abs(met.angle) for met in lr.assess(design).met) < 0.01
