@@ -1,0 +1,136 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every example runs as it stands, anywhere, and does what its line in the README says."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+
+import linkage_ros as lr
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / 'examples'
+BAG = ROOT / 'test' / 'bag' / 'recorded' / 'torque_crank.mcap'
+SCRIPTS = sorted(file.name for file in FOLDER.glob('*.py'))
+
+pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason='an installation has no examples')
+
+
+def printed(script: str, folder: Path, *arguments: str) -> list[str]:
+    """Return the lines that an example prints in a folder of its own."""
+    done = subprocess.run(
+        [sys.executable, '-W', 'error', str(FOLDER / script), *arguments],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, '')
+    return done.stdout.splitlines()
+
+
+def test_the_readme_names_each_script_once() -> None:
+    text = (FOLDER / 'README.md').read_text('utf-8')
+    assert sorted(re.findall(r'^\| \[(.*?)\]', text, re.MULTILINE)) == SCRIPTS
+    assert len(SCRIPTS) == 8
+
+
+def test_each_is_short() -> None:
+    for file in FOLDER.rglob('*.py'):
+        own = [line for line in file.read_text('utf-8').splitlines() if line[:1] != '#']
+        assert len(own) <= 40, file
+
+
+def test_turn(tmp_path: Path) -> None:
+    head, *rows = printed('turn.py', tmp_path)
+    assert head.split() == ['crank', *lr.load('jansen_leg').joint_names]
+    assert [int(row.split()[0]) for row in rows] == list(range(0, 360, 30))
+
+
+def test_table_to_csv(tmp_path: Path) -> None:
+    assert printed('table_to_csv.py', tmp_path)[0] == '361 states, 0 of them open'
+    rows = list(csv.DictReader((tmp_path / 'four_bar.csv').open()))
+    closure = lr.load('four_bar')
+    for row in rows[::60]:
+        position = closure.position(float(row['crank_joint [rad]']))
+        velocity = closure.velocity(position, 3.0)
+        for unit, found in (('rad', position), ('rad/s', velocity)):
+            told = {name: float(row[f'{name} [{unit}]']) for name in closure.joint_names}
+            assert told == pytest.approx(dict(found), abs=1e-12)
+
+
+def test_draw_svg(tmp_path: Path) -> None:
+    printed('draw_svg.py', tmp_path)
+    pictures = sorted(tmp_path.glob('*.svg'))
+    assert [picture.stem for picture in pictures] == lr.linkage_names()
+    for picture in pictures:
+        assert ET.parse(picture).getroot().tag.endswith('svg')
+
+
+def test_scene_without_ros(tmp_path: Path) -> None:
+    lines = printed('scene_without_ros.py', tmp_path)
+    pairs = re.findall(r'piston_slide: read (\S+), true (\S+)', ' '.join(lines))
+    assert len(pairs) == 5
+    assert all(0.0 < abs(float(read) - float(true)) < 1e-3 for read, true in pairs)
+
+
+def test_own_effect(tmp_path: Path) -> None:
+    lines = printed('own_effect.py', tmp_path)
+    off = [
+        float(true) - float(read)
+        for true, read in re.findall(r'(\d\.\d+), read (\S+)', '\n'.join(lines))
+    ]
+    assert len(off) == 10
+    assert all(abs(error) <= 0.0501 for error in off)
+    assert any(off)
+
+
+def test_function_generator(tmp_path: Path) -> None:
+    _, *rows = printed('function_generator.py', tmp_path)
+    values = [re.findall(r'-?\d+\.\d{5}', row) for row in rows]
+    assert len(values) == 11
+    errors = [float(y) - float(true) for y, true in values]
+    # Three precision points: the middle one, and one near each end, where the error turns.
+    assert errors[5] == pytest.approx(0.0, abs=1e-5)
+    assert [error > 0.0 for error in errors if abs(error) > 1e-5] == [
+        False,
+        *[True] * 4,
+        *[False] * 4,
+        True,
+    ]
+    assert max(map(abs, errors)) < 1e-3
+
+
+@pytest.mark.skipif(shutil.which('cc') is None, reason='there is no C compiler')
+def test_compile_to_c(tmp_path: Path) -> None:
+    status, in_c, in_python = printed('compile_to_c.py', tmp_path)
+    assert status == 'status: 0'
+    assert in_c.split()[2:] == in_python.split()[2:] != []
+
+
+def test_read_bag(tmp_path: Path) -> None:
+    lines = printed('read_bag.py', tmp_path, str(BAG))
+    assert lines[0] == '/joint_states sensor_msgs/msg/JointState'
+    head = next(number for number, line in enumerate(lines) if line.startswith('stamp'))
+    states = [line.split() for line in lines[head + 1 :]]
+    closure = lr.load('four_bar')
+    assert len(states) > 100
+    for _, crank, *joints in states[::50]:
+        read = [float(value) for value in joints]
+        assert read == pytest.approx(closure.position(float(crank)).joints, abs=1e-5)
