@@ -23,6 +23,7 @@ import subprocess
 import sys
 from urllib.parse import unquote, urlsplit
 
+import linkage_ros as lr
 from linkage_ros.cli.main import COMMANDS
 from linkage_ros.cli.parameter_tables import REGISTRIES
 from linkage_ros.scene.linkage_schema import linkage_schema
@@ -141,6 +142,11 @@ def test_no_link_is_dead(site, pages):
 def test_it_brings_all_that_it_shows(pages):
     foreign = {link for page in pages.values() for link in page.brought if urlsplit(link).netloc}
     assert not foreign
+
+
+def test_every_public_name_is_in_its_reference(pages):
+    missing = {f'linkage_ros.{name}' for name in lr.__all__} - pages['reference/python.html'].ids
+    assert not missing
 
 
 def test_every_command_is_in_its_reference(pages):
