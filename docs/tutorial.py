@@ -45,26 +45,23 @@ joints:
 traced: [P]
 """)
 
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
+import linkage_ros as lr
 
-content, _ = read_yaml('mine.yaml')
-closure = Closure(read_linkage(content))
-list(closure.linkage.joints)
+closure = lr.load('mine.yaml')
+closure
 
 # %% [markdown]
 # ## One position
 #
 # A position has a status, the gap that is left where the loop does not close, and the published
-# joints in their order. Angles are in radians.
+# joints by their names. Angles are in radians.
 
 # %%
 from math import degrees
 
 position = closure.position(0.7)
 print(position.status)
-for name, angle in zip(closure.linkage.joints, position.joints):
+for name, angle in position.items():
     print(f'{name:<14}{degrees(angle):8.3f}°')
 
 # %% [markdown]
@@ -73,7 +70,7 @@ for name, angle in zip(closure.linkage.joints, position.joints):
 # %%
 velocity = closure.velocity(position, 3.0)
 acceleration = closure.acceleration(position, velocity, 0.0)
-velocity.joints, acceleration.joints
+velocity['rocker_joint'], acceleration['rocker_joint']
 
 # %% [markdown]
 # Is that true? The rate is the slope of the angle, so two positions close by have to say the same:
@@ -89,7 +86,13 @@ slopes
 # Points are complex numbers, x + iy, in metres in the frame of the ground:
 
 # %%
-closure.points(position)['coupler', 'P']
+position.points['P']
+
+# %% [markdown]
+# A notebook draws a position, and a closure:
+
+# %%
+position
 
 # %% [markdown]
 # ## A loop that does not close
@@ -103,7 +106,7 @@ stretched = replace(
     closure.linkage,
     links={**closure.linkage.links, 'ground': {'O2': (0.0, 0.0), 'O4': (0.190, 0.0)}},
 )
-wide = Closure(stretched)
+wide = lr.Closure(stretched)
 for angle in (0.2, 2.0):
     found = wide.position(angle)
     print(f'{angle:.1f} rad: {found.status.name}, gap {found.gap * 1000:.2f} mm')
@@ -128,11 +131,11 @@ crank = np.linspace(0.0, 2 * np.pi, 721)
 batch = closure.solve(crank, rates=3.0)
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.5))
-for name, angles in zip(closure.linkage.joints, batch.positions):
+for name, angles in zip(closure.joint_names, batch.positions):
     left.plot(np.degrees(crank), np.degrees(np.unwrap(angles)), label=name)
 left.set(xlabel='crank [°]', ylabel='joint [°]', xticks=range(0, 361, 90))
 left.legend()
-path = np.array([closure.points(closure.position(angle))['coupler', 'P'] for angle in crank])
+path = np.array([closure.position(angle).points['P'] for angle in crank])
 right.plot(1000 * path.real, 1000 * path.imag)
 right.set(xlabel='x [mm]', ylabel='y [mm]', aspect='equal', title='the path of P')
 figure.tight_layout()
@@ -155,10 +158,7 @@ effects:
   encoder: {joints: {rocker_joint: {counts: 256}}}
 """)
 
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import load_scene
-
-pipeline = Pipeline(load_scene('scene.yaml'))
+pipeline = lr.Pipeline(lr.load_scene('scene.yaml'))
 pipeline.lines[0].stages
 
 # %%
@@ -171,8 +171,8 @@ ticks[0].message[:12].hex(' ')  # the bytes that the node would publish, header 
 
 # %%
 looks = [tick.looks[0] for tick in ticks]
-column = list(pipeline.closures[0].linkage.joints).index('rocker_joint')
-true = np.array([look.position.joints[column] for look in looks])
+column = pipeline.closures[0].joint_names.index('rocker_joint')
+true = np.array([look.position['rocker_joint'] for look in looks])
 read = np.array([look.reading.joints[column] for look in looks])
 error = np.angle(np.exp(1j * (read - true)))
 
@@ -186,7 +186,7 @@ figure.tight_layout()
 # a bag replay to the last bit.
 
 # %%
-again = Pipeline(load_scene('scene.yaml'))
+again = lr.Pipeline(lr.load_scene('scene.yaml'))
 assert [again.tick(number * 10_000_000).message for number in range(101)] == [
     tick.message for tick in ticks
 ]

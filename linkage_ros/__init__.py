@@ -35,7 +35,7 @@ close its loops at a value of its input. Angles are in [rad], lengths in [m]:
 Points are complex numbers x + iy in the frame of the ground. Velocities start from a position,
 accelerations from both:
 
->>> abs(position.points['A'])
+>>> round(abs(position.points['A']), 6)
 0.04
 >>> velocity = closure.velocity(position, 3.0)
 >>> acceleration = closure.acceleration(position, velocity, 0.0)

@@ -103,6 +103,7 @@ def _results(cell: Cell, variables: dict[str, Any], name: str) -> Iterator[str]:
     # Lines count as in the file, for tracebacks.
     tree = ast.parse('\n' * cell.line + cell.content, name)
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    value = None
     with redirect_stdout(StringIO()) as printed:
         exec(compile(tree, name, 'exec'), variables)
         if last is not None:
@@ -111,6 +112,8 @@ def _results(cell: Cell, variables: dict[str, Any], name: str) -> Iterator[str]:
                 print(repr(value))
     if printed.getvalue():
         yield f'```text\n{printed.getvalue().rstrip()}\n```\n'
+    if picture := getattr(value, '_repr_svg_', lambda: None)():
+        yield _framed(picture)
     for number in plt.get_fignums():
         yield _drawn(plt.figure(number))
     plt.close('all')
@@ -121,7 +124,9 @@ def _drawn(figure: Any) -> str:
     with StringIO() as file, rc_context({'svg.hashsalt': 'tutorial'}):
         figure.savefig(file, format='svg', bbox_inches='tight', metadata={'Date': None})
         svg = file.getvalue()
-    lines = [
-        line for line in _SCRIPT.sub('', svg[svg.index('<svg') :]).splitlines() if line.strip()
-    ]
+    return _framed(_SCRIPT.sub('', svg[svg.index('<svg') :]))
+
+
+def _framed(svg: str) -> str:
+    lines = [line for line in svg.splitlines() if line.strip()]
     return f'<div class="picture">\n{chr(10).join(lines)}\n</div>\n'

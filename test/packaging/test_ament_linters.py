@@ -37,7 +37,7 @@ HEADER = """\
 """
 
 # Named one by one: a linter let loose on `.` would read build/ and install/ too.
-NAMES = ('setup.py', 'bench', 'launch', 'linkage_ros', 'test')
+NAMES = ('setup.py', 'bench', 'examples', 'launch', 'linkage_ros', 'test')
 
 
 @pytest.fixture
