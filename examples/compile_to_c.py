@@ -25,24 +25,11 @@ from linkage_ros.kinematics.compiled.source import source, Subject
 closure = lr.load('four_bar')
 subject = Subject(closure, 'four_bar', 'four_bar.yaml', 0, closure.joint_names)
 Path('four_bar.c').write_text(source(subject, C('four_bar', header=False)))
-subprocess.run(
-    [
-        'cc',
-        '-O2',
-        '-ffp-contract=off',
-        '-shared',
-        '-fPIC',
-        'four_bar.c',
-        '-o',
-        'four_bar.so',
-        '-lm',
-    ],
-    check=True,
-)
+compile_it = 'cc -O2 -ffp-contract=off -shared -fPIC four_bar.c -o four_bar.so -lm'
+subprocess.run(compile_it.split(), check=True)
 
 position = ctypes.CDLL('./four_bar.so').four_bar_position
 inputs, joints = (ctypes.c_double * 1)(0.7), (ctypes.c_double * 2)()
-status = position(inputs, joints)
-print('status:', status)
+print('status:', position(inputs, joints))
 print('in C:     ', *joints)
 print('in Python:', *closure.position(0.7).values())

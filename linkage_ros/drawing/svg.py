@@ -23,6 +23,7 @@ from xml.sax.saxutils import escape
 from linkage_ros.drawing.figure import all_places, symbol_size, view
 from linkage_ros.drawing.painting import COLOURS, corners, FACES, GHOST, INK, outline, STROKES
 from linkage_ros.drawing.shapes import Circle, Polygon, shapes, skeleton
+from linkage_ros.errors import quoted
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.survey import usual_inputs
 
@@ -50,9 +51,13 @@ def svg(shown: Closure | Position) -> str:
     ------
     LinkageError
         Where the position has no pose.
+    TypeError
+        Where it is neither.
 
     """
     position = shown.position(*usual_inputs(shown)) if isinstance(shown, Closure) else shown
+    if not isinstance(position, Position):
+        raise TypeError(f'svg: {quoted(shown)} is not drawn; give a Closure or a Position')
     closure = position.closure
     seen = view(closure, position.inputs)
     size = symbol_size(seen)

@@ -232,6 +232,8 @@ class Closure:
     ------
     DefinitionError
         Where the parts do not make a linkage that the inputs move, or that closes nowhere.
+    TypeError
+        Where it is not a linkage.
 
     """
 
@@ -239,6 +241,8 @@ class Closure:
     """Whether its steps close it, which can be compiled; other solvers have a way of their own."""
 
     def __init__(self, linkage: Linkage, name: str = '') -> None:
+        if not isinstance(linkage, Linkage):
+            raise TypeError(f'linkage: {quoted(linkage)} is not a Linkage; load() reads files')
         check(linkage)
         self.linkage = linkage
         self.name = name
