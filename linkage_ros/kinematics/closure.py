@@ -72,9 +72,9 @@ class _JointValues(Mapping[str, float]):
         Raises
         ------
         KeyError
-            Where the linkage publishes no joint of this name.
+            If the linkage publishes no joint of this name.
         ValueError
-            Where the linkage has no pose.
+            If the linkage has no pose.
 
         """
         names = self.closure.joint_names
@@ -109,18 +109,18 @@ class Position(_JointValues):
     Attributes
     ----------
     status
-        Whether every loop closes.
+        Whether every loop closes, and whether the position has rates.
     gap
-        What links miss each other by where one does not, else 0, in [m].
+        Distance by which links miss each other where a loop is open, in [m]; else 0.
     joints
         Values of the published joints, in the order of the linkage, in [rad] or [m]; empty where a
         loop is open or indeterminate.
     state
-        What the steps have found.
+        Coordinates and pins that the steps found.
     poses
-        The steps' own poses; the last one is that of the step that failed, if one did.
+        One pose for each step; where a step failed, the last one is its pose.
     closure
-        The closure that found it.
+        The closure that found the position.
 
     """
 
@@ -144,7 +144,7 @@ class Position(_JointValues):
         Raises
         ------
         ValueError
-            Where the linkage has no pose.
+            If the linkage has no pose.
 
         """
         return {point: place for (_, point), place in self.closure.points(self).items()}
@@ -168,9 +168,9 @@ class Velocity(_JointValues):
     Attributes
     ----------
     joints
-        Of the published joints, in [rad/s] or [m/s].
+        Rates of the published joints, in [rad/s] or [m/s].
     state, rates
-        What the steps have found.
+        Rates of coordinates and pins, and what each step needs for its accelerations.
     closure
         The closure that found them.
 
@@ -190,9 +190,9 @@ class Acceleration(_JointValues):
     Attributes
     ----------
     joints
-        Of the published joints, in [rad/s²] or [m/s²].
+        Accelerations of the published joints, in [rad/s²] or [m/s²].
     state
-        What the steps have found.
+        Accelerations of coordinates and pins.
     closure
         The closure that found them.
 
@@ -224,16 +224,25 @@ class Closure:
     Parameters
     ----------
     linkage
-        What to solve.
+        The linkage.
     name
-        What to call it; of a file its name without the ending.
+        Its name, which messages and pictures show; `load` takes it from the file.
+
+    Attributes
+    ----------
+    linkage, name
+        As given.
+    input_names
+        Names of the driven joints, in the order in which `position` takes their values.
+    joint_names
+        Names of the published joints, in the order of `Position.joints`.
 
     Raises
     ------
     DefinitionError
-        Where the parts do not make a linkage that the inputs move, or that closes nowhere.
+        If the parts do not form a linkage, or the inputs do not move all of it.
     TypeError
-        Where it is not a linkage.
+        If ``linkage`` is not a `Linkage`.
 
     """
 
@@ -247,9 +256,7 @@ class Closure:
         self.linkage = linkage
         self.name = name
         self.input_names = tuple(given.joint for given in linkage.inputs)
-        """Names of the driven joints, in the order in which `position` takes their values."""
         self.joint_names = tuple(linkage.joints)
-        """Names of the published joints, in the order of `Position.joints`."""
         self.structure: Structure = find_groups(linkage)
         planner = Planner(linkage, self.structure)
         self.scale = planner.scale
@@ -303,15 +310,20 @@ class Closure:
         Parameters
         ----------
         *inputs
-            Values of the driven joints, in [rad] or [m]. Where one is not finite, the linkage is
-            indeterminate.
+            One value for each driven joint, in [rad] or [m]. If one is not finite, the position
+            is indeterminate.
+
+        Returns
+        -------
+        position : Position
+            Its status says whether the loops close.
 
         Raises
         ------
         ValueError
-            Where there is not one input for each driven joint.
+            If there is not one input for each driven joint.
         TypeError
-            Where an input is no number.
+            If an input is not a number.
 
         """
         x = self._coordinates('inputs', inputs)
@@ -345,22 +357,22 @@ class Closure:
 
     def velocity(self, position: Position, *rates: float) -> Velocity:
         """
-        Return the rates at a position whose status has rates.
+        Return the rates of the linkage at a position.
 
         Parameters
         ----------
         position
-            As this closure has found it.
+            A position that this closure found, with ``position.status.has_rates``.
         *rates
-            Of the driven joints, in [rad/s] or [m/s].
+            One rate for each driven joint, in [rad/s] or [m/s].
 
         Raises
         ------
         ValueError
-            Where the position has no rates, as at a toggle, a rate is not finite, or there is not
-            one for each driven joint.
+            If the position has no rates, as at a toggle, if a rate is not finite, or if there is
+            not one for each driven joint.
         TypeError
-            Where a rate is no number, or the position is not one of this closure.
+            If a rate is not a number, or the position is one of another linkage.
 
         """
         if getattr(position, 'closure', None) is not self:
@@ -378,19 +390,19 @@ class Closure:
         self, position: Position, velocity: Velocity, *accelerations: float
     ) -> Acceleration:
         """
-        Return the accelerations at a closed position.
+        Return the accelerations of the linkage at a position.
 
         Parameters
         ----------
         position, velocity
-            As this closure has found them.
+            A position and a velocity that this closure found.
         *accelerations
-            Of the driven joints, in [rad/s²] or [m/s²].
+            One acceleration for each driven joint, in [rad/s²] or [m/s²].
 
         Raises
         ------
         ValueError, TypeError
-            As `velocity` raises them.
+            As `velocity`.
 
         """
         if getattr(velocity, 'closure', None) is not self:
@@ -432,26 +444,32 @@ class Closure:
         """
         Solve many states at once, as `position`, `velocity` and `acceleration` solve one.
 
-        Memory does not grow with the states beyond the results. Links that only iteration solves
-        are iterated state by state, no faster than one at a time.
+        The memory beyond the results does not grow with the number of states. Links that need
+        iteration are solved state by state, as slowly as `position` solves them.
 
         Parameters
         ----------
         *inputs
-            For each driven joint an array of its values, in [rad] or [m]. A state with one that is
-            not finite is indeterminate.
+            For each driven joint an array (N,) of its values, in [rad] or [m]. A state with a
+            value that is not finite is indeterminate.
         rates, accelerations
-            Of the driven joints: for each a number, or an array of as many as there are states; of
-            a single one without a list. They are 1 if not given, for a single one, and 0.
+            For each driven joint a number or an array (N,); with one driven joint, without a list.
+            Without ``rates`` the rate of a single driven joint is 1; several driven joints need
+            them. Without ``accelerations`` these are 0.
         derivatives
-            What is worked out: positions (0), velocities too (1), and accelerations (2).
+            0 solves for positions, 1 also for velocities, 2 also for accelerations.
         out
-            Where the results go, and what is returned, if given: arrays of the right shape.
+            Arrays that take the results, and that are returned.
+
+        Returns
+        -------
+        batch : Batch
+            With a row for each published joint, in the order of `joint_names`: arrays (joints, N).
 
         Raises
         ------
         ValueError
-            Where the arrays do not fit each other, the linkage or ``out``.
+            If the arrays do not fit each other, the linkage or ``out``.
 
         """
         return self._solver.solve(inputs, rates, accelerations, derivatives, out)
@@ -469,12 +487,12 @@ class Closure:
         Returns
         -------
         points : dict
-            For each pair of names its place x + iy, in [m].
+            For each pair of names the place x + iy, in [m].
 
         Raises
         ------
         ValueError
-            Where the linkage has no pose.
+            If the linkage has no pose.
 
         """
         if not position.status.has_pose:
