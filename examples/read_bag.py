@@ -22,9 +22,8 @@ bag = lr.read_bag(sys.argv[1])
 for topic in bag.topics:
     print(topic.name, topic.type)
 scene = lr.recorded_scene(bag)
-joints = [joint for member in scene.members for joint in member.joints]
-reader = lr.JointStateReader(joints)
-print('stamp [ns]', *joints)
+reader = lr.JointStateReader(scene.joints)
+print('stamp [ns]', *scene.joints)
 for message in bag.messages():
     if message.topic == '/joint_states':
         state = reader.read(message.data)

@@ -43,7 +43,7 @@ from linkage_ros.effects.stage import (
     WriterStage,
 )
 from linkage_ros.effects.turns import all_wrapped, beginnings, Continuous
-from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.joint_state import JointStateWriter, Rejection
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.status import Status
@@ -518,6 +518,8 @@ class Pipeline:
     ------
     FileError
         Where something in the scene does not go together.
+    TypeError
+        Where it is not a scene.
 
     """
 
@@ -527,6 +529,8 @@ class Pipeline:
         closures: Sequence[Closure] | None = None,
         injection: Injection | None = None,
     ) -> None:
+        if not isinstance(scene, Scene):
+            raise TypeError(f'scene: {quoted(scene)} is not a Scene; load_scene() reads files')
         if injection is None and scene.faults:
             from linkage_ros.faults.injection import Injection
 

@@ -29,6 +29,7 @@ from typing import Any
 import xml.etree.ElementTree as ET
 
 import linkage_ros as lr
+from linkage_ros.shipped import shipped
 from linkage_ros.solvers.table import TableClosure
 import pytest
 
@@ -36,6 +37,8 @@ PACKAGE = Path(lr.__file__).parent
 FOUR_BAR, FIVE_BAR = lr.load('four_bar'), lr.load('five_bar')
 ROCKER = lr.load('double_rocker')
 POSITION, OPEN = FOUR_BAR.position(0.7), ROCKER.position(2.5)
+RANGES = ((1.0, 2.0), (0.8, 1.8), (2.4, 3.9))
+SCENE = shipped('scenes/demo.yaml')
 VELOCITY = FOUR_BAR.velocity(POSITION, 3.0)
 
 
@@ -113,6 +116,7 @@ def test_positions_are_equal_whoever_has_found_them() -> None:
         (FIVE_BAR, '<Closure five_bar: 2 inputs, 2 joints>'),
         (lr.Closure(FOUR_BAR.linkage), '<Closure: 1 input, 2 joints>'),
         (TableClosure(FOUR_BAR.linkage, knots=64), '<TableClosure: 1 input, 2 joints>'),
+        (lr.load_scene('two_fingers'), '<Scene two_fingers: 2 linkages, 500 Hz>'),
         (POSITION, '<Position closed: coupler_joint -0.346042, rocker_joint 1.00103>'),
         (OPEN, '<Position open by 0.0619 m>'),
         (VELOCITY, '<Velocity: coupler_joint -3.49184, rocker_joint 0.843928>'),
@@ -163,6 +167,8 @@ ERRORS: list[tuple[Callable[[], Any], type[Exception], str]] = [
     (lambda: lr.load('none.yaml'), lr.FileError, 'none.yaml: cannot be read'),
     (lambda: lr.load(''), lr.FileError, "'': is neither a file nor a name"),
     (lambda: lr.load(3), TypeError, '3 is neither a path nor a name; name a file, or one of a'),
+    (lambda: lr.load(SCENE), lr.FileError, 'demo.yaml: is a scene; name a linkage file; load_s'),
+    (lambda: lr.Pipeline('demo'), TypeError, "scene: 'demo' is not a Scene; load_scene() reads"),
     (lambda: lr.load_scene('dem'), lr.FileError, 'or one of bare, demo, '),
     (lambda: FIVE_BAR.position(1, None), TypeError, 'inputs: None is not a number; solve()'),
     (lambda: FOUR_BAR.position(1j), TypeError, 'inputs: 1j is not a number; solve()'),
@@ -184,7 +190,13 @@ ERRORS: list[tuple[Callable[[], Any], type[Exception], str]] = [
         'velocity: (-0.3460422454115175, 1.001032173019738) is not of <Closure four_bar',
     ),
     (
-        lambda: lr.generate_function('log10(', (1, 2), (0.8, 1.8), (2.4, 3.9)),
+        lambda: lr.generate_function('x', *RANGES, points=2),
+        lr.SynthesisError,
+        'points: there are 2',
+    ),
+    (lambda: lr.generate_function(abs, *RANGES), TypeError, 'is not a text; write it as'),
+    (
+        lambda: lr.generate_function('log10(', *RANGES),
         lr.SynthesisError,
         'log10(',
     ),
@@ -212,7 +224,6 @@ def test_a_file_comes_before_a_shipped_linkage_of_its_name(
 
 def test_more_than_three_points_of_a_function_are_met_as_near_as_can_be() -> None:
     pytest.importorskip('scipy')
-    ranges = ((1.0, 2.0), (0.8, 1.8), (2.4, 3.9))
-    design = lr.generate_function('log10(x)', *ranges, points=7)
+    design = lr.generate_function('log10(x)', *RANGES, points=7)
     assert len(design.wanted) == 7
     assert max(abs(met.angle) for met in lr.assess(design).met) < 0.01

@@ -78,6 +78,8 @@ def load(linkage: str | PathLike[str]) -> Closure:
     """
     file = named_file(linkage, 'linkages')
     content, _ = read_yaml(file)
+    if 'linkage' in content or 'linkages' in content:
+        raise content.error('', 'is a scene', 'name a linkage file; load_scene() reads scenes')
     return read_closure(content, file.stem)
 
 

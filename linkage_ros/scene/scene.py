@@ -156,6 +156,10 @@ class Scene:
     folder: str = field(compare=False)
     robot_description: bool = False
 
+    def __repr__(self) -> str:
+        linkages = 'linkage' if len(self.members) == 1 else 'linkages'
+        return f'<Scene {self.name}: {len(self.members)} {linkages}, {self.rate:g} Hz>'
+
     @property
     def joints(self) -> tuple[str, ...]:
         """Return the names of all published joints, in their order."""

@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+from linkage_ros.errors import quoted, SynthesisError
 from linkage_ros.synthesis.design import Design
 from linkage_ros.synthesis.function.expression import Expression
 from linkage_ros.synthesis.function.task import chebyshev, FunctionTask, pairs, Range
@@ -54,11 +55,17 @@ def generate_function(
     Raises
     ------
     SynthesisError
-        Where the function or a range cannot be used, or no four-bar of finite links does it.
+        If the function or a range cannot be used, or no four-bar of finite links does it.
     LinkageError
-        Where scipy is needed and not installed.
+        If scipy is needed and not installed.
+    TypeError
+        If the function is not a text.
 
     """
+    if not isinstance(function, str):
+        raise TypeError(f"function: {quoted(function)} is not a text; write it as 'log10(x)'")
+    if points < 3:
+        raise SynthesisError('points', f'there are {points}', 'ask for 3 or more')
     task = FunctionTask(Expression(function), x_range, crank_range, rocker_range)
     crank, rocker = pairs(task, chebyshev(*x_range, points))
     if points > 3:
