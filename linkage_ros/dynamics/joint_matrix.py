@@ -28,10 +28,10 @@ a joint's force does no work: its row is the displacement of the one link's poin
 
 from __future__ import annotations
 
-from cmath import rect
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import called, facing
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.structure import Joint
@@ -61,7 +61,7 @@ class Line(NamedTuple):
 
     def direction(self, coordinates: Sequence[float]) -> complex:
         """Return its direction in the frame of the ground, a unit vector."""
-        return rect(1.0, coordinates[self.coordinate]) * self.unit
+        return facing(coordinates[self.coordinate]) * self.unit
 
 
 class JointMatrix:
@@ -123,8 +123,7 @@ class JointMatrix:
                 )
             else:
                 self._fill_moment(self._sides(given.child, given.parent), column)
-        self._where = np.array(where, dtype=np.intp)
-        self._entries = self._matrix.reshape(-1)
+        self._fill = self._filling(self._matrix.reshape(-1), np.array(where, dtype=np.intp))
 
     def at(self, coordinates: Sequence[float], places: Sequence[complex]) -> Array:
         """
@@ -148,8 +147,18 @@ class JointMatrix:
                 lever = (places[place] - places[center]) / self._scale
                 moment = lever.real * force.imag - lever.imag * force.real
                 values += (sign * force.real, sign * force.imag, sign * moment)
-        self._entries[self._where] = values
-        return self._matrix
+        matrix: Array = called(self._fill, *values)
+        return matrix
+
+    def _filling(self, entries: Array, where: NDArray[np.intp]) -> Callable[..., Array]:
+        """Return what fills in what varies, in the order of its places, and returns the matrix."""
+        matrix = self._matrix
+
+        def fill(*values: float) -> Array:
+            entries[where] = values
+            return matrix
+
+        return fill
 
     def _plan_pins(
         self, joints: Sequence[Joint], places: Sequence[int], where: list[int]
