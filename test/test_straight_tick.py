@@ -135,6 +135,17 @@ def test_both_publish_the_same_forces(file):
         check(text, f'{DRIVES["carried"]}\n{scene}', looked=20)
 
 
+def test_a_spring_whose_ends_meet_is_left_to_the_plain_steps():
+    linkage, _ = with_masses(ROOT / 'config' / 'linkages' / 'four_bar.yaml')
+    # Where the crank is along the ground, as it is at the first tick.
+    ground = {**linkage.links[GROUND], 'S': linkage.links['crank']['A']}
+    linkage = replace(linkage, links={**linkage.links, GROUND: ground})
+    spring = '{from: ground.S, to: crank.A, stiffness: 40.0, damping: 1.0}'
+    scene = f'{DRIVES["carried"]}\nloads: {{springs: {{x: {spring}}}}}\npublish_input: true'
+    for effects in FORCES:
+        check(linkage_text(linkage).encode(), f'{scene}\neffects: {effects}')
+
+
 @pytest.mark.parametrize('effects', [*EFFECTS.values(), *FORCES])
 def test_the_usual_tick_is_straight(effects):
     work = pipeline(

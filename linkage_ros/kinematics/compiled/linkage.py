@@ -123,10 +123,12 @@ class Compiled:
             return
         close = self._closure.position if self._within_limits else self._closure.posed
         if close(*inputs).status is Status.CLOSED:
-            self.paths.append(
-                traced(self._closure, inputs, self.derivatives, self.wanted, self._within_limits)
+            path = traced(
+                self._closure, inputs, self.derivatives, self.wanted, self._within_limits
             )
-            self._functions.append(python_function(self.paths[-1]))
+            if path.outputs:
+                self.paths.append(path)
+                self._functions.append(python_function(path))
 
     def body(self, leave: str) -> Body:
         """
