@@ -58,6 +58,7 @@ from linkage_ros.straight_tick import (
     Straight,
     straight,
     straight_look,
+    straight_share,
     straight_tick,
 )
 
@@ -666,19 +667,41 @@ class Pipeline:
 
     def _ticking(self) -> Callable[[int], Tick]:
         """Return a function of the time, in [ns]: the tick, as one text where it can be."""
-        usual = self.lines[0].whole if len(self.lines) == 1 else None
-        if usual is None:
+        wholes = [whole for line in self.lines if (whole := line.whole) is not None]
+        several = len(self.lines) > 1
+        if len(wholes) < len(self.lines) or (several and self.extras):
             see = [line.see for line in self.lines]
             return lambda now: self._made(now, [look(now) for look in see])
-        (line,) = self.lines
+        if several:
+            return self._together(wholes)
+        (line,), (whole,) = self.lines, wholes
         return straight_tick(
-            usual,
+            whole,
             self._writer((True,)),
             [extra.writer for extra in self.extras],
             Tick,
             self.lines,
             lambda now, crank: self._made(now, [line.look(now, crank)]),
         )
+
+    def _together(self, wholes: Sequence[Straight]) -> Callable[[int], Tick]:
+        """Return the tick of several linkages that are all written as text."""
+        lines = self.lines
+        shares = [straight_share(one, line.look) for one, line in zip(wholes, lines, strict=True)]
+        write = self._writer((True,) * len(lines)).write
+        count = sum(len(whole.joints) for whole in wholes)
+
+        def tick(now: int) -> Tick:
+            positions: list[float] = []
+            rates: list[float] = []
+            efforts: list[float] = []
+            seen = [share(now, positions, rates, efforts) for share in shares]
+            if len(positions) < count:
+                return self._made(now, [_named(one) for one in seen])
+            message = write(now, positions, _of_all(rates, count), _of_all(efforts, count))
+            return Tick(message, (), seen, lines)
+
+        return tick
 
     def remembers(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes what comes after it."""
@@ -740,4 +763,17 @@ def _joined(
     rates = [value for reading in readings for value in reading.rates]
     efforts = [value for reading in readings for value in reading.efforts]
     n = len(positions)
-    return positions, rates if len(rates) == n else [], efforts if len(efforts) == n else []
+    return positions, _of_all(rates, n), _of_all(efforts, n)
+
+
+def _of_all(values: list[float], count: int) -> list[float]:
+    """Return values if there is one for each joint, else none."""
+    return values if len(values) == count else []
+
+
+def _named(seen: Look | Numbers) -> Look | Seen:
+    """Return what a linkage comes to with the names of its parts."""
+    if isinstance(seen, Look):
+        return seen
+    crank, reading, reactions = seen
+    return Seen(CrankState(*crank), Reading(*reading), reactions)

@@ -162,8 +162,11 @@ def straight(
         bound['running'] = angles
         lines.append('last = running.raw')
         leave_unless('last')
-        for i in angles.places:
-            leave_unless(f'{-pi!r} < last[{i}] - {joints[i]} < {pi!r}')
+        lasts = [f'l{i}' for i in range(len(joints))]
+        lines.append(f'{", ".join(lasts)}, = last')
+        near = [f'{-pi!r} < {lasts[i]} - {joints[i]} < {pi!r}' for i in angles.places]
+        if near:
+            leave_unless(' and '.join(near))
         lines.append(f'running.raw = {_tuple(joints)}')
         turns = [f'n{i}' for i in range(len(joints))]
         lines.append(f'{", ".join(turns)}, = running.added')
@@ -192,6 +195,34 @@ def straight_look(
         lines.append('reading = read(now, reading)')
     lines.append(f'return new(Seen, (crank, reading, {_reactions(usual)}))')
     return _function(usual, lines, {'read': read, 'plain': plain})
+
+
+def straight_share(usual: Straight, plain: Plain) -> Callable[..., Any]:
+    """
+    Return what adds a linkage's part to a message of several.
+
+    Parameters
+    ----------
+    usual
+        Its usual tick; its reading is what is published.
+    plain
+        What does the other ticks.
+
+    Returns
+    -------
+    share
+        A function of the time, in [ns], and of the lists of positions, rates and efforts, to which
+        it adds. It returns what the linkage comes to. In a tick that ``plain`` does it adds
+        nothing.
+
+    """
+    groups = {'positions': usual.joints, 'rates': usual.rates, 'efforts': usual.efforts}
+    lines = [
+        f'_, own_positions, own_rates, _, own_efforts = reading = {_reading(usual)}',
+        *[f'all_{name} += own_{name}' for name, group in groups.items() if group],
+        f'return (({_CRANK}), reading, {_reactions(usual)})',
+    ]
+    return _function(usual, lines, {'plain': plain}, ['now', *(f'all_{name}' for name in groups)])
 
 
 def straight_tick(
@@ -240,13 +271,16 @@ def straight_tick(
 
 
 def _function(
-    usual: Straight, lines: Sequence[str], bound: dict[str, Any]
-) -> Callable[[int], Any]:
+    usual: Straight,
+    lines: Sequence[str],
+    bound: dict[str, Any],
+    parameters: Sequence[str] = ('now',),
+) -> Callable[..., Any]:
     # The constructor of a named tuple is a function of Python's; this is one of C's.
     new = tuple.__new__
     types = {'new': new, 'CrankState': CrankState, 'Reading': Reading, 'Seen': Seen}
-    source = '\n    '.join(['def tick(now):', *usual.lines, *lines])
-    function: Callable[[int], Any] = written(source, 'tick', usual.bound | types | bound)
+    source = '\n    '.join([f'def tick({", ".join(parameters)}):', *usual.lines, *lines])
+    function: Callable[..., Any] = written(source, 'tick', usual.bound | types | bound)
     return function
 
 
