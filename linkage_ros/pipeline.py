@@ -168,7 +168,7 @@ class _Wanted:
 
     """
 
-    of: tuple[Any, ...]
+    of: list[Any]
     pick: Callable[[CompiledMotion], Sequence[Sequence[float]]] = field(compare=False)
 
     def __call__(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
@@ -305,9 +305,8 @@ class Line:
             wanted = None
             if 'acceleration' in moved:
                 of = [given[name] for name in self.stages if name in moved]
-                wanted = _Wanted(
-                    (of, self._read_off, context.loads, context.friction), self._ideal
-                )
+                of += [self._read_off, context.loads, context.friction]
+                wanted = _Wanted(of, self._ideal)
             compiled = self.closure.compiled(len(moved.intersection(_KINEMATIC)), wanted)
             # Where forces have no solution a path has less.
             if len({tuple(map(len, path.outputs)) for path in compiled.paths}) == 1:
@@ -355,10 +354,11 @@ class Line:
         if acceleration is None or not all_finite(acceleration.joints):
             return []
         moved = Motion(CrankState((), (), (), 0), *motion, (), (), ())
-        for stage in self._stages[len(_KINEMATIC) :]:
+        _velocity, _acceleration, *stages = self._stages
+        for stage in stages:
             moved = stage(moved)
-        named = not _OF_FORCES.isdisjoint(self.member.effects)
-        return [*self._observed(0, moved)[1:], [*chain(*moved.reactions)] if named else []]
+        reactions = [] if _OF_FORCES.isdisjoint(self._read_off) else [*chain(*moved.reactions)]
+        return [*self._observed(0, moved)[1:], reactions]
 
     def _moved(self, crank: CrankState, position: Position) -> Motion:
         """Return what the mechanism does in a pose."""
@@ -423,11 +423,9 @@ class Line:
         if writer.due is not None and not writer.due(now):
             return b''
         reading = seen.reading
-        of_forces = extra.effect in _OF_FORCES and isinstance(seen, Seen)
-        if writer.of_reading or of_forces:
-            return (
-                b'' if reading is None else writer.write(now, seen if of_forces else None, reading)
-            )
+        forces = seen if extra.effect in _OF_FORCES and isinstance(seen, Seen) else None
+        if writer.of_reading or forces is not None:
+            return b'' if reading is None else writer.write(now, forces, reading)
         _, position, motion, _ = self.looked(seen)
         if motion is not None:
             return b'' if reading is None else writer.write(now, motion, reading)

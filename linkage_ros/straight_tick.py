@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.compiled.linkage import Compiled
 
 _CRANK = ', '.join(CrankState._fields)
+
 Plain = Callable[[int, CrankState | None], Any]
 """Does a tick at a time, in [ns], from the crank on, step by step."""
 
