@@ -28,7 +28,8 @@ a joint's force does no work: its row is the displacement of the one link's poin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import called, facing
@@ -123,11 +124,11 @@ class JointMatrix:
                 )
             else:
                 self._fill_moment(self._sides(given.child, given.parent), column)
-        self._fill = self._filling(self._matrix.reshape(-1), np.array(where, dtype=np.intp))
+        self._fill = partial(_filled, self._matrix, np.array(where, dtype=np.intp))
 
     def at(self, coordinates: Sequence[float], places: Sequence[complex]) -> Array:
         """
-        Return the matrix at a position; the next call overwrites it.
+        Return the matrix at a position.
 
         Parameters
         ----------
@@ -149,16 +150,6 @@ class JointMatrix:
                 values += (sign * force.real, sign * force.imag, sign * moment)
         matrix: Array = called(self._fill, *values)
         return matrix
-
-    def _filling(self, entries: Array, where: NDArray[np.intp]) -> Callable[..., Array]:
-        """Return what fills in what varies, in the order of its places, and returns the matrix."""
-        matrix = self._matrix
-
-        def fill(*values: float) -> Array:
-            entries[where] = values
-            return matrix
-
-        return fill
 
     def _plan_pins(
         self, joints: Sequence[Joint], places: Sequence[int], where: list[int]
@@ -198,3 +189,10 @@ class JointMatrix:
 
     def _entry(self, row: int, column: int) -> int:
         return row * self.size + column
+
+
+def _filled(constant: Array, where: NDArray[np.intp], *values: float) -> Array:
+    """Return a matrix with values in certain places, counted along its rows."""
+    matrix = constant.copy()  # the diagnostics ask for forces from another thread than the ticks
+    matrix.reshape(-1)[where] = values
+    return matrix

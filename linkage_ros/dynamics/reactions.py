@@ -73,7 +73,7 @@ class Reaction(NamedTuple):
 
 class Reactions:
     """
-    The joints of a linkage, as they carry forces. Not for several threads at once.
+    The joints of a linkage, as they carry forces.
 
     Parameters
     ----------
