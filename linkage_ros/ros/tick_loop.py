@@ -328,7 +328,7 @@ class TickLoop:
         counts.ticks += 1
         for number, one in enumerate(tick.seen):
             if not isinstance(one, Look):
-                _, reading = one
+                _, reading, _ = one
                 counts.withheld += reading is None
                 continue
             position = one.position
