@@ -278,16 +278,23 @@ class JointStateWriter:
             )  # fmt: skip
         return alone.pack(ENCAPSULATION, seconds, nanoseconds, self._head, *positions, self._end)
 
-    def straight(self, stamp: str, positions: Sequence[str], rates: Sequence[str]) -> Lines:
+    def straight(
+        self, stamp: str, positions: Sequence[str], rates: Sequence[str], efforts: Sequence[str]
+    ) -> Lines:
         """Return `write` as lines that make ``message`` of expressions; they are short."""
-        alone, with_rates, _, _ = self._layouts
+        alone, with_rates, with_efforts, with_both = self._layouts
         numbers = [*positions, *(('between', *rates) if rates else ())]
+        if efforts:
+            layout = with_both if rates else with_efforts
+            numbers += ['between' if rates else repr(self._no_rates), *efforts]
+        else:
+            layout = with_rates if rates else alone
+            numbers.append(repr(self._end))
         packed = f'{ENCAPSULATION!r}, seconds, nanoseconds, head, {", ".join(numbers)}'
         lines = [
             f'seconds, nanoseconds = divmod({stamp}, {NANOSECONDS})',
-            f'message = pack({packed}, {self._end!r})',
+            f'message = pack({packed})',
         ]
-        layout = with_rates if rates else alone
         return Lines(lines, {'pack': layout.pack, 'head': self._head, 'between': self._between})
 
 

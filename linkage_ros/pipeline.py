@@ -22,9 +22,10 @@ Building puts in only what the scene names; a tick asks no scene.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib import import_module
+from itertools import chain
 from operator import add
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -45,6 +46,7 @@ from linkage_ros.effects.stage import (
 from linkage_ros.effects.turns import all_wrapped, beginnings, Continuous
 from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.joint_state import JointStateWriter, Rejection
+from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.routes import Routes
@@ -56,11 +58,13 @@ from linkage_ros.straight_tick import (
     Straight,
     straight,
     straight_look,
+    straight_share,
     straight_tick,
 )
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Injection
+    from linkage_ros.kinematics.compiled.trace import Motion as CompiledMotion
     from linkage_ros.solvers.solver import Choice
 
 _WITHHOLDING = {'rate_limit', 'dropout', 'delay', 'jitter'}
@@ -69,8 +73,11 @@ _WITHHOLDING = {'rate_limit', 'dropout', 'delay', 'jitter'}
 _GOING_ON = {'backlash'}
 """Effects that go on where a linkage is open."""
 
-_KINEMATIC = {'velocity', 'acceleration'}
-"""Stages of the mechanism that a compiled linkage does itself."""
+_KINEMATIC = ('velocity', 'acceleration')
+"""Stages of the mechanism that a compiled linkage does itself, by its derivatives."""
+
+_OF_FORCES = {'pin_forces'}
+"""Effects whose messages are made of the forces in the joints alone."""
 
 
 class Look(NamedTuple):
@@ -145,6 +152,28 @@ class Extra(NamedTuple):
     topic: str
     message: str
     writer: WriterStage
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """
+    Picks out of a motion the numbers that a scene asks of a compiled linkage.
+
+    Attributes
+    ----------
+    of
+        What it follows from: of two that are equal in it the numbers are the same.
+    pick
+        Picks them.
+
+    """
+
+    of: list[Any]
+    pick: Callable[[CompiledMotion], Sequence[Sequence[float]]] = field(compare=False)
+
+    def __call__(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
+        """Return the numbers, in groups."""
+        return self.pick(motion)
 
 
 class Line:
@@ -241,7 +270,7 @@ class Line:
             for effect in effects
             if effect.stage is not None
         ]
-        self._read_off = (named | {'velocity'}) & computed
+        self._read_off = named & computed
         # Sensors.
         sensors: dict[str, Any] = {
             effect.name: effect.sensor(given[effect.name], context)
@@ -254,10 +283,12 @@ class Line:
         angles = Continuous(self.closure.turning, beginnings(self.closure))
         behind = [*sensors.values(), *broken]
         running = [angles] if behind or not scene.wrapped else []
+        if behind and 'velocity' in computed - named:
+            # It serves between readings, and is not published.
+            self._read_off |= {'velocity'}
+            behind.append(_without_rates)
         if scene.wrapped:
             behind.append(all_wrapped(self.closure.turning))
-        if 'velocity' in computed - named:
-            behind.append(_without_rates)
         self._sensors = [SensorStage.of(sensor) for sensor in (*running, *behind)]
         # Messages.
         self.extras = [
@@ -270,17 +301,25 @@ class Line:
         self._read_behind = partial(self._read, first=len(running)) if behind else None
         self._straight: Straight | None = None
         moved = {effect.name for effect in effects if effect.stage is not None}
-        if self.closure.by_steps and moved <= _KINEMATIC and not self._faults:
-            compiled = self.closure.compiled(len(moved))
-            if compiled.paths:
+        if self.closure.by_steps and moved <= {*_KINEMATIC, *LOADED} and not self._faults:
+            wanted = None
+            if 'acceleration' in moved:
+                of = [given[name] for name in self.stages if name in moved]
+                of += [self._read_off, context.loads, context.friction]
+                wanted = _Wanted(of, self._ideal)
+            compiled = self.closure.compiled(len(moved.intersection(_KINEMATIC)), wanted)
+            # Where forces have no solution a path has less.
+            if len({tuple(map(len, path.outputs)) for path in compiled.paths}) == 1:
                 running_on = angles if running else None
                 self._straight = straight(self.drive, self._drive_stages, compiled, running_on)
 
     @property
     def whole(self) -> Straight | None:
         """Return the usual tick up to what is published, if all of it is written as text."""
-        of_reading = all(extra.writer.of_reading for extra in self.extras)
-        return self._straight if self._read_behind is None and of_reading else None
+        of_seen = all(
+            extra.writer.of_reading or extra.effect in _OF_FORCES for extra in self.extras
+        )
+        return self._straight if self._read_behind is None and of_seen else None
 
     @cached_property
     def see(self) -> Callable[[int], Look | Seen]:
@@ -308,6 +347,18 @@ class Line:
             return Look(crank, position, None, self._read_gap(now))
         motion = self._moved(crank, position)
         return Look(crank, position, motion, self._read(now, self._observed(now, motion)))
+
+    def _ideal(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
+        """Return what an ideal sensor reads of a motion on symbols, and the forces in joints."""
+        acceleration = motion.acceleration
+        if acceleration is None or not all_finite(acceleration.joints):
+            return []
+        moved = Motion(CrankState((), (), (), 0), *motion, (), (), ())
+        _velocity, _acceleration, *stages = self._stages
+        for stage in stages:
+            moved = stage(moved)
+        reactions = [] if _OF_FORCES.isdisjoint(self._read_off) else [*chain(*moved.reactions)]
+        return [*self._observed(0, moved)[1:], reactions]
 
     def _moved(self, crank: CrankState, position: Position) -> Motion:
         """Return what the mechanism does in a pose."""
@@ -357,7 +408,7 @@ class Line:
         """Return all that a linkage came to: of a straight tick it is worked out here."""
         if isinstance(seen, Look):
             return seen
-        crank_numbers, numbers = seen
+        crank_numbers, numbers, _ = seen
         crank = CrankState(*crank_numbers)
         position = self._close(*crank.angles)
         reading = None if numbers is None else Reading(*numbers)
@@ -365,14 +416,16 @@ class Line:
 
     def write_extras(self, now: int, seen: Look | Seen) -> list[bytes]:
         """Return the messages beside the joint states at a time, in [ns]; b'' for none."""
-        return [self._written(extra.writer, now, seen) for extra in self.extras]
+        return [self._written(extra, now, seen) for extra in self.extras]
 
-    def _written(self, writer: WriterStage, now: int, seen: Look | Seen) -> bytes:
+    def _written(self, extra: Extra, now: int, seen: Look | Seen) -> bytes:
+        writer = extra.writer
         if writer.due is not None and not writer.due(now):
             return b''
         reading = seen.reading
-        if writer.of_reading:
-            return b'' if reading is None else writer.write(now, None, reading)
+        forces = seen if extra.effect in _OF_FORCES and isinstance(seen, Seen) else None
+        if writer.of_reading or forces is not None:
+            return b'' if reading is None else writer.write(now, forces, reading)
         _, position, motion, _ = self.looked(seen)
         if motion is not None:
             return b'' if reading is None else writer.write(now, motion, reading)
@@ -616,19 +669,41 @@ class Pipeline:
 
     def _ticking(self) -> Callable[[int], Tick]:
         """Return a function of the time, in [ns]: the tick, as one text where it can be."""
-        usual = self.lines[0].whole if len(self.lines) == 1 else None
-        if usual is None:
+        wholes = [whole for line in self.lines if (whole := line.whole) is not None]
+        several = len(self.lines) > 1
+        if len(wholes) < len(self.lines) or (several and self.extras):
             see = [line.see for line in self.lines]
             return lambda now: self._made(now, [look(now) for look in see])
-        (line,) = self.lines
+        if several:
+            return self._together(wholes)
+        (line,), (whole,) = self.lines, wholes
         return straight_tick(
-            usual,
+            whole,
             self._writer((True,)),
-            [extra.writer.write for extra in self.extras],
+            [extra.writer for extra in self.extras],
             Tick,
             self.lines,
             lambda now, crank: self._made(now, [line.look(now, crank)]),
         )
+
+    def _together(self, wholes: Sequence[Straight]) -> Callable[[int], Tick]:
+        """Return the tick of several linkages that are all written as text."""
+        lines = self.lines
+        shares = [straight_share(one, line.look) for one, line in zip(wholes, lines, strict=True)]
+        write = self._writer((True,) * len(lines)).write
+        count = sum(len(whole.joints) for whole in wholes)
+
+        def tick(now: int) -> Tick:
+            positions: list[float] = []
+            rates: list[float] = []
+            efforts: list[float] = []
+            seen = [share(now, positions, rates, efforts) for share in shares]
+            if len(positions) < count:
+                return self._made(now, [_named(one) for one in seen])
+            message = write(now, positions, _of_all(rates, count), _of_all(efforts, count))
+            return Tick(message, (), seen, lines)
+
+        return tick
 
     def remembers(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes what comes after it."""
@@ -690,4 +765,17 @@ def _joined(
     rates = [value for reading in readings for value in reading.rates]
     efforts = [value for reading in readings for value in reading.efforts]
     n = len(positions)
-    return positions, rates if len(rates) == n else [], efforts if len(efforts) == n else []
+    return positions, _of_all(rates, n), _of_all(efforts, n)
+
+
+def _of_all(values: list[float], count: int) -> list[float]:
+    """Return values if there is one for each joint, else none."""
+    return values if len(values) == count else []
+
+
+def _named(seen: Look | Numbers) -> Look | Seen:
+    """Return what a linkage comes to with the names of its parts."""
+    if isinstance(seen, Look):
+        return seen
+    crank, reading, reactions = seen
+    return Seen(CrankState(*crank), Reading(*reading), reactions)

@@ -16,9 +16,9 @@
 """
 The usual tick of a linkage as one function, written as text: nothing between its formulas.
 
-In the usual tick there is a crank, every loop closes, the linkage is on the path that it was
-compiled for, no published angle jumps, and no effect changes anything. All else, the first tick
-among it, is left to the plain tick. Both have the same bits.
+In the usual tick there is a crank, every loop closes, the linkage and its forces are on the path
+that was compiled, and no published angle jumps. All else, the first tick among it, is left to the
+plain tick. Both have the same bits.
 
 A tick comes once a millisecond, to a processor that has done other things since. What it costs
 then is the memory that it touches: frames, objects, functions. A straight function of local
@@ -38,14 +38,12 @@ from linkage_ros.written import written
 
 if TYPE_CHECKING:
     from linkage_ros.drives.drive import Drive
-    from linkage_ros.effects.stage import DriveStage
+    from linkage_ros.effects.stage import DriveStage, WriterStage
     from linkage_ros.effects.turns import Continuous
     from linkage_ros.joint_state import JointStateWriter
     from linkage_ros.kinematics.compiled.linkage import Compiled
 
 _CRANK = ', '.join(CrankState._fields)
-_LEAVE = f'return plain(now, CrankState({_CRANK}))'
-"""Leaves a tick that is not the usual one."""
 
 Plain = Callable[[int, CrankState | None], Any]
 """Does a tick at a time, in [ns], from the crank on, step by step."""
@@ -61,14 +59,17 @@ class Seen(NamedTuple):
         The crank.
     reading
         What is published; None where nothing is.
+    reactions
+        In pins and sliders, each as a `Reaction` has them; empty where no message has them.
 
     """
 
     crank: CrankState
     reading: Reading | None
+    reactions: tuple[tuple[float, float, float], ...]
 
 
-Numbers: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...]]
+Numbers: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
 """The same as plain tuples."""
 
 
@@ -81,8 +82,10 @@ class Straight(NamedTuple):
     lines, bound
         They make what follows of ``now``, the fields of a `CrankState` by their names among it, or
         leave by ``plain``.
-    joints, rates, accelerations
+    joints, rates, accelerations, efforts
         Of the reading, as expressions; none where they are not called for.
+    reactions
+        The numbers of all, one after the other, as expressions; likewise.
 
     """
 
@@ -91,6 +94,8 @@ class Straight(NamedTuple):
     joints: list[str]
     rates: list[str]
     accelerations: list[str]
+    efforts: list[str]
+    reactions: list[str]
 
 
 def straight(
@@ -109,20 +114,24 @@ def straight(
     drive_stages
         What is between the drive and the crank.
     compiled
-        The linkage; it is closed somewhere.
+        The linkage; it is closed somewhere. It returns, as far as they are called for, what a
+        `Straight` has.
     angles
         Lets the published angles run on; None where they need not.
 
     """
     crank = drive.straight(compiled.driven, 'return plain(now, None)')
     lines, bound = [*crank.lines], {**crank.bound}
-
-    def leave_unless(condition: str) -> None:
-        lines.extend((f'if not ({condition}):', f'    {_LEAVE}'))
-
+    state = f'CrankState({_CRANK})'
     for number, stage in enumerate(drive_stages):
         bound[f'stage{number}'] = stage
-        lines.append(f'{_CRANK} = stage{number}(CrankState({_CRANK}))')
+        lines.append(f'crank = {_CRANK}, = stage{number}({state})')
+        state = 'crank'
+    leave = f'return plain(now, {state})'
+
+    def leave_unless(condition: str) -> None:
+        lines.extend((f'if not ({condition}):', f'    {leave}'))
+
     path, *more_paths = compiled.paths
     inputs = [one.name for one in path.inputs]
     given = iter(inputs)
@@ -132,7 +141,7 @@ def straight(
     ]
     groups = [
         [f'{letter}{i}' for i in range(len(group))]
-        for letter, group in zip('xyz', path.outputs, strict=False)
+        for letter, group in zip('xyzef', path.outputs, strict=False)
     ]
     numbers = [*chain(*groups)]
     if more_paths:
@@ -141,28 +150,29 @@ def straight(
         leave_unless('values is not None')
         lines.append(f'{", ".join(numbers)}, = chain(*values)')
     else:
-        body = compiled.body(_LEAVE)
+        body = compiled.body(leave)
         bound |= body.bound
         lines += body.lines
         outputs = chain(*body.outputs)
         lines += [f'{name} = {output}' for name, output in zip(numbers, outputs, strict=True)]
-    joints, rates, accelerations = groups + [[]] * (3 - len(groups))
-    if accelerations:
-        # Towards a toggle they may overflow alone.
-        lines.append(f'total = {" + ".join(accelerations)}')
-        leave_unless('total - total == 0.0')
-
+    joints, rates, accelerations, efforts, reactions = groups + [[]] * (5 - len(groups))
+    if efforts and drive_stages:
+        # A motor that moves alone, within its play, bears itself.
+        leave_unless("{*getattr(crank, 'free_motors', ())} <= {None}")
     if angles is not None:
         bound['running'] = angles
         lines.append('last = running.raw')
         leave_unless('last')
-        for i in angles.places:
-            leave_unless(f'{-pi!r} < last[{i}] - {joints[i]} < {pi!r}')
+        lasts = [f'l{i}' for i in range(len(joints))]
+        lines.append(f'{", ".join(lasts)}, = last')
+        near = [f'{-pi!r} < {lasts[i]} - {joints[i]} < {pi!r}' for i in angles.places]
+        if near:
+            leave_unless(' and '.join(near))
         lines.append(f'running.raw = {_tuple(joints)}')
         turns = [f'n{i}' for i in range(len(joints))]
         lines.append(f'{", ".join(turns)}, = running.added')
         lines += [f'{joint} += {turn}' for joint, turn in zip(joints, turns, strict=True)]
-    return Straight(lines, bound, joints, rates, accelerations)
+    return Straight(lines, bound, joints, rates, accelerations, efforts, reactions)
 
 
 def straight_look(
@@ -184,14 +194,42 @@ def straight_look(
     lines = [f'crank = new(CrankState, ({_CRANK}))', f'reading = new(Reading, {_reading(usual)})']
     if read is not None:
         lines.append('reading = read(now, reading)')
-    lines.append('return new(Seen, (crank, reading))')
+    lines.append(f'return new(Seen, (crank, reading, {_reactions(usual)}))')
     return _function(usual, lines, {'read': read, 'plain': plain})
+
+
+def straight_share(usual: Straight, plain: Plain) -> Callable[..., Any]:
+    """
+    Return what adds a linkage's part to a message of several.
+
+    Parameters
+    ----------
+    usual
+        Its usual tick; its reading is what is published.
+    plain
+        What does the other ticks.
+
+    Returns
+    -------
+    share
+        A function of the time, in [ns], and of the lists of positions, rates and efforts, to which
+        it adds. It returns what the linkage comes to. In a tick that ``plain`` does it adds
+        nothing.
+
+    """
+    groups = {'positions': usual.joints, 'rates': usual.rates, 'efforts': usual.efforts}
+    lines = [
+        f'_, own_positions, own_rates, _, own_efforts = reading = {_reading(usual)}',
+        *[f'all_{name} += own_{name}' for name, group in groups.items() if group],
+        f'return (({_CRANK}), reading, {_reactions(usual)})',
+    ]
+    return _function(usual, lines, {'plain': plain}, ['now', *(f'all_{name}' for name in groups)])
 
 
 def straight_tick(
     usual: Straight,
     writer: JointStateWriter,
-    extras: Sequence[Callable[[int, Any, Reading], bytes]],
+    extras: Sequence[WriterStage],
     tick: type[Any],
     linkages: Sequence[Any],
     plain: Plain,
@@ -206,7 +244,7 @@ def straight_tick(
     writer
         Of the joint states.
     extras
-        What writes the other messages; they are made of the reading alone.
+        What writes the other messages, of the reading alone or of a `Seen`.
     tick, linkages
         The type of what a tick comes to, and the linkages that it names.
     plain
@@ -214,31 +252,47 @@ def straight_tick(
 
     """
     bound: dict[str, Any] = {'Tick': tick, 'linkages': linkages, 'plain': plain}
-    bound |= {f'write{number}': write for number, write in enumerate(extras)}
-    packed = writer.straight('now', usual.joints, usual.rates)
+    bound |= {f'write{number}': extra.write for number, extra in enumerate(extras)}
+    packed = writer.straight('now', usual.joints, usual.rates, usual.efforts)
     lines = [f'reading = {_reading(usual)}', *packed.lines]
     if extras:
         lines.append('reading = new(Reading, reading)')
-    messages = _tuple([f'write{number}(now, None, reading)' for number in range(len(extras))])
-    seen = f'((({_CRANK}), reading),)'
-    lines.append(f'return new(Tick, (message, {messages}, {seen}, linkages))')
+    seen = f'(({_CRANK}), reading, {_reactions(usual)})'
+    messages = _tuple(
+        [
+            f'write{number}(now, {"None" if extra.of_reading else "seen"}, reading)'
+            for number, extra in enumerate(extras)
+        ]
+    )
+    if 'seen' in messages:
+        lines.append(f'seen = new(Seen, {seen})')
+        seen = 'seen'
+    lines.append(f'return new(Tick, (message, {messages}, ({seen},), linkages))')
     return _function(usual, lines, bound | packed.bound)
 
 
 def _function(
-    usual: Straight, lines: Sequence[str], bound: dict[str, Any]
-) -> Callable[[int], Any]:
+    usual: Straight,
+    lines: Sequence[str],
+    bound: dict[str, Any],
+    parameters: Sequence[str] = ('now',),
+) -> Callable[..., Any]:
     # The constructor of a named tuple is a function of Python's; this is one of C's.
     new = tuple.__new__
     types = {'new': new, 'CrankState': CrankState, 'Reading': Reading, 'Seen': Seen}
-    source = '\n    '.join(['def tick(now):', *usual.lines, *lines])
-    function: Callable[[int], Any] = written(source, 'tick', usual.bound | types | bound)
+    source = '\n    '.join([f'def tick({", ".join(parameters)}):', *usual.lines, *lines])
+    function: Callable[..., Any] = written(source, 'tick', usual.bound | types | bound)
     return function
 
 
 def _reading(usual: Straight) -> str:
-    parts = ', '.join(map(_tuple, (usual.joints, usual.rates, usual.accelerations)))
-    return f'(now, {parts}, ())'
+    groups = usual.joints, usual.rates, usual.accelerations, usual.efforts
+    return f'(now, {", ".join(map(_tuple, groups))})'
+
+
+def _reactions(usual: Straight) -> str:
+    numbers = iter(usual.reactions)
+    return _tuple([_tuple(three) for three in zip(numbers, numbers, numbers, strict=True)])
 
 
 def _tuple(parts: Sequence[str]) -> str:

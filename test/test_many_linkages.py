@@ -82,6 +82,28 @@ def test_each_is_as_it_would_be_alone(load):
             assert list(getattr(state, field)) == [v for p in parts for v in getattr(p, field)]
 
 
+@pytest.mark.parametrize('effects', ['{velocity: {}}', '{}'])
+def test_one_function_of_all_makes_the_same_bytes(load, effects, monkeypatch):
+    turning = 'drive: {constant_rate: {rate: 40.0}}'
+    scene = load(f"""
+linkages:
+  - {{name: left, linkage: four_bar.yaml, {turning}, effects: {{velocity: {{}}}}}}
+  - {{name: middle, linkage: four_bar.yaml, {turning}, effects: {effects}}}
+  - {{name: right, linkage: half_open.yaml, {turning}, effects: {{velocity: {{}}}}}}
+""")
+    whole = Pipeline(scene)
+    monkeypatch.setattr('linkage_ros.pipeline.Line.whole', None)
+    apart = Pipeline(scene)
+    usual = 0
+    for number in range(400):
+        one, other = (work.tick(BEGIN + number * MS) for work in (whole, apart))
+        usual += isinstance(one.seen, list) and not any(hasattr(s, 'reading') for s in one.seen)
+        assert one.message == other.message
+        for look, beside in zip(one.looks, other.looks, strict=True):
+            assert (look.crank, look.reading) == (beside.crank, beside.reading)
+    assert 0 < usual < 400
+
+
 def test_who_has_no_crank_is_left_out(load):
     both = Pipeline(load(TWO))
     assert both.tick(BEGIN).message == b''

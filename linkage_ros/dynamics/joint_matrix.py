@@ -28,10 +28,11 @@ a joint's force does no work: its row is the displacement of the one link's poin
 
 from __future__ import annotations
 
-from cmath import rect
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
+from linkage_ros.kinematics.arithmetic import called, facing
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.structure import Joint
@@ -61,7 +62,7 @@ class Line(NamedTuple):
 
     def direction(self, coordinates: Sequence[float]) -> complex:
         """Return its direction in the frame of the ground, a unit vector."""
-        return rect(1.0, coordinates[self.coordinate]) * self.unit
+        return facing(coordinates[self.coordinate]) * self.unit
 
 
 class JointMatrix:
@@ -123,12 +124,11 @@ class JointMatrix:
                 )
             else:
                 self._fill_moment(self._sides(given.child, given.parent), column)
-        self._where = np.array(where, dtype=np.intp)
-        self._entries = self._matrix.reshape(-1)
+        self._fill = partial(_filled, self._matrix, np.array(where, dtype=np.intp))
 
     def at(self, coordinates: Sequence[float], places: Sequence[complex]) -> Array:
         """
-        Return the matrix at a position; the next call overwrites it.
+        Return the matrix at a position.
 
         Parameters
         ----------
@@ -148,8 +148,8 @@ class JointMatrix:
                 lever = (places[place] - places[center]) / self._scale
                 moment = lever.real * force.imag - lever.imag * force.real
                 values += (sign * force.real, sign * force.imag, sign * moment)
-        self._entries[self._where] = values
-        return self._matrix
+        matrix: Array = called(self._fill, *values)
+        return matrix
 
     def _plan_pins(
         self, joints: Sequence[Joint], places: Sequence[int], where: list[int]
@@ -189,3 +189,10 @@ class JointMatrix:
 
     def _entry(self, row: int, column: int) -> int:
         return row * self.size + column
+
+
+def _filled(constant: Array, where: NDArray[np.intp], *values: float) -> Array:
+    """Return a matrix with values in certain places, counted along its rows."""
+    matrix = constant.copy()  # the diagnostics ask for forces from another thread than the ticks
+    matrix.reshape(-1)[where] = values
+    return matrix

@@ -298,39 +298,6 @@ class Mechanics:
             efforts += (effort,)
         return efforts
 
-    @cached_property
-    def efforts(self) -> Callable[[Position, Velocity, Acceleration], tuple[float, ...]]:
-        """Return what gives the efforts that `drive_efforts` gives, in a straight line."""
-
-        def wanted(motion: CompiledMotion) -> Sequence[Sequence[float]]:
-            position, velocity, acceleration = motion
-            if velocity is None or acceleration is None:
-                return []
-            return [self.drive_efforts(position, velocity, acceleration)]
-
-        fast, plain, units = (
-            Compiled(self.closure, 2, wanted).fast,
-            self.drive_efforts,
-            self._units,
-        )
-
-        def efforts(
-            position: Position, velocity: Velocity, acceleration: Acceleration
-        ) -> tuple[float, ...]:
-            # The inputs, exactly: the unit of the lengths is a power of two.
-            numbers = [
-                coordinate * unit
-                for part in (position, velocity, acceleration)
-                for coordinate, unit in zip(part.state.coordinates[1:], units, strict=False)
-            ]
-            found = fast(*numbers)
-            if found is None:
-                return plain(position, velocity, acceleration)
-            (values,) = found
-            return values
-
-        return efforts
-
     def _spring_pulls(self, places: list[complex], velocities: list[complex]) -> list[float]:
         """Return what each spring pulls its ends together with, in [N]."""
         return [

@@ -39,6 +39,7 @@ from typing import NamedTuple
 
 from linkage_ros.dynamics.joint_matrix import Array, JointMatrix
 from linkage_ros.dynamics.mechanics import Mechanics, resistance, stretched
+from linkage_ros.kinematics.arithmetic import called, is_found, vector
 from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
 from linkage_ros.kinematics.status import Status
@@ -72,7 +73,7 @@ class Reaction(NamedTuple):
 
 class Reactions:
     """
-    The joints of a linkage, as they carry forces. Not for several threads at once.
+    The joints of a linkage, as they carry forces.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ class Reactions:
             one, other = forces[2 * number], forces[2 * number + 1]
             resisting = resistances[number]
             if number in lines:
-                force = complex(-resisting, one) * lines[number].direction(x)
+                force = vector(-resisting, one) * lines[number].direction(x)
                 reaction = Reaction(force.real, force.imag, other * self._scale)
             else:
                 reaction = Reaction(one, other, 0.0 - resisting)
@@ -229,8 +230,8 @@ class Reactions:
                 gaps[2 * number] = offset.real * across.real + offset.imag * across.imag
             else:
                 gaps[2 * number], gaps[2 * number + 1] = offset.real, offset.imag
-        moved = _solved(matrix.T, gaps)
-        if moved is None:
+        moved = called(_turned_solved, matrix, *gaps)
+        if not is_found(moved):
             return None
         shifts: tuple[float, ...] = ()
         for published in self._published:
@@ -249,7 +250,7 @@ class Reactions:
         place, slid = places[self._places[number]], 0.0
         for row, center, sign in self._matrix.sides[number]:
             lever = (place - places[center]) / self._scale
-            way = complex(moved[row], moved[row + 1]) + 1j * moved[row + 2] * lever
+            way = vector(moved[row], moved[row + 1]) + 1j * moved[row + 2] * lever
             slid += sign * (way.real * along.real + way.imag * along.imag)
         return slid
 
@@ -284,8 +285,8 @@ class Reactions:
             number = rubbing.joint
             resistances[number] = resistance(rubbing, v)
             self._rub(sides, number, resistances[number], x, places)
-        forces = _solved(self._matrix.at(x, places), sides)
-        return None if forces is None else (forces, resistances)
+        forces = called(_solved, self._matrix.at(x, places), *sides)
+        return (forces, resistances) if is_found(forces) else None
 
     def _rub(
         self,
@@ -311,13 +312,18 @@ class Reactions:
         sides[row + 2] -= (lever.real * force.imag - lever.imag * force.real) / self._scale
 
 
-def _solved(matrix: Array, sides: list[float]) -> list[float] | None:
+def _solved(matrix: Array, *sides: float) -> list[float] | None:
     """Return the solution of a linear system, if it has one."""
     try:
         found: list[float] = np.linalg.solve(matrix, sides).tolist()
     except np.linalg.LinAlgError:
         return None
     return found if all(map(isfinite, found)) else None
+
+
+def _turned_solved(matrix: Array, *sides: float) -> list[float] | None:
+    """Return the solution of the system that has the transposed matrix."""
+    return _solved(matrix.T, *sides)
 
 
 def _names(joints: Sequence[Joint]) -> tuple[str, ...]:

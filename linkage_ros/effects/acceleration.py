@@ -25,10 +25,10 @@ both stay empty.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Reading, Stage, Writer
+from linkage_ros.kinematics.arithmetic import all_finite
 
 TOPIC = '~/motion'
 MESSAGE = 'trajectory_msgs/msg/JointTrajectory'
@@ -53,7 +53,7 @@ def stage(_parameters: AccelerationParameters, context: Context) -> Stage:
             return motion
         found = acceleration_of(motion.position, velocity, *motion.crank.accelerations)
         # Towards a toggle it grows as the cube of what the rates grow as: it may overflow alone.
-        if not all(map(isfinite, found.joints)):
+        if not all_finite(found.joints):
             return motion
         return motion._replace(acceleration=found)
 

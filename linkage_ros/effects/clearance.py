@@ -44,6 +44,7 @@ from math import hypot
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.kinematics.arithmetic import called, vector
 from linkage_ros.parameters import each, Number
 
 _SMALLEST = 1e-12
@@ -96,14 +97,14 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
         reactions = motion.reactions
         if not reactions:
             return motion
-        sizes = [hypot(fx, fy) for fx, fy, _ in reactions]
-        smallest = _SMALLEST * max(sizes)
+        sizes = [called(hypot, fx, fy) for fx, fy, _ in reactions]
+        smallest = _SMALLEST * called(max, *sizes)
         offsets = list(centred)
         for joint, play in plays:
             size = sizes[joint]
             if size > smallest:
                 fx, fy, _ = reactions[joint]
-                offsets[joint] = complex(-play * (fx / size), -play * (fy / size))
+                offsets[joint] = vector(-play * (fx / size), -play * (fy / size))
         moved = shift_of(motion.position, offsets)
         return motion if moved is None else yielding(motion, moved)
 

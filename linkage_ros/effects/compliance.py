@@ -32,7 +32,6 @@ stay those of the rigid linkage.
 
 from __future__ import annotations
 
-from cmath import rect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -40,6 +39,7 @@ from typing import NamedTuple
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.kinematics.arithmetic import facing
 from linkage_ros.kinematics.structure import Joint
 from linkage_ros.parameters import each, Number
 
@@ -108,7 +108,7 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
         x = position.state.coordinates
         offsets = list(rigid)
         for coordinate, axis, halves, far, softness in bars:
-            along = rect(1.0, x[coordinate]) * axis
+            along = facing(x[coordinate]) * axis
             tension = 0.0
             for joint, half in halves:
                 fx, fy, _ = reactions[joint]

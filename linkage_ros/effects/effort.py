@@ -31,10 +31,10 @@ At a toggle no rates exist, and no effort.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 
 from linkage_ros.drives.drive import Context, CrankBehindPlay
 from linkage_ros.effects.stage import Motion, Stage
+from linkage_ros.kinematics.arithmetic import all_finite
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ PARAMETERS = EffortParameters
 
 def stage(_parameters: EffortParameters, context: Context) -> Stage:
     """Build the stage."""
-    efforts_of = context.mechanics.efforts
+    efforts_of = context.mechanics.drive_efforts
 
     def effort(motion: Motion) -> Motion:
         velocity, acceleration = motion.velocity, motion.acceleration
@@ -55,7 +55,7 @@ def stage(_parameters: EffortParameters, context: Context) -> Stage:
             return motion
         efforts = efforts_of(motion.position, velocity, acceleration)
         # Towards a toggle they grow with the accelerations, and further.
-        if not all(map(isfinite, efforts)):
+        if not all_finite(efforts):
             return motion
         return motion._replace(efforts=efforts)
 

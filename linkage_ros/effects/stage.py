@@ -114,7 +114,12 @@ PUBLISHED_WITH = {'acceleration': ('velocity',)}
 """What to name an effect is to name too: a trajectory without rates is of no use."""
 
 LOADED = ('effort', 'pin_forces', 'compliance', 'clearance')
-"""Effects to which masses, loads and friction matter."""
+"""
+Effects to which masses, loads and friction matter.
+
+Their stages are compiled with the linkage: they take functions from `kinematics.arithmetic`, and
+call those that know numbers alone by its `called`.
+"""
 
 
 def module_of(effect: str) -> ModuleType:

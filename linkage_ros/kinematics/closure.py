@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Batch
     from linkage_ros.kinematics.compiled.linkage import Compiled
     from linkage_ros.kinematics.compiled.solve import Solver
+    from linkage_ros.kinematics.compiled.trace import Wanted
     from linkage_ros.kinematics.follower import Follower
     from numpy.typing import ArrayLike
 
@@ -285,7 +286,7 @@ class Closure:
         self.bounds = Bounds(linkage)
         """The limits between which its joints stay."""
         self._keep_limits()
-        self._compiled: dict[int, Compiled] = {}
+        self._compiled: list[Compiled] = []
 
     def __repr__(self) -> str:
         counts = ((len(self.input_names), 'input'), (len(self.joint_names), 'joint'))
@@ -415,23 +416,26 @@ class Closure:
             step.accelerations(pose, rate, position.state, velocity.state, changes)
         return Acceleration(self._joints(a), changes, self)
 
-    def compiled(self, derivatives: int) -> Compiled:
+    def compiled(self, derivatives: int, wanted: Wanted | None = None) -> Compiled:
         """
-        Return the linkage compiled for its published joints; it is compiled once.
+        Return the linkage compiled; for the same numbers it is compiled once.
 
         Parameters
         ----------
         derivatives
             Positions (0), velocities too (1), and accelerations (2).
+        wanted
+            Which numbers of these; all published joints if not given.
 
         """
-        from linkage_ros.kinematics.compiled.linkage import (  # local import: it traces closures
-            Compiled,
-        )
+        from linkage_ros.kinematics.compiled import linkage, trace  # local import: they trace
 
-        if derivatives not in self._compiled:
-            self._compiled[derivatives] = Compiled(self, derivatives)
-        return self._compiled[derivatives]
+        wanted = wanted or trace.joints
+        for compiled in self._compiled:
+            if (compiled.derivatives, compiled.wanted) == (derivatives, wanted):
+                return compiled
+        self._compiled.append(linkage.Compiled(self, derivatives, wanted))
+        return self._compiled[-1]
 
     def solve(
         self,

@@ -146,6 +146,7 @@ def _spin(
     with _no_garbage_in_ticks():
         if autostart and node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
             return EXIT_INCOMPLETE
+        gc.freeze()  # what was built for the ticks, too
         return _attend(node, executor, stop, deadline, view)
 
 

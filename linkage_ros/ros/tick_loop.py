@@ -23,7 +23,7 @@ for another thread; what it has seen stands in its counts, for others to read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from threading import Event, Thread
 from time import monotonic_ns
@@ -195,43 +195,59 @@ class TickLoop:
         """Return the pipeline, as it was built last."""
         return self._pipeline
 
-    def _offer(self, message: bytes, info: dict[str, Any], now: int) -> bool:
-        """Record a message and offer it to the pipeline; return whether it was good."""
-        if self._own is not None and self._own(message):
-            return False
-        counts = self.counts
-        counts.received += 1
-        if number := info.get('publication_sequence_number'):
-            if 0 < self._sequence < number:  # else it is the first, or of a publisher begun anew
-                counts.missed += number - self._sequence - 1
-            self._sequence = number
-        recorder, topic = self.recorder, self.topics.crank  # another thread takes it away
-        if recorder is not None and topic is not None:
-            recorder.offer(topic, now, info['source_timestamp'], message)
-        rejection = self._pipeline.offer(message, now)
-        if rejection is None:
-            return True
-        if rejection is Rejection.MISSING:
-            counts.ignored += 1
-        else:
-            counts.rejected[rejection] += 1
-        return False
+    def _take_messages(self, clock: Callable[[], int] | None, tick_for_each: bool) -> None:
+        """
+        Take the messages that have come: record, count and offer each to the pipeline.
 
-    def _drain(self, clock: Callable[[], int] | None) -> Iterator[_Taken]:
-        """Yield the messages that have come; `_last_time` is when each was taken."""
-        end = monotonic_ns() + _LONGEST_DRAIN
+        Parameters
+        ----------
+        clock
+            Returns the time when a message is taken, in [ns]; absent, that is `_last_time`, which
+            is set to it.
+        tick_for_each
+            Whether to tick for each good one, at its stamp.
+
+        """
+        counts, pipeline = self.counts, self._pipeline
+        good, end = 0, 0
         for _ in range(self._depth):
             if (taken := self._take()) is None:
-                return
+                break
             if clock is not None:
                 time = clock()
                 # A message may be younger than the tick that takes it.
                 if self.injection is not None:
                     time = self.injection.clock(time)
-                self._last_time = max(self._last_time, time)
-            yield taken
-            if monotonic_ns() > end:
-                return
+                if time > self._last_time:
+                    self._last_time = time
+            now = self._last_time
+            message, info = taken
+            if self._own is None or not self._own(message):
+                counts.received += 1
+                if number := info.get('publication_sequence_number'):
+                    if 0 < self._sequence < number:  # else the first, or of a publisher begun anew
+                        counts.missed += number - self._sequence - 1
+                    self._sequence = number
+                recorder, topic = self.recorder, self.topics.crank  # another thread takes it away
+                if recorder is not None and topic is not None:
+                    recorder.offer(topic, now, info['source_timestamp'], message)
+                rejection = pipeline.offer(message, now)
+                if rejection is None:
+                    good += 1
+                    if tick_for_each:
+                        self._tick(now, pipeline.newest_stamp)
+                elif rejection is Rejection.MISSING:
+                    counts.ignored += 1
+                else:
+                    counts.rejected[rejection] += 1
+            if not end:
+                end = monotonic_ns() + _LONGEST_DRAIN
+            elif monotonic_ns() > end:
+                break
+        if good:
+            used = good if tick_for_each else pipeline.newly_used()
+            counts.used += used
+            counts.superseded += good - used
 
     def tick_at(self, now: int, clock: Callable[[], int] | None = None) -> None:
         """
@@ -250,13 +266,7 @@ class TickLoop:
         if now < self._last_time or self.reset_requested:
             self._rebuild(now)
         self._last_time = now
-        good = 0
-        for taken in self._drain(clock):
-            good += self._offer(*taken, self._last_time)
-        if good:
-            used = self._pipeline.newly_used()
-            self.counts.used += used
-            self.counts.superseded += good - used
+        self._take_messages(clock, tick_for_each=False)
         self._tick(self._last_time, now)
 
     def tick_samples(self, now: int, clock: Callable[[], int] | None = None) -> None:
@@ -266,10 +276,7 @@ class TickLoop:
         if now < self._last_time or self.reset_requested:
             self._rebuild(now)
         self._last_time = now
-        for taken in self._drain(clock):
-            if self._offer(*taken, self._last_time):
-                self.counts.used += 1
-                self._tick(self._last_time, self._pipeline.newest_stamp)
+        self._take_messages(clock, tick_for_each=True)
 
     def _rebuild(self, now: int) -> None:
         """Build the pipeline anew, since time has jumped back or one has asked."""
@@ -321,7 +328,7 @@ class TickLoop:
         counts.ticks += 1
         for number, one in enumerate(tick.seen):
             if not isinstance(one, Look):
-                _, reading = one
+                _, reading, _ = one
                 counts.withheld += reading is None
                 continue
             position = one.position

@@ -31,6 +31,7 @@ from linkage_ros.dynamics.reactions import Reactions
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Mass, RevoluteJoint, Slider
 from linkage_ros.kinematics.status import Status
+import numpy as np
 import pytest
 
 from .loaded import closed, four_bar, loads_of, scotch_yoke, shipped, slope, STATES
@@ -252,6 +253,27 @@ def test_a_slider_named_as_its_pin():
     )
     names = Reactions(Mechanics(Closure(renamed))).names
     assert names == ('O2', 'A', 'B', 'B/ground')
+
+
+def test_what_another_asks_for_meanwhile_changes_no_force(monkeypatch):
+    closure = Closure(shipped('four_bar'))
+    reactions = Reactions(Mechanics(closure, Loads((0.0, -10.0))))
+
+    def forces(angle):
+        position = closure.position(angle)
+        velocity = closure.velocity(position, 0.0)
+        return reactions.solve(position, velocity, closure.acceleration(position, velocity, 0.0))
+
+    solve, alone = np.linalg.solve, forces(0.3)
+
+    def interrupted(matrix, sides):
+        monkeypatch.setattr(np.linalg, 'solve', solve)
+        assert forces(1.9) != alone
+        return solve(matrix, sides)
+
+    monkeypatch.setattr(np.linalg, 'solve', interrupted)
+    assert forces(0.3) == alone
+    assert np.linalg.solve is solve
 
 
 def test_nothing_where_no_rates_exist():

@@ -131,7 +131,7 @@ def test_at_a_toggle_there_is_none():
 
 def test_what_is_no_number_is_left_out():
     within = context(FOUR_BAR)
-    vars(within)['mechanics'] = type('Overflowing', (), {'efforts': lambda *_: (1e400,)})()
+    vars(within)['mechanics'] = type('Overflowing', (), {'drive_efforts': lambda *_: (1e400,)})()
     assert moved(within, (1.0, 1.0, 1.0), {'effort': ()}).efforts == ()
 
 

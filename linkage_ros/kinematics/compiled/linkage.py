@@ -81,7 +81,7 @@ class Compiled:
     ----------
     driven
         How many inputs it has.
-    derivatives
+    derivatives, wanted
         As given.
     paths
         The ways that the steps take where the linkage is closed. There is more than one where they
@@ -103,7 +103,7 @@ class Compiled:
         self._within_limits = within_limits
         self.driven = len(closure.linkage.inputs)
         self.derivatives = derivatives
-        self._wanted = wanted
+        self.wanted = wanted
         self.paths: list[Path] = []
         self._functions: list[Callable[..., Values | None]] = []
         self._bodies: dict[str, Body] = {}
@@ -123,10 +123,12 @@ class Compiled:
             return
         close = self._closure.position if self._within_limits else self._closure.posed
         if close(*inputs).status is Status.CLOSED:
-            self.paths.append(
-                traced(self._closure, inputs, self.derivatives, self._wanted, self._within_limits)
+            path = traced(
+                self._closure, inputs, self.derivatives, self.wanted, self._within_limits
             )
-            self._functions.append(python_function(self.paths[-1]))
+            if path.outputs:
+                self.paths.append(path)
+                self._functions.append(python_function(path))
 
     def body(self, leave: str) -> Body:
         """
@@ -167,7 +169,7 @@ class Compiled:
         given = list(zip(*[iter(numbers)] * self.driven, strict=True))
         motion = moved(self._closure, given, self._within_limits)
         status, gap = motion.position.status, motion.position.gap
-        found = tuple(tuple(group) for group in self._wanted(motion))
+        found = tuple(tuple(group) for group in self.wanted(motion))
         groups = len(self.paths[0].outputs) if self.paths else 1 + self.derivatives
         return Answer(status, gap, (*found, *((),) * (groups - len(found))))
 

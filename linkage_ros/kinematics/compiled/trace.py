@@ -107,12 +107,10 @@ def traced(
     motion = moved(closure, given, within_limits)
     if motion.position.status is not Status.CLOSED:
         raise ValueError(f'{list(at)}: the linkage is {motion.position.status.value} there')
-    return Path(
-        tuple(symbol.operation for group in given for symbol in group),
-        tuple(tape.decisions),
-        tuple(tuple(number_of(n) for n in group) for group in wanted(motion)),
-        tape,
-    )
+    # What is wanted may decide, too.
+    outputs = tuple(tuple(number_of(n) for n in group) for group in wanted(motion))
+    inputs = tuple(symbol.operation for group in given for symbol in group)
+    return Path(inputs, tuple(tape.decisions), outputs, tape)
 
 
 def moved(closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool = True) -> Motion:
