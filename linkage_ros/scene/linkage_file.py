@@ -21,6 +21,7 @@ from math import inf
 from typing import Any
 
 from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.files.section import Section
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.limit_checks import check_limits
 from linkage_ros.kinematics.linkage import (
@@ -34,19 +35,18 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
-from linkage_ros.scene.section import Section
 
 _KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose', 'masses')
 _MOST_LINKS, _MOST_POINTS = 400, 10_000
 """More links than these, and points of all links, are no machine's; a check takes seconds then."""
 
-_FARTHEST = 1e9
+FARTHEST = 1e9
 """Coordinates beyond this, in [m], are no machine's; below it no square overflows."""
 
-_HEAVIEST = 1e12
+HEAVIEST = 1e12
 """Masses beyond this, in [kg], and moments of inertia, in [kg·m²], are no machine's either."""
 
-_STRONGEST = 1e12
+STRONGEST = 1e12
 """Nor are efforts beyond this, in [N·m] or [N]."""
 
 
@@ -84,7 +84,7 @@ def _linkage(content: Section) -> Linkage:
     points = {}
     for name in links:
         link = links.section(name)
-        points[name] = {point: link.point(point, most=_FARTHEST) for point in link}
+        points[name] = {point: link.point(point, most=FARTHEST) for point in link}
 
     count = sum(map(len, points.values()))
     if count > _MOST_POINTS:
@@ -139,23 +139,23 @@ def _input(content: Section) -> Input:
 
 def _limits(content: Section) -> Limits:
     """Return what a joint says of its limits; `kinematics.checks` says whether they can be."""
-    low, high = content.interval('limits', most=_FARTHEST)
+    low, high = content.interval('limits', most=FARTHEST)
     return Limits(
         low,
         high,
-        content.number('velocity', inf, above=0.0, most=_FARTHEST, unit='rad/s or m/s')
+        content.number('velocity', inf, above=0.0, most=FARTHEST, unit='rad/s or m/s')
         if 'velocity' in content
         else inf,
-        content.number('effort', inf, above=0.0, most=_STRONGEST, unit='N·m or N')
+        content.number('effort', inf, above=0.0, most=STRONGEST, unit='N·m or N')
         if 'effort' in content
         else inf,
     )
 
 
 def _pose(content: Section) -> Pose:
-    inputs = tuple(content.numbers('inputs', most=_FARTHEST))
+    inputs = tuple(content.numbers('inputs', most=FARTHEST))
     points = content.section('points', required=False)
-    pose = Pose(inputs, {name: points.point(name, most=_FARTHEST) for name in points})
+    pose = Pose(inputs, {name: points.point(name, most=FARTHEST) for name in points})
     content.finish()
     return pose
 
@@ -172,9 +172,9 @@ def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
             )
         link = content.section(name)
         masses[name] = Mass(
-            link.number('mass', above=0.0, most=_HEAVIEST, unit='kg'),
-            link.point('center', most=_FARTHEST),
-            link.number('inertia', least=0.0, most=_HEAVIEST, unit='kg·m²'),
+            link.number('mass', above=0.0, most=HEAVIEST, unit='kg'),
+            link.point('center', most=FARTHEST),
+            link.number('inertia', least=0.0, most=HEAVIEST, unit='kg·m²'),
         )
         link.finish()
     return masses
@@ -186,11 +186,9 @@ def _slider(content: Section) -> Slider:
         content.text('point'),
         content.text('along'),
         content.text('through'),
-        content.point('direction', most=_FARTHEST),
+        content.point('direction', most=FARTHEST),
         block,
-        content.number('angle', 0.0, least=-_FARTHEST, most=_FARTHEST, unit='rad')
-        if block
-        else 0.0,
+        content.number('angle', 0.0, least=-FARTHEST, most=FARTHEST, unit='rad') if block else 0.0,
     )
     content.finish(('block', 'angle'))
     return slider
@@ -246,7 +244,7 @@ def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
 
 def _four_bar(content: Section) -> dict[str, Any]:
     """Write out crank a, coupler b, rocker c and ground d."""
-    a, b, c, d = (content.number(side, above=0.0, most=_FARTHEST, unit='m') for side in 'abcd')
+    a, b, c, d = (content.number(side, above=0.0, most=FARTHEST, unit='m') for side in 'abcd')
     side = content.choice('assembly', ('left', 'right'), 'left')
     return {
         'links': {
@@ -266,8 +264,8 @@ def _four_bar(content: Section) -> dict[str, Any]:
 
 def _inverted_slider_crank(content: Section) -> dict[str, Any]:
     """Write out crank a and the place of the swivel, from the crank's pivot."""
-    a = content.number('a', above=0.0, most=_FARTHEST, unit='m')
-    swivel = content.point('swivel', most=_FARTHEST)
+    a = content.number('a', above=0.0, most=FARTHEST, unit='m')
+    swivel = content.point('swivel', most=FARTHEST)
     if swivel == (0.0, 0.0):
         raise content.error(
             'swivel', "[0, 0] is the crank's pivot", 'give the swivel another place'

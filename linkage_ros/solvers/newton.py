@@ -590,8 +590,8 @@ class NewtonClosure(Solver):
                 plan.append(NewtonDyad(next(loops), tolerance, tolerance / self.scale))
             else:
                 from linkage_ros.solvers.early_stopping import (
-                    early_stopping,  # local import: it loads numpy
-                )
+                    early_stopping,
+                )  # local import: numpy
 
                 next(loops)
                 plan.append(early_stopping(step, tolerance))

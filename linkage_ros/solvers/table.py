@@ -166,10 +166,7 @@ class TableClosure(Solver):
         self.proven = self.proven_rate = inf
         if knots is None:
             from linkage_ros.solvers.loops import LoopFinder  # local import: to prove only
-            from linkage_ros.solvers.proof import (
-                knots_for,  # local import: to prove only
-                TableRequest,  # local import: to prove only
-            )
+            from linkage_ros.solvers.proof import knots_for, TableRequest  # local import: likewise
 
             assert tolerance is not None
             finder = LoopFinder(linkage, self.structure, self._known)

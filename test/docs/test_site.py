@@ -25,8 +25,7 @@ from urllib.parse import unquote, urlsplit
 
 from linkage_ros.cli.main import COMMANDS
 from linkage_ros.cli.parameter_tables import REGISTRIES
-from linkage_ros.scene.linkage_schema import linkage_schema
-from linkage_ros.scene.scene_schema import scene_schema
+from linkage_ros.scene.schema import linkage_schema, scene_schema
 import pytest
 
 from .blocks import ROOT

@@ -30,7 +30,7 @@ from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import Way
 from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.stand_in import scene_text_for
+from linkage_ros.scene.linkage_text import scene_text_for
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 

@@ -79,7 +79,7 @@ def moving(file):
 def moving_text(text):
     """Return the pipeline of a linkage that is the text of a file, driven as a file alone is."""
     from linkage_ros.scene.linkage_file import read_linkage
-    from linkage_ros.scene.stand_in import scene_text_for
+    from linkage_ros.scene.linkage_text import scene_text_for
     from linkage_ros.scene.yaml_file import parse_yaml
 
     scene = scene_text_for(read_linkage(parse_yaml(text.encode(), 'it')), 'linkage.yaml')

@@ -23,7 +23,7 @@ import sys
 import linkage_ros
 from linkage_ros.errors import LinkageError
 from linkage_ros.synthesis import workers
-from linkage_ros.synthesis.workers import results_of
+from linkage_ros.synthesis.study import results_of
 import pytest
 
 distributed = pytest.importorskip('distributed')

@@ -36,9 +36,16 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from linkage_ros.kinematics.batch import Array, Complex
-from linkage_ros.synthesis.path.aim import Aim, Fitted
-from linkage_ros.synthesis.path.arcs import along, fractions, resampled, theta_at
-from linkage_ros.synthesis.path.model import coupler_directions, diagonals
+from linkage_ros.synthesis.path.curves import (
+    Aim,
+    along,
+    coupler_directions,
+    diagonals,
+    Fitted,
+    fractions,
+    resampled,
+    theta_at,
+)
 from linkage_ros.synthesis.study import Problem
 import numpy as np
 
