@@ -589,12 +589,10 @@ class NewtonClosure(Solver):
             elif isinstance(groups[group], Dyad):
                 plan.append(NewtonDyad(next(loops), tolerance, tolerance / self.scale))
             else:
-                from linkage_ros.solvers.early_stopping import (
-                    early_stopping,
-                )  # local import: numpy
+                from linkage_ros.solvers import early_stopping  # local import: it loads numpy
 
                 next(loops)
-                plan.append(early_stopping(step, tolerance))
+                plan.append(early_stopping.early_stopping(step, tolerance))
         return tuple(plan), iterates
 
     def _orientations(self, x: list[float]) -> tuple[float, ...]:
