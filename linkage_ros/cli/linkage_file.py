@@ -24,14 +24,14 @@ from math import degrees, isfinite, pi, radians, remainder, tau
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_file import read_closure
 from linkage_ros.scene.yaml_file import read_yaml
 
 
 def open_linkage(file: str) -> Closure:
     """Read a linkage file, ready to be solved."""
     content, _ = read_yaml(file)
-    return Closure(read_linkage(content))
+    return read_closure(content)
 
 
 def add_at(parser: argparse.ArgumentParser, text: str) -> None:

@@ -56,8 +56,20 @@ def looks_like_linkage(content: Section) -> bool:
 
 
 def read_linkage(content: Section) -> Linkage:
+    """Read a linkage and prove that it closes; errors as of `read_closure`."""
+    return read_closure(content).linkage
+
+
+def read_closure(content: Section, *, publish_inputs: bool = False) -> Closure:
     """
     Read a linkage and prove that it closes.
+
+    Parameters
+    ----------
+    content
+        The file.
+    publish_inputs
+        Whether its input joints are published too, before the others.
 
     Raises
     ------
@@ -68,17 +80,17 @@ def read_linkage(content: Section) -> Linkage:
     for shorthand, expand in _SHORTHANDS.items():
         if shorthand in content:
             short = content.section(shorthand)
-            written_out = _limited(expand(short), short)
+            written_out = Section(content.file, '', _limited(expand(short), short))
             short.finish()
             content.finish()
-            return _closable(content, _linkage(Section(content.file, '', written_out)), shorthand)
+            return _closed(content, _linkage(written_out, publish_inputs), shorthand)
     for key in _KEYS:
         content.taken(key)
     content.finish(tuple(_SHORTHANDS))
-    return _closable(content, _linkage(content))
+    return _closed(content, _linkage(content, publish_inputs))
 
 
-def _linkage(content: Section) -> Linkage:
+def _linkage(content: Section, publish_inputs: bool) -> Linkage:
     links = content.section('links')
     _bound(content, links, 'links', _MOST_LINKS)
     points = {}
@@ -108,11 +120,14 @@ def _linkage(content: Section) -> Linkage:
     for driven in inputs:
         if driven.joint in joints:
             raise joints.error(driven.joint, 'is the input joint', 'publish the dependent joints')
+    published = {name: _joint(joints.section(name)) for name in joints}
+    if publish_inputs:
+        published = {driven.joint: _published(driven) for driven in inputs} | published
     return Linkage(
         points,
         inputs,
         sides,  # type: ignore[arg-type]  # the choice above is the Literal
-        {name: _joint(joints.section(name)) for name in joints},
+        published,
         {name: _slider(sliders.section(name)) for name in sliders},
         tuple(content.texts('traced')),
         _pose(content.section('pose')) if 'pose' in content else None,
@@ -135,6 +150,12 @@ def _input(content: Section) -> Input:
         driven = Input(content.text('joint'), *ends, limits=limits)
     content.finish(('slider',))
     return driven
+
+
+def _published(driven: Input) -> RevoluteJoint | SlideJoint:
+    if driven.slider:
+        return SlideJoint(driven.slider)
+    return RevoluteJoint(driven.parent, driven.child)
 
 
 def _limits(content: Section) -> Limits:
@@ -205,7 +226,7 @@ def _joint(content: Section) -> RevoluteJoint | SlideJoint:
     return joint
 
 
-def _closable(content: Section, linkage: Linkage, shorthand: str = '') -> Linkage:
+def _closed(content: Section, linkage: Linkage, shorthand: str = '') -> Closure:
     try:
         closure = Closure(linkage)
         if len(linkage.inputs) == 1 and not closure.closing_ranges:
@@ -221,7 +242,7 @@ def _closable(content: Section, linkage: Linkage, shorthand: str = '') -> Linkag
             # Of what a shorthand stands for, it says the limits alone itself.
             where = f'{shorthand}.{where}' if where.endswith('.limits') else shorthand
         raise content.error(where, error.reason, error.remedy) from None
-    return linkage
+    return closure
 
 
 def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:

@@ -237,13 +237,13 @@ _SAME = 1e-9
 """What a start may lie beyond the end of a range and count as it, in [rad] or of a length."""
 
 
-def scene_text_for(linkage: Linkage, file: str) -> str:
+def scene_text_for(closure: Closure, file: str) -> str:
     """
     Return the text of the scene that a linkage stands for.
 
     Parameters
     ----------
-    linkage
+    closure
         The linkage.
     file
         Name of its file, as the scene is to give it.
@@ -258,7 +258,7 @@ def scene_text_for(linkage: Linkage, file: str) -> str:
         '# What a linkage file alone stands for where a scene is expected.\n'
         f'linkage: {file}\n'
         'rate: 1000\n'
-        f'drive: {_drive(Closure(linkage))}\n'
+        f'drive: {_drive(closure)}\n'
         'effects: {velocity: {}}\n'
     )
 

@@ -31,10 +31,9 @@ from linkage_ros.effects.stage import EFFECTS, in_order, module_of
 from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
 from linkage_ros.faults.fault import Fault, FAULTS
 from linkage_ros.files.section import Section
-from linkage_ros.kinematics.checks import check
-from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.parameters import declared, Parts, read_parameters
-from linkage_ros.scene.linkage_file import looks_like_linkage, read_linkage
+from linkage_ros.scene.linkage_file import looks_like_linkage, read_closure
 from linkage_ros.scene.scene import (
     AS_THE_RUN_GOES,
     LEASTS,
@@ -136,7 +135,7 @@ def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
     from linkage_ros.scene.linkage_text import scene_text_for  # local import: not for scenes
 
     try:
-        text = scene_text_for(read_linkage(content), LINKAGE_FILE).encode()
+        text = scene_text_for(read_closure(content), LINKAGE_FILE).encode()
     except DefinitionError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
 
@@ -297,8 +296,6 @@ def _member(
     folder: str,
     trust_effects: bool,
 ) -> Member:
-    linkage = read_linkage(linkage_content)
-
     def where(key: str) -> Section:
         return own if key in own else scene
 
@@ -315,9 +312,9 @@ def _member(
     published = where('publish_input').flag(
         'publish_input', drive != 'topic' or 'effort' in effects
     )
-    if published:
-        linkage = _with_inputs(linkage, linkage_content)
-    elif 'effort' in effects:
+    closure = read_closure(linkage_content, publish_inputs=published)
+    linkage = closure.linkage
+    if 'effort' in effects and not published:
         raise effects.error(
             'effort', 'is that of the input joint', 'set publish_input: true, or name pin_forces'
         )
@@ -335,6 +332,7 @@ def _member(
     member = Member(
         name=name,
         linkage=linkage,
+        closure=closure,
         drive=(
             drive,
             read_parameters(
@@ -364,22 +362,6 @@ def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
         return {name: module_of(name).PARAMETERS for name in named}
     except DefinitionError as error:
         raise effects.error(error.where, error.reason, error.remedy) from None
-
-
-def _with_inputs(linkage: Linkage, content: Section) -> Linkage:
-    """Return a linkage that publishes its input joints too, before the others."""
-    inputs: dict[str, RevoluteJoint | SlideJoint] = {
-        given.joint: SlideJoint(given.slider)
-        if given.slider
-        else RevoluteJoint(given.parent, given.child)
-        for given in linkage.inputs
-    }
-    changed = replace(linkage, joints=inputs | dict(linkage.joints))
-    try:
-        check(changed)
-    except DefinitionError as error:
-        raise content.error(error.where, error.reason, error.remedy) from None
-    return changed
 
 
 def _silent(content: Section, linkage: Linkage) -> bool:

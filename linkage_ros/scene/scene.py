@@ -25,6 +25,7 @@ from linkage_ros.bag.writing.storage import COMPRESSIONS, Storage
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.faults.fault import Fault
 from linkage_ros.files.section import Section
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.parameters import choice, number, Parts, whole
 
@@ -137,8 +138,9 @@ class Member:
     name
         Its name, which its joints have before their own with an underscore between; '' where the
         scene has one linkage only.
-    linkage
-        The linkage. Where its input joints are published, they are the first of its joints.
+    linkage, closure
+        The linkage, as it is and as it closes. Where its input joints are published, they are the
+        first of its joints.
     drive
         The drive's name, and its parameters.
     effects
@@ -161,6 +163,7 @@ class Member:
 
     name: str
     linkage: Linkage
+    closure: Closure = field(compare=False, repr=False)
     drive: tuple[str, Any]
     effects: Mapping[str, Any]
     loads: Loads | None

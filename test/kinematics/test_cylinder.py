@@ -127,7 +127,7 @@ def test_one_that_starts_behind_its_pin_stays_there():
     said = cylinder(pose='pose: {inputs: [-1.0]}')
     (one,) = said.input_ranges
     assert one.highest < 0.0
-    assert 'mean: -' in scene_text_for(said.linkage, 'c.yaml')
+    assert 'mean: -' in scene_text_for(said, 'c.yaml')
 
 
 def test_limits_say_the_side_too():
