@@ -23,6 +23,7 @@ Schema.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, Field, field, fields, is_dataclass, MISSING
 from math import inf
@@ -54,7 +55,7 @@ CHARACTER = r'[^\u0000-\u001f\u007f-\u00a0\u2028\u2029]'
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class Kind(ABC):
     """
     What a parameter is.
 
@@ -68,17 +69,17 @@ class Kind:
     meaning: str
     unit: ClassVar[str] = ''
 
+    @abstractmethod
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
         """Read the value of a key; arguments and errors as of `read_parameters`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def schema(self) -> Schema:
         """Return the JSON Schema of the value."""
-        raise NotImplementedError
 
+    @abstractmethod
     def values(self) -> str:
         """Return which values there are, for a table."""
-        raise NotImplementedError
 
     def shown(self, default: Any) -> str:
         """Return a default, for a table."""

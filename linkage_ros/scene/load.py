@@ -31,6 +31,7 @@ from linkage_ros.effects.stage import EFFECTS, in_order, module_of
 from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
 from linkage_ros.faults.fault import Fault, FAULTS
 from linkage_ros.files.section import Section
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.parameters import declared, Parts, read_parameters
 from linkage_ros.scene.linkage_file import looks_like_linkage, read_closure
@@ -135,7 +136,8 @@ def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
     from linkage_ros.scene.linkage_text import scene_text_for  # local import: not for scenes
 
     try:
-        text = scene_text_for(read_closure(content), LINKAGE_FILE).encode()
+        closure = read_closure(content, publish_inputs=True)
+        text = scene_text_for(closure, LINKAGE_FILE).encode()
     except DefinitionError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
 
@@ -143,9 +145,10 @@ def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
         where.text('linkage')
         return content, data
 
-    return _scene(
-        name, parse_yaml(text, f'{content.file}, as a scene'), open_linkage, text, folder
-    )
+    scene = parse_yaml(text, f'{content.file}, as a scene')
+    # A drive moves one input, which is published then; several come from a topic.
+    closed = closure if len(closure.linkage.inputs) == 1 else None
+    return _scene(name, scene, open_linkage, text, folder, closed=closed)
 
 
 def parse_scene(
@@ -224,6 +227,7 @@ def _scene(
     seed: int | None = None,
     *,
     trust_effects: bool = True,
+    closed: Closure | None = None,
 ) -> Scene:
     files = {SCENE_FILE: scene_bytes}
     members: list[Member] = []
@@ -245,7 +249,9 @@ def _scene(
             entry.finish(_OF_A_MEMBER)
     else:
         linkage_content, files[LINKAGE_FILE] = open_linkage(content)
-        members.append(_member('', linkage_content, content, content, folder, trust_effects))
+        members.append(
+            _member('', linkage_content, content, content, folder, trust_effects, closed)
+        )
     scene = Scene(
         name=name,
         members=tuple(members),
@@ -295,6 +301,7 @@ def _member(
     scene: Section,
     folder: str,
     trust_effects: bool,
+    closure: Closure | None = None,
 ) -> Member:
     def where(key: str) -> Section:
         return own if key in own else scene
@@ -312,7 +319,8 @@ def _member(
     published = where('publish_input').flag(
         'publish_input', drive != 'topic' or 'effort' in effects
     )
-    closure = read_closure(linkage_content, publish_inputs=published)
+    if closure is None:
+        closure = read_closure(linkage_content, publish_inputs=published)
     linkage = closure.linkage
     if 'effort' in effects and not published:
         raise effects.error(

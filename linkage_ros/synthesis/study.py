@@ -83,15 +83,13 @@ def results_of(
     with _client(address) as client:
         _check_workers(address, client)
         waiting = parts(_threads(address, client))
-        loop = client.loop.asyncio_loop
+        # Futures of the standard library's: waiting for them can be given up.
+        executor = client.get_executor(pure=False)
         running: dict[Future[Result], Part] = {}
         while True:
             room = _AHEAD * _threads(address, client) - len(running)
             for part in islice(waiting, max(room, 0)):
-                task = client.submit(work, part, pure=False)
-                # A future of the standard library's: waiting for it can be given up.
-                result = client.gather(task, asynchronous=True)
-                running[asyncio.run_coroutine_threadsafe(result, loop)] = part
+                running[executor.submit(work, part)] = part
             if not running:
                 return
             for future in wait(running, _PATIENCE, FIRST_COMPLETED).done:
