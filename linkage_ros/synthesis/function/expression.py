@@ -252,7 +252,8 @@ def _tokens(text: str) -> Iterator[_Token]:
                 f'write {meant} instead' if meant else 'use numbers, x, + - * / ^ and ( )',
             )
         yield _Token(match.lastgroup or '', match.group(), at)
-        at = len(text) - len(text[match.end() :].lstrip(_SPACES))
+        end = match.end()
+        at = len(text) - len(text[end:].lstrip(_SPACES))
 
 
 def _is_value(text: str, token: _Token, after: _Token | None) -> bool:
