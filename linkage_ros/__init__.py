@@ -97,10 +97,9 @@ _HOMES = {
     'linkage_ros.synthesis.defects': 'assess Assessment',
     'linkage_ros.synthesis.design': 'Design',
     'linkage_ros.synthesis.function.generate': 'generate_function',
-    'linkage_ros.synthesis.motion.generate': 'from_fixed_pivots from_moving_pivots',
-    'linkage_ros.synthesis.motion.poses': 'Pose',
+    'linkage_ros.synthesis.motion': 'from_fixed_pivots from_moving_pivots Pose',
+    'linkage_ros.synthesis.path.curves': 'PathTask',
     'linkage_ros.synthesis.path.generate': 'generate_path',
-    'linkage_ros.synthesis.path.task': 'PathTask',
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names.split()}
 

@@ -55,12 +55,12 @@ from linkage_ros.shipped import linkage_names as linkage_names, scene_names as s
 from linkage_ros.synthesis.defects import assess as assess, Assessment as Assessment
 from linkage_ros.synthesis.design import Design as Design
 from linkage_ros.synthesis.function.generate import generate_function as generate_function
-from linkage_ros.synthesis.motion.generate import (
+from linkage_ros.synthesis.motion import (
     from_fixed_pivots as from_fixed_pivots,
     from_moving_pivots as from_moving_pivots,
+    Pose as Pose,
 )
-from linkage_ros.synthesis.motion.poses import Pose as Pose
+from linkage_ros.synthesis.path.curves import PathTask as PathTask
 from linkage_ros.synthesis.path.generate import generate_path as generate_path
-from linkage_ros.synthesis.path.task import PathTask as PathTask
 
 __version__: str

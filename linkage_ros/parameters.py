@@ -16,130 +16,389 @@
 """
 How a drive, an effect or a fault declares its parameters: once, for reader, list and schema.
 
-Parameters are a frozen dataclass whose fields are made by the functions below. The scene reads a
-section of a file into it, the command line lists it, and the JSON Schema is written from it.
+Parameters are a frozen dataclass whose fields are made by the functions below. Each field has a
+kind, which reads the value from a section of a file, describes it in tables, and writes its JSON
+Schema.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, Field, field, fields, MISSING
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, Field, field, fields, is_dataclass, MISSING
 from math import inf
-from typing import Any
+from os.path import join
+from typing import Any, ClassVar
+
+from linkage_ros.errors import did_you_mean, listed, quoted
+from linkage_ros.files.section import Section
 
 _KEY = 'parameter'
 
+Schema = dict[str, Any]
+
+Parts = Mapping[str, Sequence[str]]
+"""For each kind of part the names that there are."""
+
+KINDS = {
+    'joint': 'published joint',
+    'input': 'driven joint',
+    'pin': 'pin or slider',
+    'link': 'moving link',
+    'body': 'link or the ground',
+    'point': 'point: LINK.POINT',
+}
+"""Parts that a parameter can name, and what they are called."""
+
+CHARACTER = r'[^\u0000-\u001f\u007f-\u00a0\u2028\u2029]'
+"""Pattern of a character that prints."""
+
 
 @dataclass(frozen=True, slots=True)
-class Number:
-    """A finite number: least ≤ value ≤ most, and value > above; ``whole``, without decimals."""
+class Kind(ABC):
+    """
+    What a parameter is.
+
+    Attributes
+    ----------
+    meaning
+        In words.
+
+    """
 
     meaning: str
-    unit: str
+    unit: ClassVar[str] = ''
+
+    @abstractmethod
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
+        """Read the value of a key; arguments and errors as of `read_parameters`."""
+
+    @abstractmethod
+    def schema(self) -> Schema:
+        """Return the JSON Schema of the value."""
+
+    @abstractmethod
+    def values(self) -> str:
+        """Return which values there are, for a table."""
+
+    def shown(self, default: Any) -> str:
+        """Return a default, for a table."""
+        return str(default) or "''"
+
+    def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
+        """Yield rows of a table: key, unit, default, values, meaning."""
+        yield key, self.unit, default, self.values(), self.meaning
+
+    def _described(self, **schema: Any) -> Schema:
+        return {'description': self.meaning + (f' [{self.unit}]' if self.unit else ''), **schema}
+
+
+@dataclass(frozen=True, slots=True)
+class Number(Kind):
+    """A finite number: least ≤ value ≤ most, and value > above; ``whole``, without decimals."""
+
+    unit: str = ''  # type: ignore[misc]  # a constant where there is none
     least: float = -inf
     most: float = inf
     above: float = -inf
     whole: bool = False
 
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> float | int:
+        """Read a number."""
+        if self.whole:
+            return content.whole(key, least=self.least, most=self.most, unit=self.unit)
+        bounds = {'least': self.least, 'most': self.most, 'above': self.above}
+        return content.number(key, **bounds, unit=self.unit)
+
+    def schema(self) -> Schema:
+        """Return the schema of a number within bounds."""
+        kind = 'integer' if self.whole else 'number'
+        return self._described(type=kind, **_bounds(self.least, self.most, self.above))
+
+    def values(self) -> str:
+        """Return the bounds."""
+        least, most, above = map(written, (self.least, self.most, self.above))
+        if self.above > -inf:
+            bounds = f'more than {above}' + (f', to {most}' if self.most < inf else '')
+        elif self.least > -inf:
+            bounds = f'{least} to {most}' if self.most < inf else f'{least} or more'
+        else:
+            bounds = f'at most {most}' if self.most < inf else 'any number'
+        return f'whole: {bounds}' if self.whole else bounds
+
+    def shown(self, default: Any) -> str:
+        """Return a number as a person writes it."""
+        return written(default)
+
 
 @dataclass(frozen=True, slots=True)
-class Numbers:
-    """A list of finite numbers."""
+class Numbers(Kind):
+    """A list of finite numbers, of which none is beyond ±most."""
 
-    meaning: str
-    unit: str
-    most: float
+    unit: str = ''  # type: ignore[misc]
+    most: float = inf
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, ...]:
+        """Read a list as a tuple."""
+        return tuple(content.numbers(key, most=self.most))
+
+    def schema(self) -> Schema:
+        """Return the schema of a list."""
+        items = {'type': 'number', **_bounds(-self.most, self.most)}
+        return self._described(type='array', items=items)
+
+    def values(self) -> str:
+        """Return the bound."""
+        return f'a list of numbers{_each_at_most(self.most)}'
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
-    """A list of rows of finite numbers, one for each column."""
+class Point(Numbers):
+    """Two finite numbers [x, y], of which none is beyond ±most."""
 
-    meaning: str
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, float]:
+        """Read a point as a tuple."""
+        return content.point(key, most=self.most)
+
+    def schema(self) -> Schema:
+        """Return the schema of two numbers."""
+        return {**Numbers.schema(self), 'minItems': 2, 'maxItems': 2}
+
+    def values(self) -> str:
+        """Return the bound."""
+        return f'[x, y]{_each_at_most(self.most)}'
+
+
+@dataclass(frozen=True, slots=True)
+class Rows(Kind):
+    """
+    A list of rows of finite numbers, one for each column, of which none is beyond ±most.
+
+    Attributes
+    ----------
+    columns
+        The meaning of each column, with its unit.
+
+    """
+
     columns: tuple[str, ...]
-    """What each column is, with its unit."""
-    most: float
+    most: float = inf
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
+        """Read rows as a tuple of tuples."""
+        return content.rows(key, self.columns, most=self.most)
+
+    def schema(self) -> Schema:
+        """Return the schema of a list of lists."""
+        row, count = f'[{", ".join(self.columns)}]', len(self.columns)
+        items = {**Numbers(row, most=self.most).schema(), 'minItems': count, 'maxItems': count}
+        description = f'{self.meaning}: rows of {row}'
+        return {'description': description, 'type': 'array', 'minItems': 1, 'items': items}
+
+    def values(self) -> str:
+        """Return the columns and the bound."""
+        return f'rows of [{", ".join(self.columns)}]{_each_at_most(self.most)}'
 
 
 @dataclass(frozen=True, slots=True)
-class Flag:
+class Flag(Kind):
     """True or false."""
 
-    meaning: str
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> bool:
+        """Read a boolean."""
+        return content.flag(key)
+
+    def schema(self) -> Schema:
+        """Return the schema of a boolean."""
+        return self._described(type='boolean')
+
+    def values(self) -> str:
+        """Return both."""
+        return 'true or false'
+
+    def shown(self, default: Any) -> str:
+        """Return a boolean as YAML has it."""
+        return 'true' if default else 'false'
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class Choice(Kind):
     """One of several words."""
 
-    meaning: str
     words: tuple[str, ...]
 
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
+        """Read a word."""
+        return content.choice(key, self.words)
+
+    def schema(self) -> Schema:
+        """Return the schema of these words."""
+        return self._described(enum=list(self.words))
+
+    def values(self) -> str:
+        """Return the words."""
+        return ' or '.join(self.words)
+
 
 @dataclass(frozen=True, slots=True)
-class Text:
-    """A text that is not empty."""
+class Text(Kind):
+    """A text; without a pattern, one that is not empty and prints."""
 
-    meaning: str
+    pattern: str = f'^{CHARACTER}+$'
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
+        """Read a text."""
+        return content.text(key)
+
+    def schema(self) -> Schema:
+        """Return the schema of a text."""
+        return self._described(type='string', pattern=self.pattern)
+
+    def values(self) -> str:
+        """Return that it is a text."""
+        return 'a text'
 
 
 @dataclass(frozen=True, slots=True)
-class File:
+class File(Text):
     """A path, relative to the folder of the scene file."""
 
-    meaning: str
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
+        """Read a path, with the scene's folder before it."""
+        return join(folder, content.text(key))  # noqa: PTH118 (Path's raises on a NUL)
+
+    def values(self) -> str:
+        """Return that it is a file."""
+        return 'a file'
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
-    """Two finite numbers [x, y]."""
+class Name(Kind):
+    """The name of a part of the linkage: one of ``kind``, a key of `KINDS`."""
 
-    meaning: str
-    unit: str
-    most: float
-
-
-@dataclass(frozen=True, slots=True)
-class Name:
-    """The name of a part of the linkage: one of ``kind`` (see `KINDS`)."""
-
-    meaning: str
     kind: str
 
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
+        """Read the name of a part that there is."""
+        return self._known(content, key, content.text(key), parts)
+
+    def schema(self) -> Schema:
+        """Return the schema of a name: which names there are, a schema does not know."""
+        return Text(f'{self.meaning} (name of a {KINDS[self.kind]})').schema()
+
+    def values(self) -> str:
+        """Return the kind."""
+        return f'a {KINDS[self.kind]}'
+
+    def _known(self, content: Section, key: str, name: str, parts: Parts) -> str:
+        """Return a name, if there is such a part."""
+        names = parts[self.kind]
+        if name in names:
+            return name
+        raise content.error(
+            key,
+            f'there is no {self.kind} {quoted(name)}',
+            did_you_mean(name, names, f'there are: {listed(names) or "none"}'),
+        )
+
 
 @dataclass(frozen=True, slots=True)
-class Names:
+class Names(Name):
     """A list of names of parts of the linkage."""
 
-    meaning: str
-    kind: str
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[str, ...]:
+        """Read names as a tuple."""
+        return tuple(self._known(content, key, name, parts) for name in content.texts(key))
+
+    def schema(self) -> Schema:
+        """Return the schema of a list of names."""
+        description = f'{self.meaning} (names, each of a {KINDS[self.kind]})'
+        return {'description': description, 'type': 'array', 'items': Text('a name').schema()}
+
+    def values(self) -> str:
+        """Return the kind."""
+        return f'names, each of a {KINDS[self.kind]}'
+
+    def shown(self, default: Any) -> str:
+        """Return names; none stand for all."""
+        return ', '.join(default) or 'all'
 
 
 @dataclass(frozen=True, slots=True)
-class Each:
-    """For each of some parts of the linkage a `Number`, a `Point`, or parameters of their own."""
+class Each(Name):
+    """
+    For each of some parts of the linkage a value, or parameters of their own.
 
-    meaning: str
-    kind: str
+    Attributes
+    ----------
+    of
+        A `Kind`, or a type of parameters.
+
+    """
+
     of: Any
-    """A `Number`, a `Point`, or a type of parameters."""
+
+    @property
+    def _value(self) -> Kind:
+        return Group('', self.of) if isinstance(self.of, type) else self.of
+
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
+        """Read values by the names of parts."""
+        inner = content.section(key)
+        return {
+            self._known(inner, name, name, parts): self._value.read(inner, name, parts, folder)
+            for name in inner
+        }
+
+    def schema(self) -> Schema:
+        """Return the schema of a mapping whose keys are names."""
+        of = parameters_schema(self.of) if isinstance(self.of, type) else self.of.schema()
+        return named(f'{self.meaning} (by the name of a {KINDS[self.kind]})', of)
+
+    def values(self) -> str:
+        """Return the kind."""
+        return f'for each {KINDS[self.kind]}'
+
+    def shown(self, default: Any) -> str:
+        """Return nothing: a table has the defaults of the values."""
+        return ''
+
+    def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
+        """Yield a row, and those of the values."""
+        yield from Kind.rows(self, key, default)
+        part = f'{key}.{"LINK.POINT" if self.kind == "point" else self.kind.upper()}'
+        rows = self._value.rows(part, '')
+        if isinstance(self.of, type):
+            next(rows)
+        yield from rows
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class Group(Kind):
     """Parameters within these."""
 
-    meaning: str
     of: Any
 
+    def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
+        """Read parameters."""
+        return read_parameters(content.section(key), self.of, parts, folder)
 
-KINDS = ('joint', 'input', 'pin', 'link', 'body', 'point')
-"""
-Parts that a parameter can name: a published joint, a driven joint, a pin or slider, a moving link,
-a link or the ground, and a point of one of these: link.point.
-"""
+    def schema(self) -> Schema:
+        """Return the schema of the parameters."""
+        return {**parameters_schema(self.of), 'description': self.meaning}
 
-Kind = Number | Numbers | Rows | Flag | Choice | Text | File | Point | Name | Names | Each | Group
+    def values(self) -> str:
+        """Return that it is a mapping."""
+        return 'a mapping'
+
+    def shown(self, default: Any) -> str:
+        """Return nothing: a table has the defaults of the parameters."""
+        return ''
+
+    def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
+        """Yield a row, and those of the parameters."""
+        yield from Kind.rows(self, key, default)
+        yield from parameter_rows(self.of, f'{key}.')
 
 
 def number(
@@ -220,10 +479,119 @@ def group(meaning: str, of: Any) -> Any:
     return field(default_factory=of, metadata={_KEY: Group(meaning, of)})
 
 
-def declared(parameters: Any) -> list[tuple[Field[Any], Kind]]:
-    """Return the fields of a type of parameters, each with what it was declared as."""
-    return [(each_field, each_field.metadata[_KEY]) for each_field in fields(parameters)]
-
-
 def _declared(kind: Kind, default: Any) -> Any:
     return field(default=default, metadata={_KEY: kind})
+
+
+def declared(parameters: Any) -> list[tuple[Field[Any], Kind]]:
+    """Return the fields of a type of parameters, each with its kind."""
+    return [(entry, entry.metadata[_KEY]) for entry in fields(parameters)]
+
+
+def is_required(entry: Field[Any]) -> bool:
+    """Return whether a parameter has no default."""
+    return entry.default is MISSING and entry.default_factory is MISSING
+
+
+def default_of(entry: Field[Any]) -> Any:
+    """Return the default of a parameter that has one, as JSON has it."""
+    value = entry.default
+    if entry.default_factory is not MISSING:
+        value = entry.default_factory()
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    return list(value) if isinstance(value, tuple) else value
+
+
+def summary(parameters: Any) -> str:
+    """Return the first line of the docstring of a type of parameters."""
+    return str(parameters.__doc__).strip().splitlines()[0]
+
+
+def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -> Any:
+    """
+    Read parameters.
+
+    Parameters
+    ----------
+    content
+        The section.
+    of
+        Their type.
+    parts
+        What they may name.
+    folder
+        To which the paths of files are relative.
+
+    Raises
+    ------
+    FileError
+        With line and key of what is wrong, what was expected, and the nearest name.
+
+    """
+    entries = declared(of)
+    values = {
+        entry.name: kind.read(content, entry.name, parts, folder)
+        for entry, kind in entries
+        if entry.name in content or is_required(entry)
+    }
+    content.finish([entry.name for entry, _ in entries])
+    return of(**values)
+
+
+def parameters_schema(of: Any) -> Schema:
+    """Return the JSON Schema of the section that is read into a type of parameters."""
+    entries = declared(of)
+    return mapping(
+        summary(of),
+        {
+            entry.name: kind.schema()
+            | ({} if is_required(entry) else {'default': default_of(entry)})
+            for entry, kind in entries
+        },
+        required=tuple(entry.name for entry, _ in entries if is_required(entry)),
+    )
+
+
+def parameter_rows(of: Any, prefix: str = '') -> Iterator[tuple[str, ...]]:
+    """Yield rows of a table of parameters: key, unit, default, values, meaning."""
+    for entry, kind in declared(of):
+        default = 'required' if is_required(entry) else kind.shown(default_of(entry))
+        yield from kind.rows(prefix + entry.name, default)
+
+
+def mapping(
+    description: str, properties: Mapping[str, Schema], *, required: tuple[str, ...] = ()
+) -> Schema:
+    """Return the JSON Schema of a mapping that has these keys and no others."""
+    schema: Schema = {'description': description, 'type': 'object'}
+    if required:
+        schema['required'] = list(required)
+    return {**schema, 'properties': dict(properties), 'additionalProperties': False}
+
+
+def named(description: str, of: Schema) -> Schema:
+    """Return the JSON Schema of a mapping whose keys are names."""
+    return {'description': description, 'type': 'object', 'additionalProperties': of}
+
+
+def written(value: Any) -> str:
+    """Return a number as a person writes it: 1e9, but 4096; a list as it is."""
+    if not isinstance(value, int | float):
+        return str(value)
+    short = f'{value:g}'.replace('e+0', 'e').replace('e-0', 'e-').replace('e+', 'e')
+    return short if float(short) == value else f'{value:.15g}'
+
+
+def _each_at_most(most: float) -> str:
+    return f', each of at most {written(most)}' if most < inf else ''
+
+
+def _bounds(least: float, most: float, above: float = -inf) -> Schema:
+    bounds = (('minimum', least), ('maximum', most), ('exclusiveMinimum', above))
+    return {word: _plain(bound) for word, bound in bounds if abs(bound) < inf}
+
+
+def _plain(bound: float) -> float:
+    """Return a whole number without its decimals: a reader of the file sees 1, not 1.0."""
+    return int(bound) if float(bound).is_integer() and abs(bound) < 1e15 else bound

@@ -551,7 +551,7 @@ def _closure(
         name, solving = member.solver
         closure: Closure = import_module(SOLVERS[name]).build(solving, linkage)
         return closure
-    return Closure(linkage)
+    return member.closure if linkage is member.closure.linkage else Closure(linkage)
 
 
 class Pipeline:

@@ -98,21 +98,16 @@ DRIVE_SCENES = {
 }
 
 SOLVER_SCENES = {
-    'solver: closed_form': {'solvers.closed_form'},
+    'solver: closed_form': set(),
     'solver: {newton: {tolerance: 1.0e-9}}': {
         'solvers.newton',
-        'solvers.newton_dyad',
-        'solvers.knots',
         'solvers.loops',
         'solvers.solver',
     },
     'solver: {table: {tolerance: 1.0e-3}}': {
         'solvers.table',
         'solvers.proof',
-        'solvers.range_proof',
-        'solvers.task',
-        'solvers.cells',
-        'solvers.discs',
+        'solvers.validated_enclosure',
         'solvers.loops',
         'solvers.solver',
     },
@@ -216,9 +211,7 @@ def test_a_scene_with_one_solver_has_no_other(tmp_path, scene):
     allowed = SOLVER_SCENES[scene]
     assert solvers_of(modules) == {'solvers.registry', *allowed}
     # What proves a table, or knows the closed form, has no part in a tick.
-    assert solvers_of(passed) <= {'solvers.newton', 'solvers.newton_dyad', 'solvers.knots'} | (
-        {'solvers.table'} & allowed
-    )
+    assert solvers_of(passed) <= {'solvers.newton', 'solvers.table'} & allowed
     assert ('numpy' in everything) == ('solvers.table' in allowed)
 
 

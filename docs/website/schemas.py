@@ -21,8 +21,7 @@ from collections.abc import Iterator, Mapping
 import json
 from typing import Any
 
-from linkage_ros.scene.linkage_schema import linkage_schema
-from linkage_ros.scene.scene_schema import scene_schema
+from linkage_ros.scene.schema import linkage_schema, scene_schema
 
 from docs.website.markdown import code, plain, table
 

@@ -34,7 +34,7 @@ from linkage_ros.kinematics.compiled.c import C
 from linkage_ros.kinematics.compiled.javascript import JavaScript
 from linkage_ros.kinematics.compiled.python_module import PythonModule
 from linkage_ros.kinematics.compiled.source import Language, source, Subject
-from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_file import read_closure
 from linkage_ros.scene.yaml_file import read_yaml
 from linkage_ros.whole_file import write_whole
 
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
             f'name a file that ends in {", ".join(LANGUAGES)}',
         )
     content, _ = read_yaml(arguments.file)
-    closure = Closure(read_linkage(content))
+    closure = read_closure(content)
     file = Path(arguments.file)
     in_c = output.suffix in ('.c', '.h')
     subject = Subject(

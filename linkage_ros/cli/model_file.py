@@ -21,9 +21,8 @@ import argparse
 from pathlib import Path
 import sys
 
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.models.part import Part, PartError
-from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.linkage_file import read_closure
 from linkage_ros.scene.load import kind_of
 from linkage_ros.scene.robot_model import scene_model, Write
 from linkage_ros.scene.yaml_file import read_yaml
@@ -57,7 +56,7 @@ def model_of(file: str, write: Write) -> bytes:
         scene = load_scene(file)
         return scene_model(scene, Pipeline(scene).closures, write)
     try:
-        return write(Path(file).stem, [Part(Closure(read_linkage(content)))])
+        return write(Path(file).stem, [Part(read_closure(content))])
     except PartError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
 

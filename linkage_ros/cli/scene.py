@@ -29,12 +29,10 @@ from linkage_ros.cli.parameter_tables import REGISTRIES, table_of
 from linkage_ros.cli.scene_tables import tables
 from linkage_ros.cli.tables import show
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, listed
+from linkage_ros.files.section import Section
 from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.linkage_schema import linkage_schema
 from linkage_ros.scene.load import kind_of, load_scene
-from linkage_ros.scene.scene_schema import scene_schema
-from linkage_ros.scene.schema import as_text
-from linkage_ros.scene.section import Section
+from linkage_ros.scene.schema import as_text, linkage_schema, scene_schema
 from linkage_ros.scene.yaml_file import read_yaml
 
 SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}

@@ -24,10 +24,9 @@ from typing import Any
 from linkage_ros.cli.tables import Table
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import bringing, module_of
-from linkage_ros.parameters import declared
+from linkage_ros.parameters import declared, default_of, is_required, summary
 from linkage_ros.pipeline import Line, Pipeline
 from linkage_ros.scene.scene import Scene
-from linkage_ros.scene.schema import default_of, is_required, summary
 
 _WHERE = {
     'alter': 'in the place of the linkage that is drawn',

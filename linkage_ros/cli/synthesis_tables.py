@@ -23,9 +23,8 @@ from math import degrees
 from linkage_ros.cli.linkage_file import angle_text
 from linkage_ros.cli.synthesis_tasks import Answer
 from linkage_ros.cli.tables import Table
-from linkage_ros.synthesis.defects import Assessment
+from linkage_ros.synthesis.defects import Assessment, misses, Needs
 from linkage_ros.synthesis.design import FourBar
-from linkage_ros.synthesis.needs import misses, Needs
 
 
 def tables(answer: Answer, title: str, needs: Needs) -> Iterator[Table]:

@@ -26,15 +26,13 @@ from typing import NamedTuple, TYPE_CHECKING
 from linkage_ros.cli.progress import Told
 from linkage_ros.cli.typed_numbers import numbers_of
 from linkage_ros.errors import LinkageError, listed
-from linkage_ros.synthesis.defects import assess, Assessment
+from linkage_ros.synthesis.defects import assess, Assessment, misses, Needs
 from linkage_ros.synthesis.design import Design
-from linkage_ros.synthesis.needs import misses, Needs
 from linkage_ros.synthesis.pairs.freudenstein import exact, fit_equation, ThreePairs
 from linkage_ros.synthesis.proof import Met
 
 if TYPE_CHECKING:
-    from linkage_ros.synthesis.function.structural_error import StructuralError
-    from linkage_ros.synthesis.function.task import FunctionTask
+    from linkage_ros.synthesis.function.task import FunctionTask, StructuralError
 
 CANDIDATES = 200_000
 """How many a search tries where nobody says."""
@@ -231,8 +229,13 @@ def _errors(met: Sequence[Met]) -> str:
 
 def _function(typed: argparse.Namespace, search: Search) -> list[Answer]:
     from linkage_ros.synthesis.function.expression import Expression
-    from linkage_ros.synthesis.function.structural_error import structural_error
-    from linkage_ros.synthesis.function.task import chebyshev, FunctionTask, pairs, wanted_rocker
+    from linkage_ros.synthesis.function.task import (
+        chebyshev,
+        FunctionTask,
+        pairs,
+        structural_error,
+        wanted_rocker,
+    )
 
     for name in ('range', 'crank_range', 'rocker_range'):
         if getattr(typed, name) is None:
@@ -277,8 +280,8 @@ def _radians(angles: Sequence[float]) -> tuple[float, float]:
 
 
 def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
+    from linkage_ros.synthesis.path.curves import PathTask
     from linkage_ros.synthesis.path.generate import generate_path
-    from linkage_ros.synthesis.path.task import PathTask
 
     rows = typed.point or numbers_of(typed.path, (2, 3))
     timing = typed.timing
@@ -312,8 +315,7 @@ def _path(typed: argparse.Namespace, search: Search) -> list[Answer]:
 
 
 def _motion(typed: argparse.Namespace, _search: Search) -> list[Answer]:
-    from linkage_ros.synthesis.motion.generate import from_fixed_pivots, from_moving_pivots
-    from linkage_ros.synthesis.motion.poses import Pose
+    from linkage_ros.synthesis.motion import from_fixed_pivots, from_moving_pivots, Pose
 
     fixed, moving = typed.fixed_pivot, typed.moving_pivot
     if bool(fixed) == bool(moving):

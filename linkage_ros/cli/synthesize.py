@@ -35,7 +35,7 @@ from linkage_ros.cli.synthesis_tasks import Answer, answers, CANDIDATES, Search
 from linkage_ros.cli.tables import show
 from linkage_ros.errors import LinkageError
 from linkage_ros.scene.linkage_text import write_linkage
-from linkage_ros.synthesis.needs import distance, misses, Needs
+from linkage_ros.synthesis.defects import distance, misses, Needs
 
 _NOT_MET = 1
 """Exit code where there are solutions and none has what is needed."""

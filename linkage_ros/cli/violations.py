@@ -23,8 +23,8 @@ from typing import Any, TYPE_CHECKING
 
 from jsonschema import Draft202012Validator
 from linkage_ros.errors import did_you_mean, FileError, listed, quoted
-from linkage_ros.scene.schema import Schema
-from linkage_ros.scene.section import LinedDict, Section
+from linkage_ros.files.section import LinedDict, Section
+from linkage_ros.parameters import Schema
 
 if TYPE_CHECKING:
     from jsonschema import ValidationError

@@ -22,6 +22,7 @@ from os import PathLike
 from typing import Any
 
 from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.files.section import Section
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.limit_checks import check_limits
 from linkage_ros.kinematics.linkage import (
@@ -35,7 +36,6 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
-from linkage_ros.scene.section import Section
 from linkage_ros.scene.yaml_file import read_yaml
 from linkage_ros.shipped import named_file
 
@@ -43,13 +43,13 @@ _KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose', 'm
 _MOST_LINKS, _MOST_POINTS = 400, 10_000
 """More links than these, and points of all links, are no machine's; a check takes seconds then."""
 
-_FARTHEST = 1e9
+FARTHEST = 1e9
 """Coordinates beyond this, in [m], are no machine's; below it no square overflows."""
 
-_HEAVIEST = 1e12
+HEAVIEST = 1e12
 """Masses beyond this, in [kg], and moments of inertia, in [kg·m²], are no machine's either."""
 
-_STRONGEST = 1e12
+STRONGEST = 1e12
 """Nor are efforts beyond this, in [N·m] or [N]."""
 
 
@@ -84,11 +84,11 @@ def load(linkage: str | PathLike[str]) -> Closure:
 
 
 def read_linkage(content: Section) -> Linkage:
-    """Read a linkage as `read_closure` does; return its parts."""
+    """Read a linkage and prove that it closes; errors as of `read_closure`."""
     return read_closure(content).linkage
 
 
-def read_closure(content: Section, name: str = '') -> Closure:
+def read_closure(content: Section, name: str = '', *, publish_inputs: bool = False) -> Closure:
     """
     Read a linkage and prove that it closes.
 
@@ -98,6 +98,8 @@ def read_closure(content: Section, name: str = '') -> Closure:
         The linkage file.
     name
         What to call the linkage.
+    publish_inputs
+        Whether its input joints are published too, before the others.
 
     Raises
     ------
@@ -108,24 +110,24 @@ def read_closure(content: Section, name: str = '') -> Closure:
     for shorthand, expand in _SHORTHANDS.items():
         if shorthand in content:
             short = content.section(shorthand)
-            written_out = _limited(expand(short), short)
+            written_out = Section(content.file, '', _limited(expand(short), short))
             short.finish()
             content.finish()
-            linkage = _linkage(Section(content.file, '', written_out))
+            linkage = _linkage(written_out, publish_inputs)
             return _closable(content, linkage, name, shorthand)
     for key in _KEYS:
         content.taken(key)
     content.finish(tuple(_SHORTHANDS))
-    return _closable(content, _linkage(content), name)
+    return _closable(content, _linkage(content, publish_inputs), name)
 
 
-def _linkage(content: Section) -> Linkage:
+def _linkage(content: Section, publish_inputs: bool) -> Linkage:
     links = content.section('links')
     _bound(content, links, 'links', _MOST_LINKS)
     points = {}
     for name in links:
         link = links.section(name)
-        points[name] = {point: link.point(point, most=_FARTHEST) for point in link}
+        points[name] = {point: link.point(point, most=FARTHEST) for point in link}
 
     count = sum(map(len, points.values()))
     if count > _MOST_POINTS:
@@ -149,11 +151,14 @@ def _linkage(content: Section) -> Linkage:
     for driven in inputs:
         if driven.joint in joints:
             raise joints.error(driven.joint, 'is the input joint', 'publish the dependent joints')
+    published = {name: _joint(joints.section(name)) for name in joints}
+    if publish_inputs:
+        published = {driven.joint: _published(driven) for driven in inputs} | published
     return Linkage(
         points,
         inputs,
         sides,  # type: ignore[arg-type]  # the choice above is the Literal
-        {name: _joint(joints.section(name)) for name in joints},
+        published,
         {name: _slider(sliders.section(name)) for name in sliders},
         tuple(content.texts('traced')),
         _pose(content.section('pose')) if 'pose' in content else None,
@@ -178,25 +183,31 @@ def _input(content: Section) -> Input:
     return driven
 
 
+def _published(driven: Input) -> RevoluteJoint | SlideJoint:
+    if driven.slider:
+        return SlideJoint(driven.slider)
+    return RevoluteJoint(driven.parent, driven.child)
+
+
 def _limits(content: Section) -> Limits:
     """Return what a joint says of its limits; `kinematics.checks` says whether they can be."""
-    low, high = content.interval('limits', most=_FARTHEST)
+    low, high = content.interval('limits', most=FARTHEST)
     return Limits(
         low,
         high,
-        content.number('velocity', inf, above=0.0, most=_FARTHEST, unit='rad/s or m/s')
+        content.number('velocity', inf, above=0.0, most=FARTHEST, unit='rad/s or m/s')
         if 'velocity' in content
         else inf,
-        content.number('effort', inf, above=0.0, most=_STRONGEST, unit='N·m or N')
+        content.number('effort', inf, above=0.0, most=STRONGEST, unit='N·m or N')
         if 'effort' in content
         else inf,
     )
 
 
 def _pose(content: Section) -> Pose:
-    inputs = tuple(content.numbers('inputs', most=_FARTHEST))
+    inputs = tuple(content.numbers('inputs', most=FARTHEST))
     points = content.section('points', required=False)
-    pose = Pose(inputs, {name: points.point(name, most=_FARTHEST) for name in points})
+    pose = Pose(inputs, {name: points.point(name, most=FARTHEST) for name in points})
     content.finish()
     return pose
 
@@ -213,9 +224,9 @@ def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
             )
         link = content.section(name)
         masses[name] = Mass(
-            link.number('mass', above=0.0, most=_HEAVIEST, unit='kg'),
-            link.point('center', most=_FARTHEST),
-            link.number('inertia', least=0.0, most=_HEAVIEST, unit='kg·m²'),
+            link.number('mass', above=0.0, most=HEAVIEST, unit='kg'),
+            link.point('center', most=FARTHEST),
+            link.number('inertia', least=0.0, most=HEAVIEST, unit='kg·m²'),
         )
         link.finish()
     return masses
@@ -227,11 +238,9 @@ def _slider(content: Section) -> Slider:
         content.text('point'),
         content.text('along'),
         content.text('through'),
-        content.point('direction', most=_FARTHEST),
+        content.point('direction', most=FARTHEST),
         block,
-        content.number('angle', 0.0, least=-_FARTHEST, most=_FARTHEST, unit='rad')
-        if block
-        else 0.0,
+        content.number('angle', 0.0, least=-FARTHEST, most=FARTHEST, unit='rad') if block else 0.0,
     )
     content.finish(('block', 'angle'))
     return slider
@@ -287,7 +296,7 @@ def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
 
 def _four_bar(content: Section) -> dict[str, Any]:
     """Write out crank a, coupler b, rocker c and ground d."""
-    a, b, c, d = (content.number(side, above=0.0, most=_FARTHEST, unit='m') for side in 'abcd')
+    a, b, c, d = (content.number(side, above=0.0, most=FARTHEST, unit='m') for side in 'abcd')
     side = content.choice('assembly', ('left', 'right'), 'left')
     return {
         'links': {
@@ -307,8 +316,8 @@ def _four_bar(content: Section) -> dict[str, Any]:
 
 def _inverted_slider_crank(content: Section) -> dict[str, Any]:
     """Write out crank a and the place of the swivel, from the crank's pivot."""
-    a = content.number('a', above=0.0, most=_FARTHEST, unit='m')
-    swivel = content.point('swivel', most=_FARTHEST)
+    a = content.number('a', above=0.0, most=FARTHEST, unit='m')
+    swivel = content.point('swivel', most=FARTHEST)
     if swivel == (0.0, 0.0):
         raise content.error(
             'swivel', "[0, 0] is the crank's pivot", 'give the swivel another place'

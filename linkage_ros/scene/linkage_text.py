@@ -14,22 +14,28 @@
 
 
 """
-A linkage as the text of a linkage file, written so that reading it gives the same linkage.
+A linkage as the text of a linkage file, and the scene that such a file stands for.
 
-Short mappings stand on one line, as in the files that come with the package. Numbers are the
-shortest that read as the same floats; names are quoted where a reader of YAML 1.1 or 1.2 could
-take them for something else.
+Reading the text gives the same linkage. Short mappings stand on one line, as in the files that
+come with the package. Numbers are the shortest that read as the same floats; names are quoted
+where a reader of YAML 1.1 or 1.2 could take them for something else.
+
+Where a scene is expected, a linkage file stands for a scene that moves the linkage. It begins at
+`usual_inputs`. A single input turns at a constant rate, or swings through its range as a sine;
+several come from a topic. The result is the text of a scene file, read as any other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 import json
-from math import isfinite, isinf
+from math import asin, isfinite, isinf
 from pathlib import Path
 import re
 from textwrap import wrap
 
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
     Input,
     Limits,
@@ -38,6 +44,8 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
+from linkage_ros.kinematics.ranges import describe, InputRange
+from linkage_ros.kinematics.survey import usual_inputs, Way
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml
 from linkage_ros.whole_file import write_whole
@@ -217,3 +225,87 @@ def _name(name: str) -> str:
     if _PLAIN.fullmatch(name) and name.lower() not in _WORDS:
         return name
     return json.dumps(name, ensure_ascii=False)  # its escapes are YAML's too
+
+
+_PART = 0.96
+"""Of its range that an input swings through: at the ends of many lies a toggle, without rates."""
+
+_PERIOD = 4.0
+"""Of the swing, in [s]."""
+
+_SAME = 1e-9
+"""What a start may lie beyond the end of a range and count as it, in [rad] or of a length."""
+
+
+def scene_text_for(closure: Closure, file: str) -> str:
+    """
+    Return the text of the scene that a linkage stands for.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    file
+        Name of its file, as the scene is to give it.
+
+    Raises
+    ------
+    DefinitionError
+        Where its pose says that it starts where no loop closes.
+
+    """
+    return (
+        '# What a linkage file alone stands for where a scene is expected.\n'
+        f'linkage: {file}\n'
+        'rate: 1000\n'
+        f'drive: {_drive(closure)}\n'
+        'effects: {velocity: {}}\n'
+    )
+
+
+def _drive(closure: Closure) -> str:
+    if len(closure.linkage.inputs) > 1:
+        return '{topic: {}}'
+    start, interval = _start(closure)
+    if interval.whole:
+        return f'{{constant_rate: {{rate: 1, start: {number_text(start)}}}}}'
+    left_out = 0.5 * (1.0 - _PART) * (interval.highest - interval.lowest)
+    low, high = (
+        end if by else end + inwards
+        for end, inwards, by in zip(interval[:2], (left_out, -left_out), interval.by, strict=True)
+    )
+    # A start that lies in what is left out at an end is where the swing turns back.
+    low, high = min(low, start), max(high, start)
+    mean, amplitude = 0.5 * (low + high), 0.5 * (high - low)
+    sine = min(max((start - mean) / amplitude, -1.0), 1.0) if amplitude else 0.0
+    said = {
+        'amplitude': amplitude,
+        'frequency': 1.0 / _PERIOD,
+        'mean': mean,
+        'phase': asin(sine),
+    }
+    return f'{{sine: {{{", ".join(f"{key}: {number_text(of)}" for key, of in said.items())}}}}}'
+
+
+def _start(closure: Closure) -> tuple[float, InputRange]:
+    """Return where the single input starts, and the range in which that lies."""
+    way, pose = Way(closure), closure.linkage.pose
+    if pose is None or pose.points:
+        (start,) = usual_inputs(closure)
+        # Of a range as narrow as the rounding of its values the usual one may lie beside it.
+        interval = way.range_about(start) or way.widest_range
+        assert interval is not None, 'reading the file has proved that it closes somewhere'
+        return start, interval
+    (start,) = pose.inputs
+    near = _SAME * (1.0 if way.turning else closure.scale)
+    for value in (start, start - near, start + near):
+        interval = way.range_about(value)
+        if interval is not None:
+            if not interval.whole:
+                start = min(max(start, interval.lowest), interval.highest)
+            return start, interval
+    raise DefinitionError(
+        'pose.inputs',
+        f'no loop closes at {start:g} {"rad" if way.turning else "m"}',
+        f'start within {describe(way.ranges)}',
+    )

@@ -17,8 +17,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import MISSING, replace
 from importlib import import_module
 from os import PathLike
 from os.path import isfile
@@ -27,20 +27,28 @@ from typing import Any, Literal
 from zlib import crc32
 
 from linkage_ros.drives.drive import DRIVES
+from linkage_ros.dynamics.loads import Loads, Spring
 from linkage_ros.effects.stage import EFFECTS, in_order, module_of
-from linkage_ros.errors import DefinitionError, quoted
-from linkage_ros.kinematics.checks import check
-from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.scene.faults import read_faults
-from linkage_ros.scene.linkage_file import looks_like_linkage, read_linkage
-from linkage_ros.scene.loads import read_loads
-from linkage_ros.scene.read import parts_of, read_parameters
-from linkage_ros.scene.scene import Member, RecordParameters, Scene
-from linkage_ros.scene.section import Section
-from linkage_ros.scene.solving import read_solver, read_solving
-from linkage_ros.scene.storage import read_storage
+from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
+from linkage_ros.faults.fault import Fault, FAULTS
+from linkage_ros.files.section import Section
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.parameters import declared, Parts, read_parameters
+from linkage_ros.scene.linkage_file import looks_like_linkage, read_closure
+from linkage_ros.scene.scene import (
+    AS_THE_RUN_GOES,
+    LEASTS,
+    Member,
+    parts_of,
+    RecordParameters,
+    Scene,
+    SPLITS,
+    StorageParameters,
+)
 from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
 from linkage_ros.shipped import named_file
+from linkage_ros.solvers.registry import SOLVERS
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
 """Names of the files of a scene where a bag carries them; further linkages are numbered."""
@@ -50,6 +58,14 @@ LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
 
 _MOST_LINKAGES = 400
 """A hundred take a core at 1 kHz."""
+
+FINEST_ACCURACY, COARSEST_ACCURACY = 1e-12, 1e-2
+"""Bounds of `accuracy`, in [rad] or [m]."""
+
+STRONGEST_SPRING, STIFFEST = 1e9, 1e12
+"""No machine has larger loads, in [N], [m], [kg·m²], or larger stiffness, in [N/m] or [N·s/m]."""
+
+_WHEN = ('at', 'seconds')
 
 Open = Callable[[Section], tuple[Section, bytes]]
 """Opens the linkage file that a section names under ``linkage``."""
@@ -123,10 +139,11 @@ def kind_of(content: Section) -> Literal['scene', 'linkage']:
 
 def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
     """Return the scene that a linkage file stands for."""
-    from linkage_ros.scene.stand_in import scene_text_for  # local import: not for scenes
+    from linkage_ros.scene.linkage_text import scene_text_for  # local import: not for scenes
 
     try:
-        text = scene_text_for(read_linkage(content), LINKAGE_FILE).encode()
+        closure = read_closure(content, publish_inputs=True)
+        text = scene_text_for(closure, LINKAGE_FILE).encode()
     except DefinitionError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
 
@@ -134,9 +151,10 @@ def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
         where.text('linkage')
         return content, data
 
-    return _scene(
-        name, parse_yaml(text, f'{content.file}, as a scene'), open_linkage, text, folder
-    )
+    scene = parse_yaml(text, f'{content.file}, as a scene')
+    # A drive moves one input, which is published then; several come from a topic.
+    closed = closure if len(closure.linkage.inputs) == 1 else None
+    return _scene(name, scene, open_linkage, text, folder, closed=closed)
 
 
 def parse_scene(
@@ -215,6 +233,7 @@ def _scene(
     seed: int | None = None,
     *,
     trust_effects: bool = True,
+    closed: Closure | None = None,
 ) -> Scene:
     files = {SCENE_FILE: scene_bytes}
     members: list[Member] = []
@@ -236,7 +255,9 @@ def _scene(
             entry.finish(_OF_A_MEMBER)
     else:
         linkage_content, files[LINKAGE_FILE] = open_linkage(content)
-        members.append(_member('', linkage_content, content, content, folder, trust_effects))
+        members.append(
+            _member('', linkage_content, content, content, folder, trust_effects, closed)
+        )
     scene = Scene(
         name=name,
         members=tuple(members),
@@ -286,9 +307,8 @@ def _member(
     scene: Section,
     folder: str,
     trust_effects: bool,
+    closure: Closure | None = None,
 ) -> Member:
-    linkage = read_linkage(linkage_content)
-
     def where(key: str) -> Section:
         return own if key in own else scene
 
@@ -305,9 +325,10 @@ def _member(
     published = where('publish_input').flag(
         'publish_input', drive != 'topic' or 'effort' in effects
     )
-    if published:
-        linkage = _with_inputs(linkage, linkage_content)
-    elif 'effort' in effects:
+    if closure is None:
+        closure = read_closure(linkage_content, publish_inputs=published)
+    linkage = closure.linkage
+    if 'effort' in effects and not published:
         raise effects.error(
             'effort', 'is that of the input joint', 'set publish_input: true, or name pin_forces'
         )
@@ -325,6 +346,7 @@ def _member(
     member = Member(
         name=name,
         linkage=linkage,
+        closure=closure,
         drive=(
             drive,
             read_parameters(
@@ -354,22 +376,6 @@ def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
         return {name: module_of(name).PARAMETERS for name in named}
     except DefinitionError as error:
         raise effects.error(error.where, error.reason, error.remedy) from None
-
-
-def _with_inputs(linkage: Linkage, content: Section) -> Linkage:
-    """Return a linkage that publishes its input joints too, before the others."""
-    inputs: dict[str, RevoluteJoint | SlideJoint] = {
-        given.joint: SlideJoint(given.slider)
-        if given.slider
-        else RevoluteJoint(given.parent, given.child)
-        for given in linkage.inputs
-    }
-    changed = replace(linkage, joints=inputs | dict(linkage.joints))
-    try:
-        check(changed)
-    except DefinitionError as error:
-        raise content.error(error.where, error.reason, error.remedy) from None
-    return changed
 
 
 def _silent(content: Section, linkage: Linkage) -> bool:
@@ -411,3 +417,177 @@ def _record(content: Section) -> RecordParameters:
             'name', f'{record.name!r} is not a plain name', 'leave out the folders'
         )
     return record
+
+
+def read_solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
+    """
+    Return what closes the loops, or how well that is to be done, as a `Member` holds it.
+
+    Raises
+    ------
+    FileError
+        Where neither can be understood, or where both are named.
+
+    """
+    # What a linkage says for itself stands for both of the scene's.
+    where = own if 'solver' in own or 'accuracy' in own else scene
+    if 'accuracy' not in where:
+        return {'solver': read_solver(where, parts) if 'solver' in where else None}
+    if 'solver' in where:
+        raise where.error('accuracy', 'stands beside solver', 'write one of the two')
+    bounds = {'least': FINEST_ACCURACY, 'most': COARSEST_ACCURACY}
+    return {'accuracy': where.number('accuracy', unit='rad or m', **bounds)}
+
+
+def read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
+    """
+    Return a solver's name and parameters; a name may stand alone.
+
+    Raises
+    ------
+    FileError
+        Where there is no such solver, or its parameters cannot be read.
+
+    """
+    if isinstance(where.mapping['solver'], str):
+        return _named(where)
+    solvers = where.section('solver')
+    named = list(solvers)
+    if len(named) > 1:
+        raise solvers.error(named[1], 'is a second solver', f'leave it, or {named[0]}, out')
+    if not named or named[0] not in SOLVERS:
+        solvers.finish(tuple(SOLVERS))
+        raise solvers.error('', 'names none', f'write one of {listed(SOLVERS)}')
+    (name,) = named
+    parameters = import_module(SOLVERS[name]).PARAMETERS
+    return name, read_parameters(solvers.section(name), parameters, parts)
+
+
+def _named(where: Section) -> tuple[str, Any]:
+    name = where.text('solver')
+    if name not in SOLVERS:
+        known = f'known: {listed(SOLVERS)}'
+        raise where.error(
+            'solver', f'there is no {quoted(name)}', did_you_mean(name, SOLVERS, known)
+        )
+    parameters = import_module(SOLVERS[name]).PARAMETERS
+    for entry, _ in declared(parameters):
+        if entry.default is MISSING:
+            raise where.error(
+                'solver',
+                f'{name} has no {entry.name}',
+                f'write solver: {{{name}: {{{entry.name}: …}}}}',
+            )
+    return name, parameters()
+
+
+def read_loads(content: Section) -> Loads:
+    """
+    Read gravity, springs and the inertia of the drive.
+
+    Raises
+    ------
+    FileError
+        With line and key of what is wrong.
+
+    """
+    springs = content.section('springs', required=False)
+    loads = Loads(
+        gravity=content.point('gravity', most=1e3) if 'gravity' in content else (0.0, 0.0),
+        springs=tuple(_spring(name, springs.section(name)) for name in springs),
+        drive_inertia=content.number(
+            'drive_inertia', 0.0, least=0.0, most=STRONGEST_SPRING, unit='kg·m², or kg of a slide'
+        ),
+    )
+    content.finish(('gravity',))
+    return loads
+
+
+def _spring(name: str, content: Section) -> Spring:
+    spring = Spring(
+        *_end(content, 'from'),
+        *_end(content, 'to'),
+        content.number('stiffness', least=0.0, most=STIFFEST, unit='N/m'),
+        content.number('free_length', 0.0, least=0.0, most=STRONGEST_SPRING, unit='m'),
+        content.number('damping', 0.0, least=0.0, most=STIFFEST, unit='N·s/m'),
+        name,
+    )
+    content.finish()
+    return spring
+
+
+def _end(content: Section, key: str) -> tuple[str, str]:
+    """Return link and point of one end of a spring."""
+    link, dot, point = content.text(key).rpartition('.')
+    if not dot or not link or not point:
+        raise content.error(key, f'{content.text(key)!r} is no point', 'write LINK.POINT')
+    return link, point
+
+
+def read_faults(content: Section, members: Sequence[Member]) -> dict[str, Fault]:
+    """
+    Return the faults that a scene names, by their names.
+
+    Raises
+    ------
+    FileError
+        Where one cannot be understood.
+
+    """
+    section = content.section('faults', required=False)
+    parts: dict[str, tuple[str, ...]] = {}
+    for member in members:
+        for kind, names in parts_of(member.linkage).items():
+            parts[kind] = (*parts.get(kind, ()), *(member.prefix + name for name in names))
+    return {section.ros_name(name): _fault(section.section(name), parts) for name in section}
+
+
+def _fault(content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
+    kinds = [key for key in content if key in FAULTS]
+    if len(kinds) != 1:
+        for key in content:
+            if key in (*_WHEN, *FAULTS):
+                content.taken(key)
+        content.finish((*_WHEN, *FAULTS))
+        raise content.error('', f'{len(kinds)} kinds', f'name one of {listed(FAULTS)}')
+    parameters: Any = read_parameters(
+        content.section(kinds[0]), import_module(FAULTS[kinds[0]]).PARAMETERS, parts
+    )
+    at = content.numbers('at', most=1e9) if 'at' in content else []
+    if any(time < 0.0 for time in at):
+        raise content.error('at', f'{at} begins before the first tick', 'write seconds from it on')
+    seconds = content.number('seconds', least=1e-6, most=1e9, unit='s') if at else 0.0
+    content.finish(_WHEN)
+    return Fault(kinds[0], parameters, tuple(at), seconds)
+
+
+def read_storage(content: Section) -> StorageParameters:
+    """Read how a bag is stored out of the section that says how a run is recorded."""
+    storage: StorageParameters = read_parameters(content, StorageParameters, {})
+    for key, least in LEASTS.items():
+        value = getattr(storage, key)
+        if 0 < value < least:
+            raise content.error(key, f'{value:g} is too small', f'write {least:.9g} or more, or 0')
+    if storage.snapshot_seconds:
+        _refuse_what_is_for_a_run(content)
+    elif 'snapshot_bytes' in content:
+        raise content.error(
+            'snapshot_bytes', 'nothing is kept in memory', 'write snapshot_seconds too'
+        )
+    if storage.keep_files and not any(getattr(storage, key) for key in SPLITS):
+        raise content.error(
+            'keep_files', 'there is one file only', f'write {" or ".join(SPLITS)} too'
+        )
+    return storage
+
+
+def _refuse_what_is_for_a_run(content: Section) -> None:
+    """Raise FileError for a key that a snapshot has no use for; one that is 0 says nothing."""
+    for key in AS_THE_RUN_GOES:
+        if content.mapping.get(key, 0) != 0:
+            raise content.error(
+                key,
+                'is for a bag that is written as the run goes, and snapshot_seconds keeps the run '
+                'in memory',
+                'leave one of the two out',
+            )

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a scene says, as frozen types."""
+"""The content of a scene, as frozen types."""
 
 from __future__ import annotations
 
@@ -21,12 +21,85 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from linkage_ros.bag.writing.storage import Storage
+from linkage_ros.bag.writing.storage import COMPRESSIONS, Storage
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.faults.fault import Fault
-from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.scene.section import Section
-from linkage_ros.scene.storage import StorageParameters
+from linkage_ros.files.section import Section
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND, Linkage
+from linkage_ros.parameters import choice, number, Parts, whole
+
+SPLITS = {'split_bytes': 1_000_000, 'split_seconds': 1.0}
+"""
+What makes files of a bag, and the least that it may be where it is not 0.
+
+Each file begins with the scene, the linkages and the types, and costs the disk some ten waits.
+"""
+
+LEASTS: Mapping[str, float] = {**SPLITS, 'snapshot_seconds': 0.1}
+"""What may be 0, for never, and else has to be so much at least."""
+
+AS_THE_RUN_GOES = ('queue', 'flush_period', *SPLITS, 'keep_files')
+"""What has no meaning where a run is kept in memory, and written in one go."""
+
+_DEFAULT = Storage()
+
+
+@dataclass(frozen=True, slots=True)
+class StorageParameters(Storage):
+    """How the bag is stored."""
+
+    flush_period: float = number(
+        'what a power cut may cost: the disk is waited for a little more often',
+        _DEFAULT.flush_period,
+        unit='s',
+        least=0.05,
+        most=60.0,
+    )
+    split_bytes: int = whole(
+        'size at which the next file begins; 0: never',
+        _DEFAULT.split_bytes,
+        unit='bytes',
+        least=0,
+        most=10**15,
+    )
+    split_seconds: float = number(
+        'time after which the next file begins; 0: never',
+        _DEFAULT.split_seconds,
+        unit='s',
+        least=0.0,
+        most=1e9,
+    )
+    keep_files: int = whole(
+        'how many files are kept: the oldest goes when one more begins; 0: all',
+        _DEFAULT.keep_files,
+        least=0,
+        most=1_000_000,
+    )
+    min_free_bytes: int = whole(
+        'what stays free on the disk: where less is, the recording ends; 0: no matter',
+        _DEFAULT.min_free_bytes,
+        unit='bytes',
+        least=0,
+        most=10**15,
+    )
+    compression: str = choice('how messages are packed', COMPRESSIONS, _DEFAULT.compression)
+    snapshot_seconds: float = number(
+        'no bag as the run goes: the last so many seconds are kept in memory, and written when '
+        '~/snapshot asks for them; 0: off',
+        _DEFAULT.snapshot_seconds,
+        unit='s',
+        least=0.0,
+        most=86_400.0,
+    )
+    snapshot_bytes: int = whole(
+        'how much memory that may take: where it is too little, less than snapshot_seconds is '
+        'kept; twice as much while a snapshot is written',
+        _DEFAULT.snapshot_bytes,
+        unit='bytes',
+        least=1_000_000,
+        most=10**12,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +138,9 @@ class Member:
     name
         Its name, which its joints have before their own with an underscore between; '' where the
         scene has one linkage only.
-    linkage
-        The linkage. Where its input joints are published, they are the first of its joints.
+    linkage, closure
+        The linkage, as it is and as it closes. Where its input joints are published, they are the
+        first of its joints.
     drive
         The drive's name, and its parameters.
     effects
@@ -89,6 +163,7 @@ class Member:
 
     name: str
     linkage: Linkage
+    closure: Closure = field(compare=False, repr=False)
     drive: tuple[str, Any]
     effects: Mapping[str, Any]
     loads: Loads | None
@@ -175,3 +250,19 @@ class Scene:
         """Return the effects of one's own that it names and that were not imported."""
         named = (effect for member in self.members for effect in member.not_imported)
         return tuple(dict.fromkeys(named))
+
+
+def parts_of(linkage: Linkage) -> Parts:
+    """Return the parts of a linkage that parameters can name, by their kind."""
+    points = [point for carried in linkage.links.values() for point in carried]
+    # A point in a slot is a pin of its link and the block that the slot stands for.
+    points += [slider.point for slider in linkage.sliders.values() if not slider.block]
+    pins = {point: None for point in points if points.count(point) > 1}
+    return {
+        'joint': tuple(linkage.joints),
+        'input': tuple(given.joint for given in linkage.inputs),
+        'pin': (*pins, *linkage.sliders),
+        'link': tuple(link for link in linkage.links if link != GROUND),
+        'body': tuple(linkage.links),
+        'point': tuple(f'{link}.{p}' for link, carried in linkage.links.items() for p in carried),
+    }

@@ -14,7 +14,7 @@
 
 
 """
-Parts of which the JSON Schemas of scenes and linkages are made, and what parameters declare.
+The JSON Schemas of scene and linkage files, as `load` and `linkage_file` read them.
 
 A schema says what the reader takes, as far as it can know: names of joints, pins and links pass as
 they come. Its words are those of draft 7 and ``$defs``, which editors know, and conditions rather
@@ -24,48 +24,61 @@ than alternatives, so that a violation names one place.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, Field, is_dataclass, MISSING
+from importlib import import_module
 import json
 from math import inf
 from typing import Any
 
+from linkage_ros.drives.drive import DRIVES
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.faults.fault import FAULTS
 from linkage_ros.parameters import (
-    Choice,
+    CHARACTER,
     declared,
-    Each,
-    File,
-    Flag,
-    Group,
-    Kind,
-    Name,
-    Names,
+    is_required,
+    mapping,
+    named,
     Number,
-    Numbers,
+    parameters_schema,
     Point,
-    Rows,
+    Schema,
     Text,
 )
+from linkage_ros.scene.linkage_file import FARTHEST, HEAVIEST, STRONGEST
+from linkage_ros.scene.load import (
+    COARSEST_ACCURACY,
+    FINEST_ACCURACY,
+    HIGHEST_RATE,
+    LOWEST_RATE,
+    STIFFEST,
+    STRONGEST_SPRING,
+)
+from linkage_ros.scene.scene import AS_THE_RUN_GOES, LEASTS, SPLITS, StorageParameters
+from linkage_ros.solvers.registry import SOLVERS
 
-Schema = dict[str, Any]
 DIALECT = 'https://json-schema.org/draft/2020-12/schema'
-
-CHARACTER = r'[^\u0000-\u001f\u007f-\u00a0\u2028\u2029]'
-"""Pattern of a character that prints."""
 
 ROS_NAME = '^[A-Za-z][A-Za-z0-9_]*$'
 
 DOTTED = r'^[^.\s]+(\.[^.\s]+)+$'
 """Pattern of the name of a module within a package."""
 
-KIND_NAMES = {
-    'joint': 'published joint',
-    'input': 'driven joint',
-    'pin': 'pin or slider',
-    'link': 'moving link',
-    'body': 'link or the ground',
-    'point': 'point: LINK.POINT',
+_RATE = 'Ticks a second [Hz]; 0: one for every crank sample.'
+_ONE_SOLVER: Schema = {'not': {'required': ['solver', 'accuracy']}}
+_NO_PLAY_UNDER_TORQUE: Schema = {
+    'if': {
+        'required': ['drive'],
+        'properties': {'drive': {'required': ['torque']}},
+    },
+    'then': {'properties': {'effects': {'properties': {'backlash': False}}}},
 }
-"""What `linkage_ros.parameters.KINDS` are called."""
+_OWN_EFFECT: Schema = {
+    'description': "An effect of one's own: a module that Python finds, and its parameters.",
+    'type': 'object',
+    'additionalProperties': True,
+}
+_SHORTHANDS = ('four_bar', 'inverted_slider_crank')
+_WRITTEN_OUT = ('links', 'input', 'joints')
 
 
 def as_text(schema: Schema) -> str:
@@ -73,142 +86,473 @@ def as_text(schema: Schema) -> str:
     return json.dumps(schema, indent=2, ensure_ascii=False, allow_nan=False) + '\n'
 
 
-def summary(parameters: Any) -> str:
-    """Return the first line of what a type of parameters says of itself."""
-    return str(parameters.__doc__).strip().splitlines()[0]
+def _text(description: str, pattern: str = f'^{CHARACTER}+$') -> Schema:
+    return Text(description, pattern).schema()
 
 
-def mapping(
-    description: str, properties: Mapping[str, Schema], *, required: tuple[str, ...] = ()
-) -> Schema:
-    """Return the schema of a mapping that has these keys and no others."""
-    schema: Schema = {'description': description, 'type': 'object'}
-    if required:
-        schema['required'] = list(required)
-    return {**schema, 'properties': dict(properties), 'additionalProperties': False}
-
-
-def named(description: str, of: Schema) -> Schema:
-    """Return the schema of a mapping whose keys are names."""
-    return {'description': description, 'type': 'object', 'additionalProperties': of}
-
-
-def text(description: str, pattern: str = f'^{CHARACTER}+$') -> Schema:
-    """Return the schema of a text; without a pattern, of one that is not empty."""
-    return {'description': description, 'type': 'string', 'pattern': pattern}
-
-
-def number(
+def _number(
     description: str, *, least: float = -inf, most: float = inf, above: float = -inf
 ) -> Schema:
-    """Return the schema of a number within bounds."""
-    return {'description': description, 'type': 'number', **_bounds(least, most, above)}
+    return Number(description, '', least, most, above).schema()
 
 
-def point(description: str, most: float = inf) -> Schema:
-    """Return the schema of two numbers [x, y]."""
-    return {**_numbers(description, most), 'minItems': 2, 'maxItems': 2}
+def _point(description: str, most: float) -> Schema:
+    return Point(description, '', most).schema()
 
 
-def parameters_schema(of: Any) -> Schema:
-    """
-    Return the schema of what is read into a type of parameters.
+def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
+    """Return the type of parameters of each drive, effect or fault of a registry."""
+    return {name: import_module(module).PARAMETERS for name, module in registry.items()}
 
-    Parameters
-    ----------
-    of
-        The type, as `linkage_ros.parameters` has it.
 
-    """
-    entries = declared(of)
-    return mapping(
-        summary(of),
-        {entry.name: _with_default(_kind(kind), entry) for entry, kind in entries},
-        required=tuple(entry.name for entry, _ in entries if is_required(entry)),
+def scene_schema() -> Schema:
+    """Return the schema of a scene file; it imports all drives, effects and faults."""
+    own = {key: {'$ref': f'#/$defs/{key}'} for key in _of_a_linkage()}
+    whole = mapping(
+        'A linkage or several, what drives them, what is called for, and a recording.',
+        {
+            'linkage': _text('path of the linkage file, relative to the folder of this file'),
+            'linkages': _linkages(own),
+            'rate': {
+                **_number(_RATE, least=0.0, most=HIGHEST_RATE),
+                'if': {'exclusiveMinimum': 0},
+                'then': _number(_RATE, least=LOWEST_RATE),
+                'default': 1000,
+            },
+            'angles': {
+                'description': 'Whether published angles run on, or lie in (−π, π].',
+                'enum': ['continuous', 'wrapped'],
+                'default': 'continuous',
+            },
+            'seed': {
+                'description': 'From which everything random comes; if not said, a number that '
+                'follows from the name of the scene.',
+                'type': 'integer',
+                'minimum': 0,
+                'maximum': 2**53,
+            },
+            **own,
+            'faults': {
+                **named('What can go wrong on demand, by a name for each.', _fault()),
+                'propertyNames': _text('a name: letters, digits and _, a letter first', ROS_NAME),
+            },
+            'record': _record(),
+            'robot_description': {
+                'description': 'Whether the node publishes the linkages as URDF on '
+                'robot_description.',
+                'type': 'boolean',
+                'default': False,
+            },
+        },
     )
-
-
-def is_required(entry: Field[Any]) -> bool:
-    """Return whether a parameter has no default."""
-    return entry.default is MISSING and entry.default_factory is MISSING
-
-
-def default_of(entry: Field[Any]) -> Any:
-    """Return the default of a parameter that has one, as JSON has it."""
-    value = entry.default
-    if entry.default_factory is not MISSING:
-        value = entry.default_factory()
-    if is_dataclass(value) and not isinstance(value, type):
-        value = asdict(value)
-    return json.loads(json.dumps(value))
-
-
-def with_unit(meaning: str, unit: str) -> str:
-    """Return a meaning with the unit behind it."""
-    return f'{meaning} [{unit}]' if unit else meaning
-
-
-def _with_default(schema: Schema, entry: Field[Any]) -> Schema:
-    return schema if is_required(entry) else {**schema, 'default': default_of(entry)}
-
-
-def _kind(kind: Kind) -> Schema:
-    match kind:
-        case Number():
-            return _number(kind)
-        case Numbers():
-            return _numbers(with_unit(kind.meaning, kind.unit), kind.most)
-        case Rows():
-            return _rows(kind)
-        case Flag():
-            return {'description': kind.meaning, 'type': 'boolean'}
-        case Choice():
-            return {'description': kind.meaning, 'enum': list(kind.words)}
-        case Text() | File():
-            return text(kind.meaning)
-        case Point():
-            return point(with_unit(kind.meaning, kind.unit), kind.most)
-        case Name():
-            return text(f'{kind.meaning} (name of a {KIND_NAMES[kind.kind]})')
-        case Names():
-            description = f'{kind.meaning} (names, each of a {KIND_NAMES[kind.kind]})'
-            return {'description': description, 'type': 'array', 'items': text('a name')}
-        case Group():
-            return {**parameters_schema(kind.of), 'description': kind.meaning}
-        case Each():
-            of = parameters_schema(kind.of) if isinstance(kind.of, type) else _kind(kind.of)
-            return named(f'{kind.meaning} (by the name of a {KIND_NAMES[kind.kind]})', of)
-
-
-def _number(kind: Number) -> Schema:
-    schema = number(
-        with_unit(kind.meaning, kind.unit), least=kind.least, most=kind.most, above=kind.above
-    )
-    return {**schema, 'type': 'integer'} if kind.whole else schema
-
-
-def _numbers(description: str, most: float) -> Schema:
-    items = {'type': 'number', **_bounds(-most, most)}
-    return {'description': description, 'type': 'array', 'items': items}
-
-
-def _rows(kind: Rows) -> Schema:
-    row = f'[{", ".join(kind.columns)}]'
-    of = _numbers(row, kind.most)
-    count = len(kind.columns)
     return {
-        'description': f'{kind.meaning}: rows of {row}',
-        'type': 'array',
-        'minItems': 1,
-        'items': {**of, 'minItems': count, 'maxItems': count},
+        '$schema': DIALECT,
+        'title': 'Scene',
+        **whole,
+        'if': {'required': ['linkages']},
+        'then': {'properties': {'linkage': False}},
+        'else': {'required': ['linkage'], **_NO_PLAY_UNDER_TORQUE},
+        **_ONE_SOLVER,
+        '$defs': _of_a_linkage(),
     }
 
 
-def _bounds(least: float, most: float, above: float = -inf) -> Schema:
-    said = (('minimum', least), ('maximum', most), ('exclusiveMinimum', above))
-    return {word: _plain(bound) for word, bound in said if abs(bound) < inf}
+def _linkages(own: Mapping[str, Schema]) -> Schema:
+    one = mapping(
+        'A linkage; what it does not say for itself is as the scene says.',
+        {
+            'name': _text(
+                'its name, which its joints have before their own: letters, digits and _',
+                ROS_NAME,
+            ),
+            'linkage': _text('path of its file, relative to the folder of this file'),
+            **own,
+        },
+        required=('name', 'linkage'),
+    )
+    one |= _ONE_SOLVER | _NO_PLAY_UNDER_TORQUE
+    return {
+        'description': 'Several linkages in the place of one.',
+        'if': {'type': 'array'},
+        'then': {'minItems': 1, 'items': one},
+        'else': one,
+    }
 
 
-def _plain(bound: float) -> float:
-    """Return a whole number without its decimals: a reader of the file sees 1, not 1.0."""
-    return int(bound) if float(bound).is_integer() and abs(bound) < 1e15 else bound
+def _of_a_linkage() -> dict[str, Schema]:
+    """Return what the scene says for all linkages, and each may say for itself."""
+    drives, effects = (
+        {name: parameters_schema(of) for name, of in parameter_types(registry).items()}
+        for registry in (DRIVES, EFFECTS)
+    )
+    return {
+        'publish_input': {
+            'description': 'Whether the input joints are published too, before the others; '
+            'without it, they are where the drive is no topic, or effort is named.',
+            'type': 'boolean',
+        },
+        'beyond_limits': {
+            'description': 'What is published while a joint is beyond its limits: the same as '
+            'within them, or nothing.',
+            'enum': ['publish', 'silent'],
+            'default': 'publish',
+        },
+        'drive': {
+            **mapping('Where the crank comes from: one drive.', drives),
+            'maxProperties': 1,
+            'default': {'topic': {}},
+        },
+        'effects': {
+            **mapping('What is called for beyond positions.', effects),
+            'patternProperties': {DOTTED: _OWN_EFFECT},
+            'default': {},
+        },
+        'solver': _solver(),
+        'accuracy': _number(
+            'Of the positions [rad or m]: the cheapest solver that proves it is chosen.',
+            least=FINEST_ACCURACY,
+            most=COARSEST_ACCURACY,
+        ),
+        'loads': mapping(
+            'The forces that act on the links, where effects or the drive ask for them.',
+            {
+                'gravity': {**_point('gravity: [x, y] [m/s²]', 1e3), 'default': [0, 0]},
+                'springs': named('springs between points of links, by name', _spring()),
+                'drive_inertia': {
+                    **_number(
+                        'of the motor, at the input [kg·m², or kg of a slide]',
+                        least=0.0,
+                        most=STRONGEST_SPRING,
+                    ),
+                    'default': 0,
+                },
+            },
+        ),
+    }
+
+
+def _solver() -> Schema:
+    solvers = parameter_types(SOLVERS)
+    alone = [
+        name
+        for name, of in solvers.items()
+        if not any(is_required(entry) for entry, _ in declared(of))
+    ]
+    one = mapping(
+        'How the loops are closed: one solver.',
+        {name: parameters_schema(of) for name, of in solvers.items()},
+    )
+    others = ', '.join(f'{{{name}: {{…}}}}' for name in solvers if name not in alone)
+    return {
+        'description': one['description'],
+        'if': {'type': 'string'},
+        'then': {'enum': alone, 'description': f'or with its parameters: {others}'},
+        'else': {**one, 'minProperties': 1, 'maxProperties': 1},
+        'default': 'closed_form',
+    }
+
+
+def _spring() -> Schema:
+    end = _text('where it ends: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
+    free = _number('length without a force [m]', least=0.0, most=STRONGEST_SPRING)
+    damping = _number('damping along it [N·s/m]', least=0.0, most=STIFFEST)
+    return mapping(
+        'A spring, with a damper beside it.',
+        {
+            'from': end,
+            'to': end,
+            'stiffness': _number('stiffness [N/m]', least=0.0, most=STIFFEST),
+            'free_length': {**free, 'default': 0},
+            'damping': {**damping, 'default': 0},
+        },
+        required=('from', 'to', 'stiffness'),
+    )
+
+
+def _fault() -> Schema:
+    kinds = {name: parameters_schema(of) for name, of in parameter_types(FAULTS).items()}
+    return {
+        **mapping(
+            'A fault of one kind, injected by service, or at the times that are said.',
+            {
+                **kinds,
+                'at': {
+                    'description': 'when it is injected by itself, from the first tick on [s]',
+                    'type': 'array',
+                    'items': _number('a time [s]', least=0.0, most=1e9),
+                },
+                'seconds': _number('how long it lasts then [s]', least=1e-6, most=1e9),
+            },
+        ),
+        'oneOf': [{'required': [kind]} for kind in kinds],
+        'if': {'required': ['at'], 'properties': {'at': {'minItems': 1}}},
+        'then': {'required': ['seconds']},
+        'else': {'properties': {'seconds': False}},
+    }
+
+
+def _record() -> Schema:
+    storage = parameters_schema(StorageParameters)['properties']
+    for key, least in LEASTS.items():
+        above = {'if': {'exclusiveMinimum': 0}, 'then': {'minimum': least}}
+        storage[key] = {**storage[key], **above}
+    whole = mapping(
+        'How the run is recorded; without it, it is not.',
+        {
+            'directory': {
+                **_text("folder of the bags' folders, relative to where the node is started"),
+                'default': 'runs',
+            },
+            'name': {
+                **_text(
+                    "name of the bag's folder; '': the scene's name and the time; one that exists "
+                    'gets a number',
+                    rf'^(?!\.\.?$)(?!.*/){CHARACTER}*$',
+                ),
+                'default': '',
+            },
+            'queue': {
+                'description': 'how many messages wait for the disk before more are dropped; one '
+                'of more than 16 KiB counts as one for each 16 KiB',
+                'type': 'integer',
+                'minimum': 100,
+                'maximum': 10_000_000,
+                'default': 20_000,
+            },
+            **storage,
+        },
+    )
+    one = {'required': ['split_bytes'], 'properties': {'split_bytes': {'maximum': 0}}}
+    split = {'anyOf': [{'not': one}, _wanted('split_seconds')]}
+    one_file = f'without {" or ".join(SPLITS)} there is one file'
+    alone = {'properties': {'keep_files': {'description': one_file, 'maximum': 0}}}
+    in_memory = 'leave it out: with snapshot_seconds the run is kept in memory'
+    not_in_memory = 'leave it out: without snapshot_seconds nothing is kept in memory'
+    for_a_run = {'description': in_memory, 'maximum': 0}
+    for_memory = {'description': not_in_memory, 'maximum': 0}
+    return {
+        **whole,
+        'allOf': [
+            {'if': split, 'else': alone},
+            {
+                'if': _wanted('snapshot_seconds'),
+                'then': {'properties': dict.fromkeys(AS_THE_RUN_GOES, for_a_run)},
+                'else': {'properties': {'snapshot_bytes': for_memory}},
+            },
+        ],
+    }
+
+
+def _wanted(key: str) -> Schema:
+    """Return the schema of a mapping in which a number is given that is not 0."""
+    return {'required': [key], 'properties': {key: {'exclusiveMinimum': 0}}}
+
+
+def linkage_schema() -> Schema:
+    """Return the schema of a linkage file."""
+    whole = mapping('A planar linkage.', {**_keys(), **_shorthands()})
+    return {
+        '$schema': DIALECT,
+        'title': 'Linkage',
+        **whole,
+        'if': {'anyOf': [{'required': [shorthand]} for shorthand in _SHORTHANDS]},
+        'then': {'maxProperties': 1},
+        'else': {'required': list(_WRITTEN_OUT)},
+    }
+
+
+def _keys() -> dict[str, Schema]:
+    place = _point('where the point lies in the frame of its link: [x, y] [m]', FARTHEST)
+    return {
+        'links': named(
+            'Links, each with its points; a point on two links is a pin; one link is the ground.',
+            named('points of the link, by name', place),
+        ),
+        'input': _input(),
+        'assembly': named(
+            'Of each pin or slider that closes a dyad, the side on which it lies.',
+            _choice('the side', ('left', 'right', 'ahead', 'behind')),
+        ),
+        'sliders': named('Points that stay on lines of other links, by name.', _slider()),
+        'joints': {
+            **named('What is published, in this order, by name.', _joint()),
+            'minProperties': 1,
+        },
+        'traced': {
+            'description': 'Points whose paths are drawn.',
+            'type': 'array',
+            'items': _text('a point'),
+        },
+        'pose': _pose(),
+        'masses': named('What the links weigh, by their names.', _mass()),
+    }
+
+
+def _shorthands() -> dict[str, Schema]:
+    lengths = {
+        key: _number(f'{link} [m]', above=0.0, most=FARTHEST)
+        for key, link in zip('abcd', ('crank', 'coupler', 'rocker', 'ground'), strict=True)
+    }
+    left, ahead = ('left', 'right'), ('ahead', 'behind')
+    return {
+        'four_bar': mapping(
+            'A four-bar by the lengths of its links; stands for a file written out.',
+            {
+                **lengths,
+                'assembly': _choice('side of A→O4 on which B lies', left, left[0]),
+                **_limits_of('coupler_joint', 'rocker_joint'),
+            },
+            required=tuple(lengths),
+        ),
+        'inverted_slider_crank': mapping(
+            'A crank whose rod slides through a swivel; stands for a file written out.',
+            {
+                'a': _number('crank [m]', above=0.0, most=FARTHEST),
+                'swivel': _point("the swivel from the crank's pivot: [x, y] [m]", FARTHEST),
+                'assembly': _choice('side of B on which the swivel lies', ahead, ahead[0]),
+                **_limits_of('rod_joint', 'rod_slide'),
+            },
+            required=('a', 'swivel'),
+        ),
+    }
+
+
+def _input() -> Schema:
+    """Return the schema of one input, or a list of them."""
+    one = {
+        **mapping(
+            'The driven joint; several in a list.',
+            {
+                'joint': _text('its name in crank messages'),
+                'parent': _text('the link that carries the motor'),
+                'child': _text('the link that is turned'),
+                'slider': _text('the slider that is driven, in the place of parent and child'),
+                **_limits(),
+            },
+            required=('joint',),
+        ),
+        **_either_slider,
+    }
+    return {
+        'description': one['description'],
+        'if': {'type': 'array'},
+        'then': {'minItems': 1, 'items': one},
+        'else': one,
+    }
+
+
+def _joint() -> Schema:
+    return {
+        **mapping(
+            "The child's angle less the parent's [rad], or the slide of a slider [m].",
+            {
+                'parent': _text('the link from which the angle is measured'),
+                'child': _text('the link whose angle it is'),
+                'slider': _text('the slider, in the place of parent and child'),
+                **_limits(),
+            },
+        ),
+        **_either_slider,
+    }
+
+
+def _limits() -> dict[str, Schema]:
+    """Return the schemas of what a joint of the machine can do."""
+    return {
+        'limits': {
+            'description': 'between which the joint stays: [low, high] [rad or m]; '
+            '-.inf or .inf for no limit on a side',
+            'type': 'array',
+            'minItems': 2,
+            'maxItems': 2,
+            # The lower one may be -.inf, the upper one .inf: JSON Schema knows them as numbers.
+            'items': {'type': 'number'},
+        },
+        'velocity': _number('its greatest rate [rad/s or m/s]', above=0.0, most=FARTHEST),
+        'effort': _number('its greatest torque or force [N·m or N]', above=0.0, most=STRONGEST),
+    }
+
+
+def _limits_of(*joints: str) -> dict[str, Schema]:
+    """Return the schemas by which a shorthand gives its joints limits."""
+    return {
+        'input': mapping('What the driven joint can do.', _limits()),
+        'joints': mapping(
+            'What the published joints can do, by their names.',
+            {name: mapping('What the joint can do.', _limits()) for name in joints},
+        ),
+    }
+
+
+_either_slider: Schema = {
+    'if': {'required': ['slider']},
+    'then': {'properties': {'parent': False, 'child': False}},
+    'else': {'required': ['parent', 'child']},
+}
+
+
+def _slider() -> Schema:
+    return {
+        **mapping(
+            'A point that stays on a line of the link `along`.',
+            {
+                'point': _text('the point; no point of `along`'),
+                'along': _text('the link that carries the line'),
+                'through': _text('point of `along` on the line; the slide is measured from it'),
+                'direction': _point('of the line, in the frame of `along`: [x, y]', FARTHEST),
+                'block': {
+                    **_text('the link that slides without turning', f'^{CHARACTER}*$'),
+                    'default': '',
+                },
+                'angle': {
+                    **_number(
+                        'angle of the block less that of `along` [rad]',
+                        least=-FARTHEST,
+                        most=FARTHEST,
+                    ),
+                    'default': 0,
+                },
+            },
+            required=('point', 'along', 'through', 'direction'),
+        ),
+        'if': {'required': ['block']},
+        'else': {'properties': {'angle': False}},
+    }
+
+
+def _pose() -> Schema:
+    return mapping(
+        'Where the linkage starts; with points, where the iteration of links does that no dyad '
+        'covers.',
+        {
+            'inputs': {
+                'description': 'a value for each input [rad or m]',
+                'type': 'array',
+                'items': _number('a value', least=-FARTHEST, most=FARTHEST),
+            },
+            'points': named(
+                'points of iterated links in the frame of the ground, roughly',
+                _point('[x, y] [m]', FARTHEST),
+            ),
+        },
+        required=('inputs',),
+    )
+
+
+def _mass() -> Schema:
+    return mapping(
+        'What a link weighs.',
+        {
+            'mass': _number('mass [kg]', above=0.0, most=HEAVIEST),
+            'center': _point("centre of mass in the link's frame: [x, y] [m]", FARTHEST),
+            'inertia': _number(
+                'moment of inertia about the centre of mass [kg·m²]', least=0.0, most=HEAVIEST
+            ),
+        },
+        required=('mass', 'center', 'inertia'),
+    )
+
+
+def _choice(description: str, words: tuple[str, ...], default: str = '') -> Schema:
+    schema: Schema = {'description': description, 'enum': list(words)}
+    return {**schema, 'default': default} if default else schema

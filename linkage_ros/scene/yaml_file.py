@@ -28,8 +28,8 @@ from typing import Any, cast
 
 from linkage_ros.bounded_yaml import BoundedLoader
 from linkage_ros.errors import FileError, quoted
+from linkage_ros.files.section import LinedDict, Section
 from linkage_ros.regular_file import read_regular
-from linkage_ros.scene.section import LinedDict, Section
 import yaml
 
 _LARGEST_FILE = 1_000_000

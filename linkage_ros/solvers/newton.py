@@ -22,39 +22,362 @@ two real equations. With × for the z component of the cross product::
     F_p·δp + F_q·δq = −F      δp = F_q × F/(F_p × F_q)      δq = F × F_p/(F_p × F_q)
 
 until both corrections are below the tolerance, in [rad] or [m]: the error that is left is of the
-size of their square. Rates and accelerations solve the same for what F changes by with p and q
-held. The sign of F_p × F_q is that of the assembly. It has to be the one that the closed form has
-about there; where it is not, near a toggle or a change point, where the method does not converge,
-and where the loops do not close, the state is that of the closed form. So the hard cases stay as
-they are. Groups that no dyad covers are iterated in any case, here to the tolerance.
+size of their square. Rates and accelerations solve the same equations for the change of F while p
+and q, or their rates, are held. F_p × F_q is 0 where the dyad folds or stretches, and its sign is
+that of the assembly. The closed form gives the state where the sign is not the one that the closed
+form has nearby (near a toggle or a change point), where the method does not converge, and where
+the loops do not close. Groups that no dyad covers are iterated in any case, here to the tolerance.
 
-It starts from the closed form at the nearest of `knots`, carried forward by the rates there: a
-state depends on the inputs alone. It may also start from its last state (``warm``); then a state
-depends, within the tolerance, on those before it.
+The method starts from the closed form at a knot, carried forward by the rates there. Knots lie 256
+to a turn of an input, or to the unit of length, and a state takes the nearest. A knot counts only
+if the loops close there and at its neighbours in the same assembly, so that no change point lies
+between a state and its knot. Knots are computed when they are asked for and depend on nothing
+else, so a state depends on the inputs alone. The method may also start from its last state
+(``warm``); then a state depends, within the tolerance, on those before it.
 """
 
 from __future__ import annotations
 
+from cmath import rect
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import copysign
-from typing import Any, TYPE_CHECKING
+from math import copysign, tau
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
+from linkage_ros.kinematics.plane import cross
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import PLACED, State, Step
 from linkage_ros.kinematics.structure import Dyad, Iterated
 from linkage_ros.kinematics.survey import usual_inputs
 from linkage_ros.parameters import number
-from linkage_ros.solvers.knots import Knots
-from linkage_ros.solvers.loops import LoopFinder
-from linkage_ros.solvers.newton_dyad import NewtonDyad
+from linkage_ros.solvers.loops import LoopFinder, Loops, Vector
 from linkage_ros.solvers.solver import Solver
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch import Batch
-    from numpy.typing import ArrayLike
+    pass
+
+
+_PER_TURN = 256
+_MOST = 2**16
+"""Knots that are kept; beyond it they are worked out again."""
+
+
+class Knot(NamedTuple):
+    """
+    The closed form at a knot.
+
+    Attributes
+    ----------
+    inputs
+        As coordinates.
+    coordinates
+        All of them.
+    slopes
+        For each input the derivatives of all coordinates.
+    signs
+        For each dyad its assembly: +1 or −1.
+
+    """
+
+    inputs: tuple[float, ...]
+    coordinates: list[float]
+    slopes: tuple[list[float], ...]
+    signs: tuple[float, ...]
+
+
+class Knots:
+    """
+    Knots of a linkage.
+
+    Parameters
+    ----------
+    closed
+        The linkage in closed form.
+    orientations
+        Returns for given coordinates of a closed position how each dyad is oriented: a sign.
+    repeats
+        Whether everything is the same again after two turns of an input.
+
+    """
+
+    def __init__(
+        self,
+        closed: Closure,
+        orientations: Callable[[list[float]], tuple[float, ...]],
+        repeats: bool,
+    ) -> None:
+        self._closed = closed
+        self._orientations = orientations
+        self._spacing = [
+            (1.0 if given.slider else tau) / _PER_TURN for given in closed.linkage.inputs
+        ]
+        self._period = [
+            2 * _PER_TURN if repeats and not given.slider else 0 for given in closed.linkage.inputs
+        ]
+        self._units = [closed.scale if given.slider else 1.0 for given in closed.linkage.inputs]
+        self._knots: dict[tuple[int, ...], Knot | None] = {}
+        self._signs: dict[tuple[int, ...], tuple[float, ...] | None] = {}
+
+    def near(self, inputs: Sequence[float]) -> tuple[Knot | None, list[float]]:
+        """Return the knot nearest to some inputs, given as coordinates, and how far these are."""
+        numbers, offsets = [], []
+        for value, spacing, period in zip(inputs, self._spacing, self._period, strict=True):
+            number = round(value / spacing)
+            offsets.append(value - number * spacing)
+            numbers.append(number % period if period else number)
+        key = tuple(numbers)
+        try:
+            return self._knots[key], offsets
+        except KeyError:
+            return self._new(key), offsets
+
+    def _new(self, key: tuple[int, ...]) -> Knot | None:
+        if len(self._knots) >= _MOST:
+            self._knots.clear()
+            self._signs.clear()
+        self._knots[key] = knot = self._knot(key)
+        return knot
+
+    def _knot(self, key: tuple[int, ...]) -> Knot | None:
+        signs = self._signs_at(key)
+        around = [
+            tuple(number + step * (k == i) for k, number in enumerate(key))
+            for i in range(len(key))
+            for step in (-1, 1)
+        ]
+        if signs is None or any(self._signs_at(other) != signs for other in around):
+            return None
+        given = self._given(key)
+        closed = self._closed
+        position = closed.position(*given)
+        slopes = []
+        for i in range(len(key)):
+            rates = [self._units[i] if k == i else 0.0 for k in range(len(key))]
+            slopes.append(closed.velocity(position, *rates).state.coordinates)
+        coordinates, count = position.state.coordinates, len(key)
+        return Knot(tuple(coordinates[1:][:count]), coordinates, tuple(slopes), signs)
+
+    def _signs_at(self, key: tuple[int, ...]) -> tuple[float, ...] | None:
+        """Return the assembly of each dyad, or nothing where a loop is not closed."""
+        if key not in self._signs:
+            position = self._closed.position(*self._given(key))
+            closed = position.status in (Status.CLOSED, Status.LIMITED)
+            self._signs[key] = self._orientations(position.state.coordinates) if closed else None
+        return self._signs[key]
+
+    def _given(self, key: tuple[int, ...]) -> list[float]:
+        return [
+            number * spacing * unit
+            for number, spacing, unit in zip(key, self._spacing, self._units, strict=True)
+        ]
+
+
+_STEPS = 12
+"""Of Newton's method; a cold start takes up to ten."""
+
+LEAST_SINE = 0.05
+"""Sine of the angle between F_p and F_q below which the dyad is too near to folding."""
+
+_ROUNDING = 16.0 * UNIT_ROUNDOFF
+
+
+class NewtonDyad:
+    """
+    A dyad.
+
+    Parameters
+    ----------
+    loops
+        Its loop.
+    tolerance
+        What corrections of an angle are below at the end, in [rad].
+    slide_tolerance
+        Likewise of a slide, in the unit of the lengths.
+
+    """
+
+    __slots__ = ('_arms', '_constant', '_first', '_known', '_new', '_tolerances', '_two_arms')
+
+    def __init__(self, loops: Loops, tolerance: float, slide_tolerance: float) -> None:
+        self._first, second = loops.coordinates
+        (vectors,) = loops.equations
+        new = tuple(v for v in vectors if {self._first, second} & {*dict(v.turns), v.slide})
+        known = [v for v in vectors if v not in new]
+        self._new = new
+        self._constant = sum((v.factor for v in known if not v.turns and v.slide < 0), 0j)
+        single = [v for v in known if v.slide < 0 and len(v.turns) == 1 and v.turns[0][1] > 0.0]
+        self._arms = tuple((v.factor, v.turns[0][0]) for v in single)
+        self._known = tuple(
+            v for v in known if v not in single and (v.turns or v.slide >= 0 or v.pin >= 0)
+        )
+        sliding = {v.slide for v in new}
+        self._tolerances = tuple(
+            max(slide_tolerance if k in sliding else tolerance, _ROUNDING)
+            for k in (self._first, second)
+        )
+        by_turns = {v.turns: v.factor for v in new if v.slide < 0}
+        turns = ((self._first, 1.0),), ((second, 1.0),)
+        self._two_arms = None
+        if len(new) == 2 and set(by_turns) == set(turns):
+            self._two_arms = by_turns[turns[0]], by_turns[turns[1]]
+
+    def close(self, x: list[float], pins: list[complex], p: float, q: float, sign: float) -> bool:
+        """
+        Append p and q to the coordinates, or say that there is nothing that could be.
+
+        Parameters
+        ----------
+        x, pins
+            What is known; of pins what iterations have placed.
+        p, q
+            Where to start.
+        sign
+            Of F_p × F_q.
+
+        """
+        known = self._constant
+        for factor, arm in self._arms:
+            known += factor * rect(1.0, x[arm])
+        for vector in self._known:
+            known += _value(vector, x, pins)
+        if self._two_arms is None:
+            return self._close_any(x, pins, known, p, q, sign)
+        first, second = self._two_arms
+        p_least, q_least = self._tolerances
+        for _ in range(_STEPS):
+            one, other = first * rect(1.0, p), second * rect(1.0, q)
+            off = known + one + other
+            # F_p = i·one, F_q = i·other.
+            across = one.real * other.imag - one.imag * other.real
+            if not across:
+                return False
+            dp = -(other.real * off.real + other.imag * off.imag) / across
+            dq = (one.real * off.real + one.imag * off.imag) / across
+            p += dp
+            q += dq
+            if -p_least <= dp <= p_least and -q_least <= dq <= q_least:
+                x += (p, q)
+                return across * sign >= LEAST_SINE * abs(one) * abs(other)
+        return False
+
+    def _close_any(
+        self, x: list[float], pins: list[complex], known: complex, p: float, q: float, sign: float
+    ) -> bool:
+        first = self._first
+        x += (p, q)
+        p_least, q_least = self._tolerances
+        for _ in range(_STEPS):
+            off = known
+            for vector in self._new:
+                off += _value(vector, x, pins)
+            by_p, by_q = self._slopes(x)
+            across = cross(by_p, by_q)
+            if not across:
+                break
+            dp, dq = cross(by_q, off) / across, cross(off, by_p) / across
+            x[first] += dp
+            x[first + 1] += dq
+            if -p_least <= dp <= p_least and -q_least <= dq <= q_least:
+                return across * sign >= LEAST_SINE * abs(by_p) * abs(by_q)
+        del x[first:]
+        return False
+
+    def orientation(self, x: list[float]) -> float:
+        """Return the sine of the angle from F_p to F_q."""
+        by_p, by_q = self._slopes(x)
+        return cross(by_p, by_q) / (abs(by_p) * abs(by_q))
+
+    def rates(
+        self, x: list[float], pins: list[complex], v: list[float], speeds: list[complex]
+    ) -> None:
+        """Append the rates of p and q, given those of what is known."""
+        v += (0.0, 0.0)
+        drift = 0j
+        for factor, arm in self._arms:
+            drift += 1j * (v[arm] * (factor * rect(1.0, x[arm])))
+        for vector in (*self._known, *self._new):
+            drift += _rate(vector, x, pins, v, speeds)
+        self._solve(x, drift, v)
+
+    def accelerations(
+        self,
+        x: list[float],
+        v: list[float],
+        a: list[float],
+        pulls: list[complex],
+    ) -> None:
+        """Append the accelerations of p and q, given those of what is known."""
+        a += (0.0, 0.0)
+        drift = 0j
+        for factor, arm in self._arms:
+            drift += complex(-v[arm] * v[arm], a[arm]) * (factor * rect(1.0, x[arm]))
+        for vector in (*self._known, *self._new):
+            drift += _acceleration(vector, x, v, a, pulls)
+        self._solve(x, drift, a)
+
+    def _solve(self, x: list[float], drift: complex, into: list[float]) -> None:
+        by_p, by_q = self._slopes(x)
+        across = cross(by_p, by_q)
+        into[self._first] = cross(by_q, drift) / across
+        into[self._first + 1] = cross(drift, by_p) / across
+
+    def _slopes(self, x: list[float]) -> tuple[complex, complex]:
+        """Return F_p and F_q."""
+        first = self._first
+        found = [0j, 0j]
+        for factor, turns, slide, _ in self._new:
+            unit = factor * rect(1.0, sum([sign * x[k] for k, sign in turns]))
+            if slide >= first:
+                found[slide - first] += unit
+            if slide >= 0:
+                unit *= x[slide]
+            for k, sign in turns:
+                if k >= first:
+                    found[k - first] += sign * 1j * unit
+        return found[0], found[1]
+
+
+def _value(vector: Vector, x: list[float], pins: list[complex]) -> complex:
+    factor, turns, slide, pin = vector
+    if pin >= 0:
+        return factor * pins[pin]
+    unit = factor * rect(1.0, sum([sign * x[k] for k, sign in turns]))
+    return unit if slide < 0 else unit * x[slide]
+
+
+def _rate(
+    vector: Vector, x: list[float], pins: list[complex], v: list[float], speeds: list[complex]
+) -> complex:
+    """Return the derivative: e^{iφ}·(ṡ + iφ̇·s)."""
+    factor, turns, slide, pin = vector
+    if pin >= 0:
+        return factor * speeds[pin]
+    unit = factor * rect(1.0, sum([sign * x[k] for k, sign in turns]))
+    turn = sum([sign * v[k] for k, sign in turns])
+    if slide < 0:
+        return 1j * turn * unit
+    return complex(v[slide], turn * x[slide]) * unit
+
+
+def _acceleration(
+    vector: Vector, x: list[float], v: list[float], a: list[float], pulls: list[complex]
+) -> complex:
+    """Return the second derivative: e^{iφ}·(s̈ − φ̇²·s + i(φ̈·s + 2φ̇·ṡ))."""
+    factor, turns, slide, pin = vector
+    if pin >= 0:
+        return factor * pulls[pin]
+    unit = factor * rect(1.0, sum([sign * x[k] for k, sign in turns]))
+    turn = sum([sign * v[k] for k, sign in turns])
+    change = sum([sign * a[k] for k, sign in turns])
+    if slide < 0:
+        return complex(-turn * turn, change) * unit
+    s, way = x[slide], v[slide]
+    return complex(a[slide] - turn * turn * s, change * s + 2.0 * turn * way) * unit
+
 
 PLACING = (FixedPoint, PointOnLink, PointOnRail)
 """Steps that place a pin and find no coordinate."""
@@ -229,19 +552,6 @@ class NewtonClosure(Solver):
                 part.accelerations(pose, rate, state, speeds, changes)
         return Acceleration(self._joints(a), changes, self)
 
-    def solve(
-        self,
-        *inputs: ArrayLike,
-        rates: Any = None,
-        accelerations: Any = None,
-        derivatives: int = 2,
-        out: Batch | None = None,
-    ) -> Batch:
-        """Solve many states, one after the other; as `Closure.solve` says."""
-        from linkage_ros.solvers.one_by_one import solve_one_by_one  # local import: no tick asks
-
-        return solve_one_by_one(self, inputs, rates, accelerations, derivatives, out)
-
     def placed(self, position: Position) -> Position:
         """Return a position that knows angles, slides and pins of all links."""
         if not isinstance(position.poses, _Found):
@@ -279,10 +589,10 @@ class NewtonClosure(Solver):
             elif isinstance(groups[group], Dyad):
                 plan.append(NewtonDyad(next(loops), tolerance, tolerance / self.scale))
             else:
-                from linkage_ros.solvers.looser import looser  # local import: it loads numpy
+                from linkage_ros.solvers import early_stopping  # local import: it loads numpy
 
                 next(loops)
-                plan.append(looser(step, tolerance))
+                plan.append(early_stopping.early_stopping(step, tolerance))
         return tuple(plan), iterates
 
     def _orientations(self, x: list[float]) -> tuple[float, ...]:

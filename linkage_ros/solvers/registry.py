@@ -14,15 +14,35 @@
 
 
 """
-The solvers that a scene can name, each in a module of its own, imported only where it is.
+The solvers that a scene can name; each is imported only where a scene names it.
 
 A module has ``PARAMETERS``, the type of its parameters (see `linkage_ros.parameters`), and
 ``build(parameters, linkage) -> Closure``.
 """
 
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Linkage
+
 SOLVERS = {
-    'closed_form': 'linkage_ros.solvers.closed_form',
+    'closed_form': 'linkage_ros.solvers.registry',
     'newton': 'linkage_ros.solvers.newton',
     'table': 'linkage_ros.solvers.table',
 }
 """Name of each solver, and the module that holds it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClosedFormParameters:
+    """Each dyad in closed form: as accurate as doubles allow, toggles and change points too."""
+
+
+PARAMETERS = ClosedFormParameters
+
+
+def build(_parameters: ClosedFormParameters, linkage: Linkage) -> Closure:
+    """Build the closed form, which a scene gets too where it names no solver."""
+    return Closure(linkage)

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.closure import (
     Acceleration,
@@ -35,6 +35,11 @@ from linkage_ros.kinematics.closure import (
 )
 from linkage_ros.kinematics.nearness import Nearness, SingularInput
 from linkage_ros.kinematics.ranges import InputRange
+from linkage_ros.kinematics.status import Status
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.batch import Batch
+    from numpy.typing import ArrayLike
 
 
 class Choice(NamedTuple):
@@ -79,6 +84,45 @@ class Solver(Closure):
         self._keep_limits()
         self.closed = closed
         self.choice: Choice | None = None
+
+    def solve(
+        self,
+        *inputs: ArrayLike,
+        rates: Any = None,
+        accelerations: Any = None,
+        derivatives: int = 2,
+        out: Batch | None = None,
+    ) -> Batch:
+        """Solve many states as `Closure.solve`; another way takes one after the other."""
+        batch = self.closed.solve(
+            *inputs, rates=rates, accelerations=accelerations, derivatives=derivatives, out=out
+        )
+        if self.by_steps:
+            return batch
+        from linkage_ros.kinematics.batch import CODES  # local import: it loads numpy
+        import numpy as np  # local import: the batch alone needs it
+
+        count, driven = len(batch.status), len(inputs)
+        given, speeds, changes = (
+            _rows(values, driven, count)
+            for values in (
+                inputs,
+                [1.0] * driven if rates is None else rates,
+                [0.0] * driven if accelerations is None else accelerations,
+            )
+        )
+        solved = np.isin(batch.status, (CODES[Status.CLOSED], CODES[Status.LIMITED]))
+        for k in np.flatnonzero(solved).tolist():
+            position = self.position(*(values[k] for values in given))
+            batch.positions[:, k] = position.joints
+            if batch.velocities is not None:
+                velocity = self.velocity(position, *(values[k] for values in speeds))
+                batch.velocities[:, k] = velocity.joints
+                if batch.accelerations is not None:
+                    batch.accelerations[:, k] = self.acceleration(
+                        position, velocity, *(values[k] for values in changes)
+                    ).joints
+        return batch
 
     def exact(self, position: Position) -> Position:
         """Return what the closed form has at the inputs of a position."""
@@ -128,3 +172,12 @@ class Solver(Closure):
     def nearness(self, position: Position) -> Nearness:
         """Return how near trouble a closed position is."""
         return self.closed.nearness(self.exact(position))
+
+
+def _rows(values: Any, driven: int, count: int) -> list[list[float]]:
+    """Return for each driven joint its values, one a state; a single one needs no list."""
+    import numpy as np  # local import: the batch alone needs it
+
+    if driven == 1 and not isinstance(values, list | tuple) and np.ndim(values) < 2:
+        values = [values]
+    return [np.broadcast_to(np.asarray(value, np.float64), count).tolist() for value in values]

@@ -51,8 +51,7 @@ from linkage_ros.solvers.solver import Solver
 import numpy as np
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.batch import Batch
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
 Order = Literal['linear', 'hermite']
 ORDERS: dict[Order, int] = {'linear': 1, 'hermite': 3}
@@ -167,8 +166,7 @@ class TableClosure(Solver):
         self.proven = self.proven_rate = inf
         if knots is None:
             from linkage_ros.solvers.loops import LoopFinder  # local import: to prove only
-            from linkage_ros.solvers.proof import knots_for  # local import: to prove only
-            from linkage_ros.solvers.task import Task  # local import: to prove only
+            from linkage_ros.solvers.proof import knots_for, TableRequest  # local import: likewise
 
             assert tolerance is not None
             finder = LoopFinder(linkage, self.structure, self._known)
@@ -176,8 +174,8 @@ class TableClosure(Solver):
                 (finder.difference(i, j), factor, constant)
                 for i, j, factor, constant in self._terms
             ]
-            task = Task(self.closed, finder.find(), joints, tolerance, order)
-            knots, self.proven, self.proven_rate = knots_for(task, intervals)
+            request = TableRequest(self.closed, finder.find(), joints, tolerance, order)
+            knots, self.proven, self.proven_rate = knots_for(request, intervals)
         self.knots = knots
         self._degree = ORDERS[order]
         self._parts = [
@@ -309,19 +307,6 @@ class TableClosure(Solver):
                 joints += (pull * c[i + 1],)
         given = change if self._factors is None else change * self._factors[0]
         return Acceleration(joints, State([0.0, given], self._no_pins), self)
-
-    def solve(
-        self,
-        *inputs: ArrayLike,
-        rates: Any = None,
-        accelerations: Any = None,
-        derivatives: int = 2,
-        out: Batch | None = None,
-    ) -> Batch:
-        """Solve many states, one after the other; as `Closure.solve` says."""
-        from linkage_ros.solvers.one_by_one import solve_one_by_one  # local import: no tick asks
-
-        return solve_one_by_one(self, inputs, rates, accelerations, derivatives, out)
 
     def _elsewhere(self, x: float) -> tuple[_Part | None, float]:
         """Return the part of the table in which an input lies, if one does, and where in it."""

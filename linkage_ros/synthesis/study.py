@@ -17,22 +17,184 @@
 A search over random candidates: here, or by the workers of a Dask scheduler.
 
 Candidates come in chunks. Each chunk draws from a generator of its own, seeded by the study's seed
-and the chunk's number, and results are ordered by score, then by place in the study. So what is
-found depends neither on how many workers there are nor on which of them is first. (To the last
-bit where they have the same processor and the same numpy; elsewhere as far as its exp and sin
-agree.)
+and the chunk's number, and results are ordered by score, then by place in the study. So the result
+depends neither on the number of workers nor on which of them is first. (To the last bit where they
+have the same processor and the same numpy; elsewhere as far as its exp and sin agree.)
+
+Dask itself starts the work of a worker that died again. Whatever it cannot mend ends in one error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import closing
+import asyncio
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import (
+    CancelledError,
+    FIRST_COMPLETED,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import closing, contextmanager
 from functools import partial
-from typing import NamedTuple, Protocol
+from itertools import islice
+from logging import CRITICAL, getLogger
+from pkgutil import resolve_name
+from typing import Any, NamedTuple, Protocol, TypeVar
 
-from linkage_ros.synthesis.workers import results_of
+import linkage_ros
+from linkage_ros.errors import LinkageError
+from linkage_ros.synthesis.extras import distributed
 import numpy as np
 from numpy.typing import NDArray
+
+Part = TypeVar('Part')
+Result = TypeVar('Result')
+
+_AHEAD = 3
+"""Tasks under way for each thread of the workers: no thread waits, and no queue grows."""
+
+_PATIENCE = 10.0
+"""Seconds until a scheduler that does not answer is none, and between two looks at workers from
+which nothing comes."""
+
+
+def results_of(
+    work: Callable[[Part], Result], parts: Callable[[int], Iterator[Part]], address: str
+) -> Generator[tuple[Part, Result], None, None]:
+    """
+    Give parts and what they come to, in the order in which they come.
+
+    Parameters
+    ----------
+    work
+        Takes a part; it goes to the workers by pickle.
+    parts
+        Takes the number of threads that the workers have, and gives parts as they are asked for.
+    address
+        Of the scheduler.
+
+    Raises
+    ------
+    LinkageError
+        Where the scheduler or its workers cannot do it. What the work raises comes as it is.
+
+    """
+    with _client(address) as client:
+        _check_workers(address, client)
+        waiting = parts(_threads(address, client))
+        # Futures of the standard library's: waiting for them can be given up.
+        executor = client.get_executor(pure=False)
+        running: dict[Future[Result], Part] = {}
+        while True:
+            room = _AHEAD * _threads(address, client) - len(running)
+            for part in islice(waiting, max(room, 0)):
+                running[executor.submit(work, part)] = part
+            if not running:
+                return
+            for future in wait(running, _PATIENCE, FIRST_COMPLETED).done:
+                yield running.pop(future), _result(address, future)
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
+    dask = distributed()
+    # What it logs when a connection is lost, with traceback, ends in an error here.
+    log = getLogger('distributed.client')
+    level = log.level
+    log.setLevel(CRITICAL)
+    try:
+        _knock(address)
+        with dask.Client(address, timeout=_PATIENCE, set_as_default=False) as client:
+            yield client
+    finally:
+        log.setLevel(level)
+
+
+def _knock(address: str) -> None:
+    """Refuse an address that is not a scheduler's; a client would wait for one that is silent."""
+    dask = distributed()
+
+    async def identity() -> Any:
+        secrets = dask.Security().get_connection_args('client')
+        async with dask.rpc(address, timeout=_PATIENCE, connection_args=secrets) as server:
+            # Longer than to connect, so that who does not listen is not called silent.
+            return await asyncio.wait_for(server.identity(), 1.5 * _PATIENCE)
+
+    try:
+        # In a thread of its own: who calls may have a loop that is running.
+        with ThreadPoolExecutor(1) as thread:
+            found = thread.submit(asyncio.run, identity()).result()
+    # An address without host or port, or of an unknown kind, has an error of its own each.
+    except (OSError, asyncio.TimeoutError, ValueError, TypeError, AssertionError) as error:
+        raise LinkageError(
+            address,
+            f'no Dask scheduler answers here ({str(error) or "it is silent"})',
+            'start one by `dask scheduler`, and give the address that it prints',
+        ) from error
+    if found['type'] != 'Scheduler':
+        raise LinkageError(
+            address, f'is a Dask {found["type"]}', 'give the address of the scheduler'
+        )
+
+
+def _check_workers(address: str, client: Any) -> None:
+    """Refuse workers that have another version of this package, or none."""
+    try:
+        client.wait_for_workers(1, timeout=_PATIENCE)
+    except asyncio.TimeoutError:
+        raise _no_workers(address) from None
+    name = linkage_ros.__name__
+    versions = client.run(resolve_name, f'{name}:__version__', on_error='return')
+    for worker, version in versions.items():
+        if isinstance(version, ImportError):
+            raise _not_importable(worker, version)
+        if isinstance(version, str) and version != linkage_ros.__version__:
+            raise LinkageError(
+                worker,
+                f'this worker has {name} {version}, and here is {linkage_ros.__version__}',
+                'install the same on all, so that they find the same',
+            )
+
+
+def _threads(address: str, client: Any) -> int:
+    try:
+        threads = sum(client.nthreads().values())
+    except OSError as error:
+        raise _lost(address) from error
+    if not threads:
+        raise _no_workers(address)
+    return int(threads)
+
+
+def _result(address: str, future: Future[Result]) -> Result:
+    try:
+        return future.result()
+    except ImportError as error:
+        raise _not_importable('Dask workers', error) from error
+    except distributed().KilledWorker as error:
+        raise LinkageError(
+            address,
+            f'{error.allowed_failures + 1} workers died at the same task, one after the other',
+            'look into their logs: memory is the usual reason',
+        ) from error
+    except (CancelledError, distributed().comm.CommClosedError) as error:
+        raise _lost(address) from error
+
+
+def _not_importable(where: str, error: ImportError) -> LinkageError:
+    return LinkageError(
+        where, f'cannot import {error.name}', 'install the same on all workers as here'
+    )
+
+
+def _no_workers(address: str) -> LinkageError:
+    return LinkageError(address, 'the scheduler has no workers', f'start `dask worker {address}`')
+
+
+def _lost(address: str) -> LinkageError:
+    return LinkageError(address, 'the scheduler was lost', 'start it again, and then the study')
+
 
 Array = NDArray[np.float64]
 

@@ -24,9 +24,10 @@ from linkage_ros.effects import clearance
 from linkage_ros.effects.clearance import ClearanceParameters
 from linkage_ros.effects.stage import EFFECTS, NEEDS
 from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.parameters import read_parameters
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.read import parts_of, read_parameters
+from linkage_ros.scene.scene import parts_of
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 from rosbags.typesys import get_typestore, Stores

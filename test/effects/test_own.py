@@ -37,7 +37,7 @@ from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import own_effects_here
 from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.scene_schema import scene_schema
+from linkage_ros.scene.schema import scene_schema
 from linkage_ros.scene.yaml_file import read_yaml
 import pytest
 

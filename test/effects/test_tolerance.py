@@ -28,10 +28,11 @@ from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.effects.tolerance import alter, ToleranceParameters
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.parameters import read_parameters
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.read import parts_of, read_parameters
+from linkage_ros.scene.scene import parts_of
 from linkage_ros.scene.yaml_file import parse_yaml
 import mpmath
 import pytest

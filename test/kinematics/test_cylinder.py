@@ -30,7 +30,7 @@ from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import Way
 from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.stand_in import scene_text_for
+from linkage_ros.scene.linkage_text import scene_text_for
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
@@ -127,7 +127,7 @@ def test_one_that_starts_behind_its_pin_stays_there():
     said = cylinder(pose='pose: {inputs: [-1.0]}')
     (one,) = said.input_ranges
     assert one.highest < 0.0
-    assert 'mean: -' in scene_text_for(said.linkage, 'c.yaml')
+    assert 'mean: -' in scene_text_for(said, 'c.yaml')
 
 
 def test_limits_say_the_side_too():

@@ -78,11 +78,11 @@ def moving(file):
 
 def moving_text(text):
     """Return the pipeline of a linkage that is the text of a file, driven as a file alone is."""
-    from linkage_ros.scene.linkage_file import read_linkage
-    from linkage_ros.scene.stand_in import scene_text_for
+    from linkage_ros.scene.linkage_file import read_closure
+    from linkage_ros.scene.linkage_text import scene_text_for
     from linkage_ros.scene.yaml_file import parse_yaml
 
-    scene = scene_text_for(read_linkage(parse_yaml(text.encode(), 'it')), 'linkage.yaml')
+    scene = scene_text_for(read_closure(parse_yaml(text.encode(), 'it')), 'linkage.yaml')
     files = {'scene.yaml': scene.encode(), 'linkage.yaml': text.encode()}
     return Pipeline(parse_scene('it', 'it', files))
 

@@ -23,10 +23,10 @@ from typing import Any
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import FileError
+from linkage_ros.files.section import Section
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.section import Section
 from linkage_ros.scene.yaml_file import read_yaml
 import pytest
 import yaml

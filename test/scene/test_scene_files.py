@@ -24,8 +24,7 @@ from linkage_ros.effects.velocity import VelocityParameters
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
-from linkage_ros.scene.scene import RecordParameters
-from linkage_ros.scene.storage import StorageParameters
+from linkage_ros.scene.scene import RecordParameters, StorageParameters
 import pytest
 
 from .files import CONFIG, FOUR_BAR, SCENE

@@ -30,6 +30,7 @@ from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import FileError
 from linkage_ros.faults.fault import FAULTS
+from linkage_ros.files.section import Section
 from linkage_ros.parameters import (
     Choice,
     choice,
@@ -51,8 +52,10 @@ from linkage_ros.parameters import (
     number,
     Numbers,
     numbers,
+    parameters_schema,
     Point,
     point,
+    read_parameters,
     Rows,
     rows,
     Text,
@@ -60,12 +63,8 @@ from linkage_ros.parameters import (
     whole,
 )
 from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.linkage_schema import linkage_schema
 from linkage_ros.scene.load import load_scene, parse_scene
-from linkage_ros.scene.read import read_parameters
-from linkage_ros.scene.scene_schema import parameter_types, scene_schema
-from linkage_ros.scene.schema import as_text, KIND_NAMES, parameters_schema
-from linkage_ros.scene.section import Section
+from linkage_ros.scene.schema import as_text, linkage_schema, parameter_types, scene_schema
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 import yaml
@@ -144,10 +143,6 @@ def test_no_mapping_lets_strangers_in():
             # Either keys are known, or they are names and their values are.
             assert one['additionalProperties'] is False or 'properties' not in one
             assert one['additionalProperties'] != {}
-
-
-def test_every_kind_of_part_has_a_name():
-    assert tuple(KIND_NAMES) == KINDS
 
 
 # Appended to a scene that says no more than its linkage. A schema cannot know what follows in

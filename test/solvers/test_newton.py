@@ -26,8 +26,7 @@ from hypothesis import strategies as st
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.solvers.loops import LoopFinder
-from linkage_ros.solvers.newton import NewtonClosure
-from linkage_ros.solvers.newton_dyad import NewtonDyad
+from linkage_ros.solvers.newton import NewtonClosure, NewtonDyad
 import pytest
 
 from .linkages import (

@@ -22,9 +22,16 @@ from math import tau
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.solvers.cells import Cells, enclose
-from linkage_ros.solvers.discs import Disc, facing, jet_product, product, total
 from linkage_ros.solvers.loops import LoopFinder
+from linkage_ros.solvers.validated_enclosure import (
+    Cells,
+    Disc,
+    enclose,
+    facing,
+    jet_product,
+    product,
+    total,
+)
 from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest

@@ -28,7 +28,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import replay
 from linkage_ros.scene.load import load_scene, parse_scene
-from linkage_ros.scene.scene_schema import scene_schema
+from linkage_ros.scene.schema import scene_schema
 from linkage_ros.scene.yaml_file import parse_yaml
 from linkage_ros.solvers import choose as choosing
 from linkage_ros.solvers.newton import NewtonClosure

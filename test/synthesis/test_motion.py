@@ -20,9 +20,14 @@ from math import inf, nan, pi, radians, tau
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
-from linkage_ros.synthesis.motion.generate import from_fixed_pivots, from_moving_pivots
-from linkage_ros.synthesis.motion.pivots import fixed_pivots, moving_pivots, TRUSTED
-from linkage_ros.synthesis.motion.poses import Pose
+from linkage_ros.synthesis.motion import (
+    fixed_pivots,
+    from_fixed_pivots,
+    from_moving_pivots,
+    moving_pivots,
+    Pose,
+    TRUSTED,
+)
 from linkage_ros.synthesis.proof import prove
 from mpmath import mp, mpc, mpf
 import numpy as np

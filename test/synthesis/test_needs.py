@@ -20,9 +20,8 @@ from math import inf, log, nan, radians
 import random
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.defects import assess
+from linkage_ros.synthesis.defects import assess, distance, distances, misses, Needs
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
-from linkage_ros.synthesis.needs import distance, distances, misses, Needs
 import numpy as np
 import pytest
 

@@ -24,8 +24,15 @@ from typing import Any
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from linkage_ros.synthesis.design import Assembly
-from linkage_ros.synthesis.path.arcs import along, resampled, theta_at
-from linkage_ros.synthesis.path.model import closes, COLUMNS, folds, slopes
+from linkage_ros.synthesis.path.curves import (
+    along,
+    closes,
+    COLUMNS,
+    folds,
+    resampled,
+    slopes,
+    theta_at,
+)
 import numpy as np
 import pytest
 

@@ -22,8 +22,8 @@ from math import inf, pi
 import pickle
 from typing import Any
 
-from linkage_ros.synthesis.path.aim import Aim
-from linkage_ros.synthesis.path.fit import allowed, improve
+from linkage_ros.synthesis.path.curves import Aim
+from linkage_ros.synthesis.path.generate import allowed, improve
 from linkage_ros.synthesis.path.search import problem_of
 import numpy as np
 import pytest

@@ -22,8 +22,14 @@ from dataclasses import replace
 from math import isnan, nan, pi, radians, sqrt, tau
 
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
-from linkage_ros.synthesis.function.structural_error import errors_at_positions, structural_error
-from linkage_ros.synthesis.function.task import chebyshev, FunctionTask, pairs, wanted_rocker
+from linkage_ros.synthesis.function.task import (
+    chebyshev,
+    errors_at_positions,
+    FunctionTask,
+    pairs,
+    structural_error,
+    wanted_rocker,
+)
 from linkage_ros.synthesis.pairs.freudenstein import exact
 from mpmath import mp
 import numpy as np

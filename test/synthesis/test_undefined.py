@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.synthesis.function.expression import Expression
-from linkage_ros.synthesis.function.undefined import check_defined
+from linkage_ros.synthesis.function.task import check_defined
 import pytest
 
 

@@ -22,8 +22,8 @@ import sys
 
 import linkage_ros
 from linkage_ros.errors import LinkageError
-from linkage_ros.synthesis import workers
-from linkage_ros.synthesis.workers import results_of
+from linkage_ros.synthesis import study
+from linkage_ros.synthesis.study import results_of
 import pytest
 
 distributed = pytest.importorskip('distributed')
@@ -62,7 +62,7 @@ def cluster():
 
 @pytest.fixture
 def impatient(monkeypatch):
-    monkeypatch.setattr(workers, '_PATIENCE', 1.0)
+    monkeypatch.setattr(study, '_PATIENCE', 1.0)
 
 
 def numbers(count):
@@ -94,7 +94,7 @@ def test_parts_are_asked_for_as_they_are_done(cluster):
             yield part
 
     for done, _ in enumerate(results_of(abs, parts, cluster.scheduler_address)):
-        assert len(asked) <= done + 2 * workers._AHEAD
+        assert len(asked) <= done + 2 * study._AHEAD
 
 
 def test_the_client_is_closed_where_nobody_asks_for_more(cluster):

@@ -21,9 +21,8 @@ from math import degrees, hypot, inf, isfinite, pi, radians, remainder
 import pickle
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.defects import assess, Assessment
+from linkage_ros.synthesis.defects import assess, Assessment, distance, misses, Needs
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
-from linkage_ros.synthesis.needs import distance, misses, Needs
 from linkage_ros.synthesis.pairs.freudenstein import exact
 from linkage_ros.synthesis.pairs.zero_search import search_zeros, ZeroProblem
 from linkage_ros.synthesis.proof import assembled

@@ -14,26 +14,22 @@
 
 
 """
-A formula of x, as somebody types it, and as nothing but a formula.
+A formula of x, as a user types it.
 
-It is read by the few rules below, and by nothing else: Python never sees it, so that there is
-nothing in it to run::
-
-    sum      product, then any number of + product or - product
-    product  signed, then any number of * signed or / signed
-    signed   + signed, - signed or power
-    power    value, or value ^ signed; ** is the same, and -x^2 is -(x^2)
-    value    a number, x, pi, e, tau, (sum) or function(sum)
-
-``log`` is the natural logarithm, as ``ln`` is; the one to the base of 10 is ``log10``.
+Each token of the text is checked: only numbers, x, constants, functions, operators and parentheses
+come through, in an order that a formula can have. What is left is parsed as Python, which gives
+the precedence (-x^2 is -(x^2), 2^x^2 is 2^(x^2)), and never run. ``^`` and ``**`` are the same;
+``log`` is the natural logarithm, as ``ln`` is, and ``log10`` the one to the base of 10.
 """
 
 from __future__ import annotations
 
+import ast
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import e, isfinite, pi, tau
 import re
-from typing import NamedTuple, overload
+from typing import cast, NamedTuple, overload
 
 from linkage_ros.errors import did_you_mean, listed, quoted, SynthesisError
 import numpy as np
@@ -65,20 +61,19 @@ CONSTANTS = {'pi': pi, 'e': e, 'tau': tau}
 
 _X = 'x'
 
-_OPERATORS: dict[str, np.ufunc] = {
-    '+': np.add,
-    '-': np.subtract,
-    '*': np.multiply,
-    '/': np.divide,
-    '^': np.power,
-    '**': np.power,
+_OPERATORS: dict[type[ast.operator], np.ufunc] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+    ast.Pow: np.power,
 }
 
 _LONGEST = 200
 """Characters."""
 
 _DEEPEST = 40
-"""Levels of parentheses, powers and signs; Python's own stack must bear them."""
+"""Levels of parentheses, powers and signs: Python's parser and stack must bear them."""
 
 _TOKEN = re.compile(
     r'(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)'
@@ -86,7 +81,7 @@ _TOKEN = re.compile(
     r'|(?P<operator>\*\*|[-+*/^()])'
 )
 
-_SPACES = re.compile(r'[ \t\r\n]*')
+_SPACES = ' \t\r\n'
 
 _MEANT = {
     '\N{MINUS SIGN}': '-',
@@ -129,7 +124,8 @@ class Expression:
     _steps: tuple[_Step, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, '_steps', _Reader(self.text).steps)
+        formula = ast.parse(_as_python(self.text), mode='eval')
+        object.__setattr__(self, '_steps', tuple(_steps(formula.body)))
 
     @overload
     def __call__(self, x: float) -> float: ...
@@ -166,165 +162,126 @@ class Expression:
 
 
 class _Token(NamedTuple):
-    """A part of a formula: its kind as the pattern has it, or 'end', and where it begins."""
+    """A part of a formula: its kind as the pattern has it, and where it begins."""
 
     kind: str
     text: str
     at: int
 
 
-class _Reader:
-    """
-    What reads a formula, from its beginning to its end.
+def _steps(node: ast.expr) -> Iterator[_Step]:
+    """Yield values first, then the operations on them, in the order in which they are done."""
+    match node:
+        case ast.Constant():
+            yield cast('float', node.value)
+        case ast.Name():
+            yield CONSTANTS.get(node.id)
+        case ast.Call():
+            yield from _steps(node.args[0])
+            yield FUNCTIONS[cast('ast.Name', node.func).id]
+        case ast.UnaryOp():
+            yield from _steps(node.operand)
+            if isinstance(node.op, ast.USub):
+                yield np.negative
+        case ast.BinOp():
+            yield from _steps(node.left)
+            yield from _steps(node.right)
+            yield _OPERATORS[type(node.op)]
 
-    Its steps are in the order in which they are done: values first, then what is done to them.
-    """
 
-    def __init__(self, text: str) -> None:
-        self._text = text
-        if len(text) > _LONGEST:
-            raise self._error(
-                f'is {len(text)} characters long', f'keep it within {_LONGEST} characters'
-            )
-        self._tokens = self._split()
-        self._next = 0
-        self._depth = 0
-        self._found: list[_Step] = []
-        if self._token.kind == 'end':
-            raise self._error('is empty', 'write a formula of x, such as log10(x)')
-        self._sum()
-        if self._token.kind != 'end':
-            raise self._leftover()
-        self.steps = tuple(self._found)
-
-    @property
-    def _token(self) -> _Token:
-        return self._tokens[self._next]
-
-    def _split(self) -> list[_Token]:
-        found: list[_Token] = []
-        at = 0
-        while True:
-            spaces = _SPACES.match(self._text, at)
-            at = spaces.end() if spaces else at
-            if at == len(self._text):
-                return [*found, _Token('end', '', at)]
-            match = _TOKEN.match(self._text, at)
-            if match is None:
-                character = self._text[at]
-                meant = _MEANT.get(character)
-                raise self._wrong(
-                    _Token('', character, at),
-                    'has no meaning in a formula',
-                    f'write {meant} instead' if meant else 'use numbers, x, + - * / ^ and ( )',
-                )
-            found.append(_Token(match.lastgroup or '', match.group(), at))
-            at = match.end()
-
-    def _takes(self, *operators: str) -> str:
-        """Step over one of these and return it; '' if none stands here."""
-        kind, text, _ = self._token
-        if kind != 'operator' or text not in operators:
-            return ''
-        self._next += 1
-        return text
-
-    def _sum(self) -> None:
-        self._product()
-        while sign := self._takes('+', '-'):
-            self._product()
-            self._found.append(_OPERATORS[sign])
-
-    def _product(self) -> None:
-        self._signed()
-        while sign := self._takes('*', '/'):
-            self._signed()
-            self._found.append(_OPERATORS[sign])
-
-    def _signed(self) -> None:
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            raise self._wrong(
-                self._token, f'is more than {_DEEPEST} levels deep', 'write it with fewer'
-            )
-        if sign := self._takes('+', '-'):
-            self._signed()
-            if sign == '-':
-                self._found.append(np.negative)
-        else:
-            self._power()
-        self._depth -= 1
-
-    def _power(self) -> None:
-        self._value()
-        if sign := self._takes('^', '**'):
-            self._signed()
-            self._found.append(_OPERATORS[sign])
-
-    def _value(self) -> None:
-        token = self._token
-        if self._takes('('):
-            self._inner(token)
-        elif token.kind == 'number':
-            self._next += 1
-            number = float(token.text)
-            if not isfinite(number):
-                raise self._wrong(token, 'is beyond all numbers', 'write a smaller one')
-            self._found.append(number)
-        elif token.kind == 'name':
-            self._next += 1
-            self._name(token)
-        elif token.kind == 'end':
-            before = self._tokens[self._next - 1]
-            raise self._wrong(before, 'has nothing after it', 'write what it applies to')
-        else:
-            raise self._wrong(
-                token, 'stands where a value is wanted', 'write a number or x before it'
-            )
-
-    def _name(self, token: _Token) -> None:
-        name = token.text
-        if name == _X:
-            self._found.append(None)
-        elif name in CONSTANTS:
-            self._found.append(CONSTANTS[name])
-        elif name in FUNCTIONS:
-            opening = self._token
-            if not self._takes('('):
-                raise self._wrong(token, 'is a function', f'write {name}(…)')
-            self._inner(opening)
-            self._found.append(FUNCTIONS[name])
-        else:
-            known = [_X, *CONSTANTS, *FUNCTIONS]
-            raise self._wrong(
-                token,
-                'is not known',
-                did_you_mean(name.lower(), known, f'there are {listed(known)}'),
-            )
-
-    def _inner(self, opening: _Token) -> None:
-        """Read what is in parentheses."""
-        self._sum()
-        if not self._takes(')'):
-            if self._token.kind == 'end':
-                raise self._wrong(opening, 'is not closed', "write ')' where it ends")
-            raise self._leftover()
-
-    def _leftover(self) -> SynthesisError:
-        """Return what is wrong with something that follows a whole formula."""
-        token = self._token
-        if token.text == ')':
-            return self._wrong(token, 'closes nothing', "leave it out, or write '(' before")
-        before = self._tokens[self._next - 1]
-        return self._wrong(
-            token, f'follows {quoted(before.text)} with nothing between', 'write * between the two'
+def _as_python(text: str) -> str:
+    """Return a formula as Python writes it; refuse a text that is none."""
+    if len(text) > _LONGEST:
+        raise _error(
+            text, f'is {len(text)} characters long', f'keep it within {_LONGEST} characters'
         )
+    tokens = list(_tokens(text))
+    if not tokens:
+        raise _error(text, 'is empty', 'write a formula of x, such as log10(x)')
+    opened: list[_Token] = []
+    depths = [1]  # of each open parenthesis: how many signs and powers the next value is within
+    has_value = False
+    for number, token in enumerate(tokens):
+        before = tokens[number - 1]
+        if has_value:
+            if token.text == ')':
+                if not opened:
+                    raise _wrong(
+                        text, token, 'closes nothing', "leave it out, or write '(' before"
+                    )
+                opened.pop()
+                depths.pop()
+            elif token.kind != 'operator' or token.text == '(':
+                reason = f'follows {quoted(before.text)} with nothing between'
+                raise _wrong(text, token, reason, 'write * between the two')
+            else:
+                has_value = False
+                depths[-1] = depths[-1] + 1 if token.text in ('^', '**') else 1
+        elif sum(depths) > _DEEPEST:
+            raise _wrong(
+                text, token, f'is more than {_DEEPEST} levels deep', 'write it with fewer'
+            )
+        elif token.text == '(':
+            opened.append(token)
+            depths.append(1)
+        elif token.text in ('+', '-'):
+            depths[-1] += 1
+        else:
+            after = tokens[number + 1] if number + 1 < len(tokens) else None
+            has_value = _is_value(text, token, after)
+    if not has_value:
+        raise _wrong(text, tokens[-1], 'has nothing after it', 'write what it applies to')
+    if opened:
+        raise _wrong(text, opened[-1], 'is not closed', "write ')' where it ends")
+    return ' '.join(
+        repr(float(token.text)) if token.kind == 'number' else token.text.replace('^', '**')
+        for token in tokens
+    )
 
-    def _wrong(self, token: _Token, reason: str, remedy: str) -> SynthesisError:
-        return self._error(f'{quoted(token.text)} at character {token.at + 1} {reason}', remedy)
 
-    def _error(self, reason: str, remedy: str) -> SynthesisError:
-        return SynthesisError(named(self._text), reason, remedy)
+def _tokens(text: str) -> Iterator[_Token]:
+    at = len(text) - len(text.lstrip(_SPACES))
+    while at < len(text):
+        match = _TOKEN.match(text, at)
+        if match is None:
+            meant = _MEANT.get(text[at])
+            raise _wrong(
+                text,
+                _Token('', text[at], at),
+                'has no meaning in a formula',
+                f'write {meant} instead' if meant else 'use numbers, x, + - * / ^ and ( )',
+            )
+        yield _Token(match.lastgroup or '', match.group(), at)
+        end = match.end()
+        at = len(text) - len(text[end:].lstrip(_SPACES))
+
+
+def _is_value(text: str, token: _Token, after: _Token | None) -> bool:
+    """Return whether a token is a value; a function, whose parenthesis follows, is none yet."""
+    if token.kind == 'number':
+        if not isfinite(float(token.text)):
+            raise _wrong(text, token, 'is beyond all numbers', 'write a smaller one')
+        return True
+    if token.kind != 'name':
+        remedy = 'write a number or x before it'
+        raise _wrong(text, token, 'stands where a value is wanted', remedy)
+    if token.text in FUNCTIONS:
+        if after is None or after.text != '(':
+            raise _wrong(text, token, 'is a function', f'write {token.text}(…)')
+        return False
+    known = [_X, *CONSTANTS, *FUNCTIONS]
+    if token.text not in known:
+        remedy = did_you_mean(token.text.lower(), known, f'there are {listed(known)}')
+        raise _wrong(text, token, 'is not known', remedy)
+    return True
+
+
+def _wrong(text: str, token: _Token, reason: str, remedy: str) -> SynthesisError:
+    return _error(text, f'{quoted(token.text)} at character {token.at + 1} {reason}', remedy)
+
+
+def _error(text: str, reason: str, remedy: str) -> SynthesisError:
+    return SynthesisError(named(text), reason, remedy)
 
 
 def named(text: str) -> str:

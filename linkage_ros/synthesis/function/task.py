@@ -14,34 +14,150 @@
 
 
 """
-A function that a four-bar shall work out: x is the crank's angle, y = f(x) the rocker's.
+Function generation: a four-bar whose crank angle is x and whose rocker angle is y = f(x).
 
 Both scales are even: x begins and ends where the crank's range does, and f of these two where the
 rocker's does (F. Freudenstein, Approximate synthesis of four-bar linkages, Transactions of the
 ASME 77 (1955) 853-861: starting and final values, and the scale factors between them). In between
 f may go beyond its ends, and the rocker with it. A range may go down: the crank turns back, or y
 falls where the rocker's angle grows.
+
+The structural error is the rocker angle of a design less the wanted one. It is what remains when
+every link has its length exactly and nothing bends or plays. At precision points of an exact
+design it is 0, between them it is not.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import degrees, isfinite, tau
+from math import degrees, floor, isfinite, log10, nan, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.survey import Way
+from linkage_ros.synthesis.design import Design, ROCKER
 from linkage_ros.synthesis.function.expression import Array, Expression, named
-from linkage_ros.synthesis.function.undefined import check_defined
 import numpy as np
 from numpy.typing import ArrayLike
 
-Range = tuple[float, float]
-"""Where something begins and ends; it may go down."""
-
 _SAMPLES = 2000
+
+_ZOOMS = 3
+"""Each makes the samples some 700 times denser, where the function is steepest."""
+
+_JUMP = 0.1
+"""A step that stays this part of itself when one looks 3e8 times closer is no slope."""
 
 _ROUNDING = 1e-12
 """What is less of a function's values is rounding."""
+
+
+def check_defined(function: Expression, low: float, high: float) -> None:
+    """
+    Refuse a function that has no value somewhere in a range, or jumps there.
+
+    It is sampled, and the edges of what has no value are narrowed down; what lies between two
+    samples and shows in neither is missed.
+
+    Raises
+    ------
+    SynthesisError
+        With where it is, and what range would do.
+
+    """
+    low, high = min(low, high), max(low, high)
+    xs = np.linspace(low, high, _SAMPLES + 1)
+    ys = function(xs)
+    if not np.isfinite(ys).all():
+        raise _undefined(function, xs, ys)
+    jump = _jump(function, xs, ys)
+    if jump is not None:
+        raise SynthesisError(
+            named(function.text),
+            f'jumps, or goes to infinity, at x = {_rounded(jump, high - low)}',
+            'choose a range on one side of it',
+        )
+
+
+def _undefined(function: Expression, xs: Array, ys: Array) -> SynthesisError:
+    """Return what is wrong with a function of which some samples have no value."""
+    span = float(xs[-1] - xs[0])
+    good = np.isfinite(ys)
+    runs = _runs(function, xs, good)
+    start, end = next((start, end) for start, end, has_value in runs if not has_value)
+    value = ys[int(np.argmin(good))]
+    reason = 'is not defined' if np.isnan(value) else 'is infinite'
+    usable = [(start, end) for start, end, has_value in runs if has_value]
+    if not usable:
+        return SynthesisError(
+            named(function.text), f'{reason} anywhere in the range', 'choose another range'
+        )
+    first, last = _rounded(start, span), _rounded(end, span)
+    if first == last:
+        place, remedy = f'at x = {first}', 'choose a range without it'
+    else:
+        place = f'from x = {first} to {last}'
+        widest = max(usable, key=lambda run: run[1] - run[0])
+        ends = ' to '.join(_rounded(x, span) for x in widest)
+        remedy = f'choose a range within {ends}'
+    return SynthesisError(named(function.text), f'{reason} {place}', remedy)
+
+
+def _runs(function: Expression, xs: Array, good: Array) -> list[tuple[float, float, bool]]:
+    """Return the parts of a range in which a function has values, and in which it has none."""
+    found = []
+    start = float(xs[0])
+    for i in np.flatnonzero(np.diff(good)):
+        edge = _edge(function, float(xs[i]), float(xs[i + 1]))
+        found.append((start, edge, bool(good[i])))
+        start = edge
+    return [*found, (start, float(xs[-1]), bool(good[-1]))]
+
+
+def _edge(function: Expression, low: float, high: float) -> float:
+    """Return where, between two places, a function begins or ceases to have values."""
+    before = isfinite(function(low))
+    while low < (middle := 0.5 * (low + high)) < high:
+        if isfinite(function(middle)) == before:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _jump(function: Expression, xs: Array, ys: Array) -> float | None:
+    """
+    Return where a function jumps: a pole between two samples, or an angle that starts again.
+
+    What is looked at ever closer is its steepest place.
+    """
+    largest = []
+    for _ in range(_ZOOMS + 1):
+        with np.errstate(all='ignore'):
+            steps = np.abs(np.diff(ys))
+        steepest = int(np.argmax(steps))
+        largest.append(float(steps[steepest]))
+        # A step more on each side: a pole may lie beside the steepest step.
+        low, high = xs[max(steepest - 1, 0)], xs[min(steepest + 2, len(xs) - 1)]
+        place = 0.5 * float(xs[steepest] + xs[steepest + 1])
+        xs = np.linspace(low, high, _SAMPLES + 1)
+        ys = function(xs)
+        if not np.isfinite(ys).all():
+            return float(xs[int(np.argmin(np.isfinite(ys)))])
+    size = float(np.max(np.abs(ys)))
+    return place if largest[-1] > max(_JUMP * largest[0], _ROUNDING * size) else None
+
+
+def _rounded(x: float, span: float) -> str:
+    """Return a place as it matters in a range as wide as this."""
+    # Adding 0 makes 0 of -0.
+    return f'{round(x, 10 - floor(log10(span))) + 0.0:.10g}'
+
+
+Range = tuple[float, float]
+"""Where something begins and ends; it may go down."""
 
 _MOST = 1000
 """Precision points; more make no four-bar better."""
@@ -249,3 +365,147 @@ def _check_turn(name: str, ends: Range) -> None:
         raise SynthesisError(
             name, f'{start:.10g}° to {end:.10g}° is a full turn or more', 'keep it below 360°'
         )
+
+
+_ERROR_SAMPLES = 720
+
+_ERROR_ZOOMS = 4
+"""How often a summit is looked at closer, each time 32 times; then its height has all digits."""
+
+_GRID = 64
+
+_SUMMITS = 8
+"""How many of the highest are looked at: the errors of a good design are nearly equal."""
+
+_SAME = 1e-9
+"""What a range may end short of the crank's by and the loop still closes, in [rad]."""
+
+
+class StructuralError(NamedTuple):
+    """
+    The error over a range of the crank.
+
+    Attributes
+    ----------
+    crank
+        Angles of the crank from one end of the range to the other, in [rad]; (n,).
+    error
+        The rocker's angle less the wanted one there, in (−π, π] rad, nan where the loop is open;
+        (n,).
+    greatest
+        The error that is farthest from 0, in [rad]; nan where the loop closes nowhere.
+    at
+        Angle of the crank where it is made, in [rad].
+    rms
+        Root of the mean square where the loop closes, in [rad].
+    opens_at
+        Angle of the crank, on its way through the range, at which the loop opens, in [rad]; None
+        where it closes all the way.
+
+    """
+
+    crank: Array
+    error: Array
+    greatest: float
+    at: float
+    rms: float
+    opens_at: float | None
+
+
+def structural_error(
+    design: Design, wanted: Callable[[Array], Array], low: float, high: float
+) -> StructuralError:
+    """
+    Return the error of a design over a range of the crank, on the design's own assembly.
+
+    Parameters
+    ----------
+    design
+        The design; its own positions are among the samples.
+    wanted
+        Returns the rocker's angles for angles of the crank, in [rad]; (n,) each.
+    low, high
+        Where the range begins and ends, in [rad]; it may go down.
+
+    """
+    closure = Closure(design.four_bar.linkage())
+
+    def errors(crank: Array) -> Array:
+        return _wrapped(_rocker_of(closure, crank.ravel()) - wanted(crank.ravel())).reshape(
+            crank.shape
+        )
+
+    first, last = min(low, high), max(low, high)
+    precise = [one.crank for one in design.wanted if first <= one.crank <= last]
+    crank = np.unique(np.concatenate((np.linspace(first, last, _ERROR_SAMPLES + 1), precise)))
+    if high < low:
+        crank = crank[::-1]
+    error = errors(crank)
+    at, greatest = _greatest(errors, crank, error)
+    return StructuralError(
+        crank, error, greatest, at, _rms(crank, error), _opens_at(closure, low, high)
+    )
+
+
+def errors_at_positions(design: Design) -> Array:
+    """Return the error at each position of a design, on its own assembly, in [rad]; (n,)."""
+    closure = Closure(design.four_bar.linkage())
+    crank = np.array([one.crank for one in design.wanted])
+    wanted = [nan if one.rocker is None else one.rocker for one in design.wanted]
+    return _wrapped(_rocker_of(closure, crank) - np.array(wanted))
+
+
+def _rocker_of(closure: Closure, crank: Array) -> Array:
+    row = list(closure.linkage.joints).index(f'{ROCKER}_joint')
+    angles: Array = closure.solve(crank, derivatives=0).positions[row]
+    return angles
+
+
+def _wrapped(angle: Array) -> Array:
+    """Return angles in (−π, π]; small ones keep all their digits."""
+    wrapped = angle - tau * np.round(angle / tau)
+    return np.where(wrapped <= -np.pi, wrapped + tau, wrapped)
+
+
+def _greatest(errors: Callable[[Array], Array], crank: Array, error: Array) -> tuple[float, float]:
+    """Return where the error is farthest from 0, and what it is there."""
+    heights = np.nan_to_num(np.abs(error), nan=-1.0)
+    highest = int(np.argmax(heights))
+    if heights[highest] < 0.0:
+        return nan, nan
+    beside = np.pad(heights, 1, constant_values=-1.0)
+    summits = np.flatnonzero((heights >= beside[:-2]) & (heights >= beside[2:]) & (heights >= 0.0))
+    summits = summits[np.argsort(-heights[summits], kind='stable')[:_SUMMITS]]
+    places, found = [crank[highest]], [error[highest]]
+    start = crank[np.maximum(summits - 1, 0)]
+    end = crank[np.minimum(summits + 1, len(crank) - 1)]
+    for _ in range(_ERROR_ZOOMS):
+        grid = np.linspace(start, end, _GRID + 1, axis=-1)
+        values = errors(grid)
+        best = np.nan_to_num(np.abs(values), nan=-1.0).argmax(-1)
+        row = np.arange(len(grid))
+        places.extend(grid[row, best])
+        found.extend(values[row, best])
+        start, end = grid[row, np.maximum(best - 1, 0)], grid[row, np.minimum(best + 1, _GRID)]
+    i = int(np.nanargmax(np.abs(found)))
+    return float(places[i]), float(found[i])
+
+
+def _rms(crank: Array, error: Array) -> float:
+    """Return the root of the mean square over the parts of the range in which the loop closes."""
+    by = np.abs(np.diff(crank))
+    squares = 0.5 * (error[1:] ** 2 + error[:-1] ** 2)
+    closed = np.isfinite(squares)
+    if not closed.any():
+        return abs(float(error[0])) if len(error) == 1 else nan
+    return float(np.sqrt(np.sum(squares[closed] * by[closed]) / np.sum(by[closed])))
+
+
+def _opens_at(closure: Closure, low: float, high: float) -> float | None:
+    """Return where, on the way from one angle to another, the loop opens, if it does."""
+    interval = Way(closure).range_about(low)
+    if interval is None:
+        return low
+    if interval.whole or interval.lowest - _SAME <= high <= interval.highest + _SAME:
+        return None
+    return interval.highest if high > low else interval.lowest

@@ -34,8 +34,7 @@ from linkage_ros.errors import SynthesisError
 from linkage_ros.synthesis.design import Design, FourBar
 from linkage_ros.synthesis.double_double import Array
 from linkage_ros.synthesis.extras import scipy_optimize
-from linkage_ros.synthesis.pairs.checks import wanted_of
-from linkage_ros.synthesis.pairs.freudenstein import fit_equation, links
+from linkage_ros.synthesis.pairs.freudenstein import fit_equation, links, wanted_of
 from linkage_ros.synthesis.proof import SIDES
 import numpy as np
 

@@ -23,28 +23,345 @@ numbers (F. Freudenstein, Approximate synthesis of four-bar linkages, Transactio
     k1·cos φ + k2·cos θ + k3 = cos(θ − φ)
     k1 = d/a,  k2 = −d/c,  k3 = (a² − b² + c² + d²)/(2ac)
 
-Three pairs fix them (`system.py`). What error the lengths have is that of the angles: each is
-within 4·2⁻⁵³ of its sensitivity κ, the sum of what a relative change of each angle makes of it
-(`sensitivity.py`), and where that says nothing any more, no digit is trusted. More pairs are met
-as well as may be. The coupler is real wherever the angles are: b² is the mean of the squares of
-what crank and rocker pin are apart in the pairs.
+Three pairs fix them (`System`, threes of pairs by the thousand). The first equation is subtracted
+from the other two, so that k3 falls out::
+
+    k1·(cos φᵢ − cos φ₁) + k2·(cos θᵢ − cos θ₁) = cos(θᵢ − φᵢ) − cos(θ₁ − φ₁),  i = 2, 3
+
+The differences are products,
+
+    cos u − cos v = −2·sin((u + v)/2)·sin((u − v)/2),
+
+of angles that are sums of two or four doubles, and are taken as such. Determinants, lengths and
+the coupler are computed in sums of two doubles too, since no more may be lost there than rounding
+the angles loses: at a change point, in a parallelogram or with a short coupler, terms cancel that
+the angles themselves do not touch. So the error of the lengths is that of the angles: each length
+is within 4·2⁻⁵³ of its sensitivity κ, the sum of what a relative change of each angle makes of it
+(`gradient`), and where κ is too large for any digit, none is trusted. More pairs are met by least
+squares. The coupler is real wherever the angles are: b² is the mean, over the pairs, of the
+squared distance of crank pin and rocker pin.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
+from math import degrees, inf, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
-from linkage_ros.synthesis.design import Design, FourBar
-from linkage_ros.synthesis.double_double import Array
-from linkage_ros.synthesis.pairs.checks import centred, check_pairs, dependent, MOVE, wanted_of
-from linkage_ros.synthesis.pairs.sensitivity import condition, doubt, gradient
-from linkage_ros.synthesis.pairs.system import solved
+from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.double_double import (
+    Array,
+    minus,
+    over,
+    plus,
+    sine,
+    sine_cosine,
+    times,
+    two_sum,
+    Twofold,
+)
 from linkage_ros.synthesis.proof import assembled
 import numpy as np
 from numpy.typing import ArrayLike
+
+
+class System(NamedTuple):
+    """
+    Freudenstein's equation for three pairs, and its solution for a ground of length 1.
+
+    Attributes
+    ----------
+    theta, phi
+        Angles of crank and rocker, in [rad]; (3, n).
+    P, Q, R
+        What cos φ, cos θ and cos(θ − φ) of the second and third pair have over those of the
+        first, divided by −2; (2, n).
+    last
+        What P and Q of the third pair have over those of the second; (2, n).
+    determinant
+        P0·Q1 − P1·Q0; (n,).
+    k
+        k1, k2 and k3; (3, n).
+    lengths
+        Of crank, coupler and rocker, the first and the last signed; (3, n).
+    coupler
+        Its x and y in the first pair; (2, n).
+
+    """
+
+    theta: Array
+    phi: Array
+    P: Array
+    Q: Array
+    R: Array
+    last: Array
+    determinant: Array
+    k: Array
+    lengths: Array
+    coupler: Array
+
+
+def solved(theta: Array, phi: Array) -> System:
+    """
+    Solve; infinite or nan where there is no solution.
+
+    Parameters
+    ----------
+    theta, phi
+        Angles of crank and rocker, in [rad]; (3, n).
+
+    """
+    with np.errstate(all='ignore'):
+        P, Q, R = differences(theta, phi)
+        determinant, of_k1, of_k2 = _determinant(P, Q), _determinant(R, Q), _determinant(P, R)
+        a, c = over(determinant, of_k1), over(determinant, (-of_k2[0], -of_k2[1]))
+        # The coupler is what closes the first position. From k3 long links would leave little.
+        nothing = np.zeros_like(theta[0])
+        crank_y, crank_x = sine_cosine((theta[0], nothing))
+        rocker_y, rocker_x = sine_cosine((phi[0], nothing))
+        x, _ = plus((nothing + 1.0, nothing), minus(times(c, rocker_x), times(a, crank_x)))
+        y, _ = minus(times(c, rocker_y), times(a, crank_y))
+        k1, k2 = over(of_k1, determinant)[0], over(of_k2, determinant)[0]
+        k3 = np.cos(theta[0] - phi[0]) - k1 * rocker_x[0] - k2 * crank_x[0]
+        return System(
+            theta,
+            phi,
+            P[0],
+            Q[0],
+            R[0],
+            np.stack([(high[1] - high[0]) + (low[1] - low[0]) for high, low in (P, Q)]),
+            determinant[0],
+            np.stack((k1, k2, k3)),
+            np.stack((a[0], np.hypot(x, y), c[0])),
+            np.stack((x, y)),
+        )
+
+
+def differences(theta: Array, phi: Array) -> tuple[Twofold, Twofold, Twofold]:
+    """
+    Return what all equations but the first have over it, divided by −2.
+
+    Parameters
+    ----------
+    theta, phi
+        Angles of crank and rocker, in [rad]; (m, n).
+
+    Returns
+    -------
+    tuple
+        Of cos φ, of cos θ and of cos(θ − φ); (m − 1, n) each.
+
+    """
+    theta_by, phi_by = two_sum(theta[1:], -theta[:1]), two_sum(phi[1:], -phi[:1])
+    theta_sum, phi_sum = two_sum(theta[1:], theta[:1]), two_sum(phi[1:], phi[:1])
+    sums = (phi_sum, theta_sum, minus(theta_sum, phi_sum))
+    bys = (phi_by, theta_by, minus(theta_by, phi_by))
+    high = 0.5 * np.stack([term[0] for term in (*sums, *bys)])
+    low = 0.5 * np.stack([term[1] for term in (*sums, *bys)])
+    high, low = sine((high, low))
+    high, low = times((high[:3], low[:3]), (high[3:], low[3:]))
+    return (high[0], low[0]), (high[1], low[1]), (high[2], low[2])
+
+
+def _determinant(x: Twofold, y: Twofold) -> Twofold:
+    """Return x0·y1 − x1·y0."""
+    high, low = times(x, (y[0][::-1], y[1][::-1]))
+    return minus((high[0], low[0]), (high[1], low[1]))
+
+
+def gradient(system: System) -> Array:
+    """
+    Differentiate the lengths, and the direction of the coupler in the first pair, by the angles.
+
+    Equation i, k1·cos φ + k2·cos θ + k3 − cos(θ − φ) = 0, moves by sin(θ − φ) − k2·sin θ with θᵢ,
+    by −sin(θ − φ) − k1·sin φ with φᵢ; the k by that times less column i of the inverse. The
+    coupler is 1 + c·e^{iφ} − a·e^{iθ} in the first pair.
+
+    Returns
+    -------
+    Array
+        Of crank, coupler, rocker and direction by the three crank angles, then by the three rocker
+        angles, per [rad]; (4, 6, n).
+
+    """
+    theta, phi = system.theta, system.phi
+    k1, k2, _ = system.k
+    a, b, c = system.lengths
+    of_k1, of_k2 = _inverse(system)
+    across = np.sin(theta - phi)
+    moves = np.concatenate((k2 * np.sin(theta) - across, k1 * np.sin(phi) + across))
+    of_a = -a * a * np.concatenate((of_k1, of_k1)) * moves
+    of_c = c * c * np.concatenate((of_k2, of_k2)) * moves
+    # Crank and rocker as the coupler sees them: along it and across.
+    x, y = system.coupler / b
+    crank_x, crank_y = np.cos(theta[0]), np.sin(theta[0])
+    rocker_x, rocker_y = np.cos(phi[0]), np.sin(phi[0])
+    crank_along, crank_across = x * crank_x + y * crank_y, x * crank_y - y * crank_x
+    rocker_along, rocker_across = x * rocker_x + y * rocker_y, x * rocker_y - y * rocker_x
+    of_b = rocker_along * of_c - crank_along * of_a
+    of_b[0] += a * crank_across
+    of_b[3] -= c * rocker_across
+    turned = rocker_across * of_c - crank_across * of_a
+    turned[0] -= a * crank_along
+    turned[3] += c * rocker_along
+    return np.stack((of_a, of_b, of_c, turned / b))
+
+
+def doubt(system: System) -> Array:
+    """
+    Return Σ|x ∂D/∂x| / ``abs(D)`` of the determinant D over the six angles x; (n,).
+
+    Of dM, the trace of M⁻¹·dM is that of the logarithm of D.
+    """
+    of_k1, of_k2 = _inverse(system)
+    by_theta = np.sin(system.theta) * of_k2 * system.theta
+    by_phi = np.sin(system.phi) * of_k1 * system.phi
+    return np.asarray((np.abs(by_theta) + np.abs(by_phi)).sum(0))
+
+
+def condition(system: System) -> Array:
+    """Return the condition number of the matrix of rows (cos φ, cos θ, 1), by the 2-norm; (n,)."""
+    x, y = np.cos(system.phi), np.cos(system.theta)
+    of_k1, of_k2 = _inverse(system)
+    of_k3 = -x[0] * of_k1 - y[0] * of_k2
+    of_k3[0] += 1.0
+    return _norm(x, y, np.ones_like(x)) * _norm(of_k1, of_k2, of_k3)
+
+
+def _inverse(system: System) -> tuple[Array, Array]:
+    """Return how k1 and k2 go with the right sides of the three equations; (3, n) each."""
+    P, Q, (last_P, last_Q) = system.P, system.Q, system.last
+    scale = -0.5 / system.determinant
+    return (
+        np.stack((-last_Q, Q[1], -Q[0])) * scale,
+        np.stack((last_P, -P[1], P[0])) * scale,
+    )
+
+
+def _norm(x: Array, y: Array, z: Array) -> Array:
+    """
+    Return the 2-norm of matrices of three rows; (n,).
+
+    The greatest eigenvalue of their squares in closed form (O. K. Smith, Eigenvalues of a
+    symmetric 3 × 3 matrix, Communications of the ACM 4 (1961)), which is exact enough for the
+    greatest, and some ten times as fast as a decomposition.
+    """
+    xx, yy, zz = (x * x).sum(0), (y * y).sum(0), (z * z).sum(0)
+    xy, xz, yz = (x * y).sum(0), (x * z).sum(0), (y * z).sum(0)
+    mean = (xx + yy + zz) / 3.0
+    xx, yy, zz = xx - mean, yy - mean, zz - mean
+    square = (xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0
+    determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    width = np.sqrt(square)
+    turned = np.arccos(np.clip(determinant / (2.0 * square * width), -1.0, 1.0)) / 3.0
+    return np.asarray(np.sqrt(mean + 2.0 * width * np.cos(turned)))
+
+
+MOVE = 'move one of the angles'
+
+_SAME = 1e-12
+"""Angles nearer than this are the same, in [rad]."""
+
+_FARTHEST = 1e9
+"""An angle beyond this, in [rad], has lost the digits that say where in its turn it is."""
+
+_CONSISTENT = 1e-9
+"""Equations that leave a smaller part of themselves do not contradict each other."""
+
+
+def wanted_of(crank: Sequence[float], rocker: Sequence[float]) -> tuple[Wanted, ...]:
+    """Return pairs as positions that are wanted."""
+    return tuple(Wanted(t, p) for t, p in zip(crank, rocker, strict=True))
+
+
+def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) -> None:
+    """
+    Refuse pairs that no four-bar can have, or that say one thing twice.
+
+    Raises
+    ------
+    SynthesisError
+        With the numbers of the pairs, counted from 1.
+
+    """
+    if not 0.0 < ground < inf:
+        raise SynthesisError('ground', f'{ground!r} m is no length', 'give it one above 0')
+    pairs = [*enumerate(zip(crank, rocker, strict=True), 1)]
+    for number, pair in pairs:
+        if not all(abs(angle) <= _FARTHEST for angle in pair):
+            raise SynthesisError(
+                f'pair {number}',
+                f'{_said(pair)} is no pair of angles',
+                f'write two numbers of at most {degrees(_FARTHEST):.1g}°',
+            )
+    for (i, one), (j, other) in combinations(pairs, 2):
+        theta, phi = (abs(remainder(u - v, tau)) for u, v in zip(one, other, strict=True))
+        if theta < _SAME and phi < _SAME:
+            raise SynthesisError(
+                f'pairs {i} and {j}', f'are the same, {_said(one)}', 'give each position once'
+            )
+        if theta < _SAME:
+            raise SynthesisError(
+                f'pairs {i} and {j}',
+                f'want the rocker at {_degrees(one[1])} and at {_degrees(other[1])} for the same '
+                f'crank angle, {_degrees(one[0])}, which needs both assemblies',
+                'change one of the crank angles',
+            )
+
+
+def centred(crank: Sequence[float], rocker: Sequence[float]) -> tuple[Array, Array, Array]:
+    """
+    Return what each pair's cos φ, cos θ and cos(θ − φ) have over their means, by −2; (n,) each.
+
+    Freudenstein's k3 is what makes the rest zero on the whole: against the means it falls out.
+    """
+    theta, phi = np.array(crank, np.float64), np.array(rocker, np.float64)
+    columns = differences(theta[:, None], phi[:, None])
+    P, Q, R = (np.append(0.0, high[:, 0]) for high, _ in columns)
+    return P - P.mean(), Q - Q.mean(), R - R.mean()
+
+
+def dependent(crank: Sequence[float], rocker: Sequence[float]) -> SynthesisError:
+    """Return why the equations of pairs do not fix a four-bar, as far as that can be told."""
+    pairs = [*enumerate(zip(crank, rocker, strict=True), 1)]
+    if all(abs(remainder(theta - phi, tau)) < _SAME for _, (theta, phi) in pairs):
+        return SynthesisError(
+            'the pairs',
+            'turn crank and rocker by the same angles, as parallelograms of any crank length do',
+            'change one, or draw a parallelogram',
+        )
+    for (i, one), (j, other) in combinations(pairs, 2):
+        if all(abs(remainder(u + v, tau)) < _SAME for u, v in zip(one, other, strict=True)):
+            return SynthesisError(
+                f'pairs {i} and {j}',
+                f'{_said(one)} and {_said(other)} are mirror images in the ground line: a '
+                'four-bar that has one has the other',
+                'give another pair in place of one of them',
+            )
+    P, Q, R = centred(crank, rocker)
+    matrix = np.stack((P, Q), 1)
+    rest = R - matrix @ np.linalg.lstsq(matrix, R, _CONSISTENT)[0]
+    if np.linalg.norm(rest) < _CONSISTENT * np.linalg.norm(R):
+        return SynthesisError(
+            'the pairs', 'say so little that any number of four-bars has them all', MOVE
+        )
+    return SynthesisError(
+        'the pairs',
+        'contradict each other: no four-bar of finite links has them all',
+        f'{MOVE}, or let the zero angles be free',
+    )
+
+
+def _said(pair: tuple[float, float]) -> str:
+    return ' → '.join(map(_degrees, pair))
+
+
+def _degrees(angle: float) -> str:
+    return f'{degrees(angle):.10g}°'
+
 
 TRUSTED = 4.0
 """Units of roundoff times sensitivity that the error of a length stays within; measured."""

@@ -30,12 +30,10 @@ from dataclasses import dataclass
 from math import degrees, hypot, isfinite, pi, remainder
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.synthesis.course import Array, Course, course, Flags, least_transmission
+from linkage_ros.synthesis.defects import distances, Needs
 from linkage_ros.synthesis.design import Design, FourBar
-from linkage_ros.synthesis.needs import distances, Needs
-from linkage_ros.synthesis.pairs.checks import check_pairs, wanted_of
-from linkage_ros.synthesis.pairs.freudenstein import links
-from linkage_ros.synthesis.proof import assembled
+from linkage_ros.synthesis.pairs.freudenstein import check_pairs, links, wanted_of
+from linkage_ros.synthesis.proof import Array, assembled, Course, course, Flags, least_transmission
 from linkage_ros.synthesis.study import Found, search
 import numpy as np
 

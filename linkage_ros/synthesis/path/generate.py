@@ -16,16 +16,26 @@
 """
 Path generation: four-bars whose coupler point passes as near as can be to given points.
 
-Many are drawn and laid upon the points (`search`), the best are brought nearer
-(`fit`), and what is left of them are distinct linkages. A coupler curve has nine numbers: up
-to nine points can be met exactly without timing (H. Alt, Über die Erzeugung gegebener ebener
-Kurven mit Hilfe des Gelenkvierecks, Zeitschrift für angewandte Mathematik und Mechanik 3 (1923)
-13-19), and five with it. Of fewer points there are endlessly many exact answers; those with the
-better transmission angles come first then.
+Many four-bars are drawn and laid upon the points (`search`), the best are brought nearer, and the
+distinct linkages among them are the result. A coupler curve has nine numbers: up to nine points
+can be met exactly without timing (H. Alt, Über die Erzeugung gegebener ebener Kurven mit Hilfe des
+Gelenkvierecks, Zeitschrift für angewandte Mathematik und Mechanik 3 (1923) 13-19), and five with
+it. Fewer points have endlessly many exact answers; those with the better transmission angles come
+first then. Every linkage has two others, its cognates, that trace the same curve (S. Roberts, On
+three-bar motion in plane space, Proceedings of the London Mathematical Society 7 (1875) 14-23).
+They count as different.
 
-Every linkage has two others, its cognates, that trace the same curve (S. Roberts, On three-bar
-motion in plane space, Proceedings of the London Mathematical Society 7 (1875) 14-23). They count
-as different.
+Many four-bars are fitted at once, each from its own start, by least squares on the distances,
+damped until a step helps (K. Levenberg, 1944; D. W. Marquardt, 1963). A step does not help if it
+opens the loop on its way, or takes the points out of order, whatever the distances say. A guard
+keeps the first steps off toggles, so that no fit ends at such an edge far from the answer: the
+cotangent of the transmission angle counts as a distance. In a step
+
+- the crank angle of every point is an unknown too, without timing. It moves one place only, so
+  that it is eliminated from the normal equations (a Schur complement): they stay nine by nine
+  however many points there are.
+- lengths stay in a box. A length at an edge that would leave the box is held for that step.
+- the move is bent as the curves bend, to second order.
 """
 
 from __future__ import annotations
@@ -37,18 +47,278 @@ from math import remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
-from linkage_ros.kinematics.batch import Array
-from linkage_ros.synthesis.course import least_transmission
+from linkage_ros.kinematics.batch import Array, Complex, Mask
 from linkage_ros.synthesis.design import Design, FourBar, Wanted
-from linkage_ros.synthesis.path.aim import Aim, Fitted
-from linkage_ros.synthesis.path.arcs import fractions
-from linkage_ros.synthesis.path.fit import improve
-from linkage_ros.synthesis.path.model import LENGTHS, slopes
+from linkage_ros.synthesis.path.curves import (
+    Aim,
+    closes,
+    COLUMNS,
+    Fitted,
+    folds,
+    fractions,
+    LENGTHS,
+    PathTask,
+    POINT,
+    Slopes,
+    slopes,
+)
 from linkage_ros.synthesis.path.search import problem_of
-from linkage_ros.synthesis.path.task import PathTask
+from linkage_ros.synthesis.proof import least_transmission
 from linkage_ros.synthesis.study import search
 import numpy as np
 from numpy.typing import NDArray
+
+_SIZE = len(COLUMNS)
+
+_BENT = 0.4
+"""A step is bent by this part of its own length at most."""
+
+_AHEAD = 0.1
+"""The part of a step after which is looked how the curves bend."""
+
+_TINY = 1e-30
+"""Keeps a division from zero where a crank angle moves nothing."""
+
+
+def step(now: Fitted, seen: Slopes, damping: Array, aim: Aim, guard: float) -> Fitted:
+    """
+    Return where one damped step leads, within the box.
+
+    Without a guard the step is bent as the curves bend, to second order (M. K. Transtrum and J. P.
+    Sethna, Improvements to the Levenberg-Marquardt algorithm, arXiv:1201.5885, 2012): errors of
+    coupler curves have long, bent valleys, along which straight steps are short.
+    """
+    equations = _equations(now, seen, aim, guard)
+    solve = _Solver(now, equations, damping, aim)
+    change = solve(equations.gaps, equations.aside)
+    if not guard:
+        bend = _bend(now, seen, change, aim)
+        more = solve(np.stack((bend.real, bend.imag), axis=1), equations.aside)
+        sizes = [np.abs(part).max(1) for part in (change.rows, more.rows)]
+        helps = (sizes[1] <= _BENT * sizes[0])[:, None]
+        change = Fitted(
+            change.rows + helps * more.rows, change.angles + helps * more.angles, change.side
+        )
+    return _moved(now, change, aim)
+
+
+class _Equations(NamedTuple):
+    """
+    What is asked of a step: derivatives times step = gaps, as near as can be.
+
+    Attributes
+    ----------
+    by
+        Derivatives by the unknowns that all points share, (n, parts, N, m).
+    turns
+        Derivatives by the crank angle of the point, (n, parts, N).
+    gaps
+        (n, parts, N).
+    more, aside
+        Derivatives of what belongs to no point, (n, k, m), and their gaps, (n, k).
+
+    """
+
+    by: Array
+    turns: Array
+    gaps: Array
+    more: Array
+    aside: Array
+
+
+def _equations(now: Fitted, seen: Slopes, aim: Aim, guard: float) -> _Equations:
+    miss = aim.points - seen.places
+    by = np.stack((seen.by_dimension.real, seen.by_dimension.imag), axis=1)
+    turns = np.stack((seen.by_angle.real, seen.by_angle.imag), axis=1)
+    gaps = np.stack((miss.real, miss.imag), axis=1)
+    more, aside = np.zeros((len(by), 0, _SIZE)), np.zeros((len(by), 0))
+    if guard:
+        # Where the crank's angle is no unknown it is 0 or π, at which a full turn comes nearest to
+        # its toggles.
+        folded, by_dimension, by_angle = folds(now.rows, now.angles)
+        by = np.concatenate((by, guard * by_dimension[:, None]), axis=1)
+        turns = np.concatenate((turns, guard * by_angle[:, None]), axis=1)
+        gaps = np.concatenate((gaps, -guard * folded[:, None]), axis=1)
+        if aim.full_turn:
+            folded, by_dimension, _ = folds(now.rows, np.broadcast_to((0.0, np.pi), (len(by), 2)))
+            more, aside = guard * by_dimension, -guard * folded
+    if aim.timing is not None and aim.zero_free:
+        by = np.concatenate((by, turns[..., None]), axis=3)
+        more = np.pad(more, ((0, 0), (0, 0), (0, 1)))
+    elif aim.timing is not None:
+        # The crank's angle in the world is given: what turns the ground turns it back.
+        by[..., 2] -= turns
+    return _Equations(by, turns, gaps, more, aside)
+
+
+class _Solver:
+    """The damped normal equations of a step, ready for any gaps."""
+
+    def __init__(self, now: Fitted, equations: _Equations, damping: Array, aim: Aim) -> None:
+        self._now, self._equations, self._aim = now, equations, aim
+        by, turns, more = equations.by, equations.turns, equations.more
+        count, unknowns = len(by), by.shape[3]
+        self._rows = np.concatenate((by.reshape(count, -1, unknowns), more), axis=1)
+        matrix = np.matmul(self._rows.transpose(0, 2, 1), self._rows)
+        diagonal = np.arange(unknowns)
+        scale = matrix[:, diagonal, diagonal]
+        if aim.timing is None:
+            self._stiff = (turns * turns).sum(1) * (1.0 + damping[:, None]) + _TINY
+            self._mixed = (turns[..., None] * by).sum(1)
+            self._shares = self._mixed / self._stiff[..., None]
+            matrix -= np.matmul(self._shares.transpose(0, 2, 1), self._mixed)
+        matrix[:, diagonal, diagonal] += damping[:, None] * scale
+        matrix[:, diagonal, diagonal] += 1e-12 * scale.max(1, keepdims=True)
+        self._held = np.zeros((count, unknowns), dtype=bool)
+        slope, _ = self._slope(equations.gaps, equations.aside)
+        low, high = _box(aim)
+        self._held[:, :_SIZE] = (now.rows <= low) & (slope[:, :_SIZE] < 0.0)
+        self._held[:, :_SIZE] |= (now.rows >= high) & (slope[:, :_SIZE] > 0.0)
+        matrix *= ~self._held[:, :, None] & ~self._held[:, None, :]
+        matrix[:, diagonal, diagonal] += self._held
+        self._inverse = np.linalg.inv(matrix)
+
+    def __call__(self, gaps: Array, aside: Array) -> Fitted:
+        """Return the change of rows and angles."""
+        slope, pull = self._slope(gaps, aside)
+        change = np.matmul(self._inverse, np.where(self._held, 0.0, slope)[..., None])[..., 0]
+        # Far from the answer a step may be of any size, and e^x must stay finite.
+        np.clip(change, -1.0, 1.0, out=change)
+        rows = change[:, :_SIZE]
+        if self._aim.timing is None:
+            turned = (pull - np.matmul(self._mixed, rows[..., None])[..., 0]) / self._stiff
+        else:
+            turn = change[:, _SIZE:] if self._aim.zero_free else -rows[:, 2:3]
+            turned = np.broadcast_to(turn, self._now.angles.shape)
+        return Fitted(rows, turned, self._now.side)
+
+    def _slope(self, gaps: Array, aside: Array) -> tuple[Array, Array]:
+        right = np.concatenate((gaps.reshape(len(gaps), -1), aside), axis=1)
+        slope = np.matmul(right[:, None, :], self._rows)[:, 0, :]
+        if self._aim.timing is not None:
+            return slope, slope
+        pull = (self._equations.turns * gaps).sum(1)
+        return slope - np.matmul(pull[:, None, :], self._shares)[:, 0, :], pull
+
+
+def _bend(now: Fitted, seen: Slopes, change: Fitted, aim: Aim) -> Complex:
+    """Return what the places lag behind a step for their second derivative along it, (n, N)."""
+    ahead = slopes(
+        *_moved(now, Fitted(_AHEAD * change.rows, _AHEAD * change.angles, change.side), aim)
+    )
+    straight = np.matmul(seen.by_dimension, change.rows[..., None])[..., 0]
+    straight = straight + seen.by_angle * change.angles
+    bend: Complex = ((seen.places - ahead.places) / _AHEAD + straight) / _AHEAD
+    return bend
+
+
+def _moved(now: Fitted, change: Fitted, aim: Aim) -> Fitted:
+    low, high = _box(aim)
+    moved = np.clip(now.rows + change.rows, low, high)
+    return Fitted(moved, now.angles + change.angles, now.side)
+
+
+def _box(aim: Aim) -> tuple[Array, Array]:
+    """Return bounds of the rows, (9,)."""
+    low, high = np.full(_SIZE, -np.inf), np.full(_SIZE, np.inf)
+    low[LENGTHS], high[LENGTHS] = np.log(aim.shortest), np.log(aim.longest)
+    low[POINT], high[POINT] = -aim.longest, aim.longest
+    return low, high
+
+
+_TURN = 2.0 * np.pi
+
+_DAMPING = 1e-2
+_LEAST_DAMPED, _MOST_DAMPED = 1e-12, 1e10
+_HELPED, _FAILED = 0.2, 5.0
+"""What damping is multiplied by after a step."""
+
+_SETTLED = 1e-15
+"""A step that gains less than this part of the squares is the last."""
+
+_NOTHING = 1e-30
+"""Squares that are rounding, of a path of size 1."""
+
+
+def improve(start: Fitted, aim: Aim, steps: int, guard: float = 0.0) -> tuple[Fitted, Array]:
+    """
+    Return the four-bars after so many steps, and their sums of squared distances, (n,).
+
+    Those that are no answer from the outset (open, out of order) have inf, and stay as they are.
+
+    Parameters
+    ----------
+    start, aim
+        As above.
+    steps
+        At most.
+    guard
+        What a transmission angle of 45° counts for as a distance. Not part of the sums.
+
+    """
+    now = Fitted(*(np.array(part) for part in start))
+    seen = slopes(*now)
+    cost = _cost(now, seen, aim, guard)
+    damping = np.full(len(cost), _DAMPING)
+    going = np.flatnonzero(np.isfinite(cost))
+    # What is tried may be open, and its derivatives anything: its cost is inf.
+    with np.errstate(all='ignore'):
+        for _ in range(steps):
+            if not len(going):
+                break
+            at = Slopes(*(part[going] for part in seen))
+            tried = step(now.some(going), at, damping[going], aim, guard)
+            fresh = slopes(*tried)
+            reached = _cost(tried, fresh, aim, guard)
+            better = reached < cost[going]
+            settled = better & (cost[going] - reached <= _SETTLED * reached)
+            taken = going[better]
+            for old, new in zip((*now, *seen), (*tried, *fresh), strict=True):
+                old[taken] = new[better]
+            cost[taken] = reached[better]
+            damping[going] = np.maximum(
+                damping[going] * np.where(better, _HELPED, _FAILED), _LEAST_DAMPED
+            )
+            settled |= (damping[going] > _MOST_DAMPED) | (cost[going] < _NOTHING)
+            going = going[~settled]
+    return now, np.where(np.isfinite(cost), _squares(seen, aim), np.inf)
+
+
+def allowed(fitted: Fitted, aim: Aim) -> Mask:
+    """Return which four-bars stay closed on their way through the points, in order."""
+    angles = fitted.angles
+    low, high = angles.min(1), angles.max(1)
+    good: Mask = np.ones(len(low), dtype=bool)
+    if aim.timing is None:
+        along = np.diff(angles, axis=1) * np.sign(angles[:, -1:] - angles[:, :1])
+        good = (along > 0.0).all(1) & (high - low < _TURN)
+    if aim.full_turn:
+        low, high = np.zeros_like(low), np.full_like(high, _TURN)
+    good &= closes(fitted.rows, low, high)
+    return good
+
+
+def _cost(fitted: Fitted, seen: Slopes, aim: Aim, guard: float) -> Array:
+    squares = _squares(seen, aim)
+    if guard:
+        squares += guard * guard * _folded(fitted.rows, fitted.angles)
+        if aim.full_turn:
+            squares += guard * guard * _folded(fitted.rows, np.array([[0.0, np.pi]]))
+    return np.where(allowed(fitted, aim), squares, np.inf)
+
+
+def _folded(rows: Array, angles: Array) -> Array:
+    folded = folds(rows, angles)[0]
+    squares: Array = (folded * folded).sum(1)
+    return squares
+
+
+def _squares(seen: Slopes, aim: Aim) -> Array:
+    miss = aim.points - seen.places
+    total: Array = (miss.real**2 + miss.imag**2).sum(1)
+    total[~np.isfinite(total)] = np.inf
+    return total
+
 
 COUNT = 200_000
 """Four-bars that are drawn, if not said otherwise."""

@@ -32,14 +32,20 @@ the longest diagonal, then b + c above the longest and b − c between the short
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 from linkage_ros.kinematics.batch import Array, Complex
-from linkage_ros.synthesis.path.aim import Aim, Fitted
-from linkage_ros.synthesis.path.arcs import along, fractions, resampled, theta_at
-from linkage_ros.synthesis.path.model import coupler_directions, diagonals
-from linkage_ros.synthesis.study import Problem
+from linkage_ros.synthesis.path.curves import (
+    Aim,
+    along,
+    coupler_directions,
+    diagonals,
+    Fitted,
+    fractions,
+    resampled,
+    theta_at,
+)
 import numpy as np
 
 _TURN = 2.0 * np.pi
@@ -61,18 +67,32 @@ _AROUND = 32
 """Steps of the crank, and places along the curve, at which a closed one is compared."""
 
 
-class Starts(Problem, Protocol):
-    """A search that can say where its candidates stand."""
+@dataclass(frozen=True, slots=True)
+class Starts(ABC):
+    """A search (see `Problem`) that can say where its candidates stand."""
+
+    aim: Aim
+
+    @abstractmethod
+    def sample(self, generator: np.random.Generator, count: int) -> Array:
+        """Draw candidates, (count, n)."""
+
+    @abstractmethod
+    def _angles(self, candidates: Array) -> Array:
+        """Return the crank angles at the points, of each candidate, in [rad]."""
+
+    def score(self, candidates: Array) -> Array:
+        """Return the error of each candidate as it is laid upon the points."""
+        return _laid(candidates, self._angles(candidates), self.aim)[0]
 
     def starts(self, candidates: Array) -> Fitted:
         """Return the candidates as four-bars laid upon the points."""
+        return _started(candidates, self._angles(candidates), self.aim)
 
 
 @dataclass(frozen=True, slots=True)
-class Timed:
+class Timed(Starts):
     """Candidates b/a, c/a, d/a, side and the crank angle at the timing's zero."""
-
-    aim: Aim
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
         zero = generator.uniform(0.0, _TURN, count)
@@ -80,21 +100,13 @@ class Timed:
         low, high = zero + timing.min(), zero + timing.max()
         return np.column_stack((_bars(generator, low, high, self.aim.full_turn), zero))
 
-    def score(self, candidates: Array) -> Array:
-        return _laid(candidates, self._angles(candidates), self.aim)[0]
-
-    def starts(self, candidates: Array) -> Fitted:
-        return _started(candidates, self._angles(candidates), self.aim)
-
     def _angles(self, candidates: Array) -> Array:
         return candidates[:, 4:5] + _known(self.aim.timing)
 
 
 @dataclass(frozen=True, slots=True)
-class Open:
+class Open(Starts):
     """Candidates b/a, c/a, d/a, side, the traced point, the first crank angle and the travel."""
-
-    aim: Aim
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
         start = generator.uniform(0.0, _TURN, count)
@@ -102,12 +114,6 @@ class Open:
         low, high = np.minimum(start, start + travel), np.maximum(start, start + travel)
         bars = _bars(generator, low, high, self.aim.full_turn)
         return np.column_stack((bars, _arms(generator, bars), start, travel))
-
-    def score(self, candidates: Array) -> Array:
-        return _laid(candidates, self._angles(candidates), self.aim)[0]
-
-    def starts(self, candidates: Array) -> Fitted:
-        return _started(candidates, self._angles(candidates), self.aim)
 
     def _angles(self, candidates: Array) -> Array:
         start, travel = candidates[:, 6:7], candidates[:, 7:8]
@@ -117,20 +123,12 @@ class Open:
 
 
 @dataclass(frozen=True, slots=True)
-class Closed:
+class Closed(Starts):
     """Candidates b/a, c/a, d/a, side and the traced point; where it begins is found."""
-
-    aim: Aim
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
         bars = _bars(generator, np.zeros(count), np.full(count, _TURN), True)
         return np.column_stack((bars, _arms(generator, bars)))
-
-    def score(self, candidates: Array) -> Array:
-        return _laid(candidates, self._angles(candidates), self.aim)[0]
-
-    def starts(self, candidates: Array) -> Fitted:
-        return _started(candidates, self._angles(candidates), self.aim)
 
     def _angles(self, candidates: Array) -> Array:
         """Return the angles by the turn of the whole curve that lays it best on the points."""

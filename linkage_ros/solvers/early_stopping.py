@@ -26,10 +26,10 @@ import numpy as np
 
 _STEPS = 8
 _SINGULAR = 1e-6
-"""Conditioning below which so loose an answer is none."""
+"""Conditioning below which the links are iterated to the end."""
 
 
-class _Looser(Iteration):
+class _EarlyStopping(Iteration):
     __slots__ = ('_tolerance',)
 
     def __init__(self, strict: Iteration, tolerance: float) -> None:
@@ -65,7 +65,7 @@ class _Looser(Iteration):
         return super().close(known)
 
 
-def looser(step: Step, tolerance: float) -> Step:
+def early_stopping(step: Step, tolerance: float) -> Step:
     """
     Return an iteration that ends where the last correction is below a tolerance.
 
@@ -77,4 +77,4 @@ def looser(step: Step, tolerance: float) -> Step:
         In [rad], and in the unit of the lengths.
 
     """
-    return _Looser(cast('Iteration', step), tolerance)
+    return _EarlyStopping(cast('Iteration', step), tolerance)

@@ -16,35 +16,106 @@
 """
 The joints of a linkage and their derivatives over cells of its input, enclosed for certain.
 
+Numbers are discs: a centre, real or complex, and a radius that bounds how far the number may be
+from it, rounding of the centre included (circular arithmetic: I. Gargantini and P. Henrici, Numer.
+Math. 18, 1972). Everything is an array over the cells of a range; overflow apart, each bound holds
+for certain.
+
 Over a cell, an interval T of the input with the middle t, the loop equations F(T, y) = 0 of a
-group of links are shown to have one solution y within ρ of what the closed form has at t, by the
-operator of Krawczyk (R. Krawczyk, Computing 4, 1969): with Y near F_y⁻¹ it is so where::
+group of links are shown to have one solution y within ρ of the closed form's at t, by the operator
+of Krawczyk (R. Krawczyk, Computing 4, 1969): with Y near F_y⁻¹ it is so where::
 
     |Y·F(T, y(t))| + |1 − Y·F_y(T, y(t) ± ρ)|·ρ < ρ
 
-All Taylor coefficients of y by the input follow from F_y·y_k = −(what F_k comes to with y_k = 0),
-as discs that hold them over the whole cell. Groups are taken in the order of solution, each with
-the discs of those before it.
+All Taylor coefficients of y by the input follow from F_y·y_k = −(F_k with y_k = 0), as discs that
+hold them over the whole cell. Groups are taken in the order of solution, each with the discs of
+those before it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from linkage_ros.solvers.discs import Disc, facing, Jet, jet_product, times, total, ZERO
 from linkage_ros.solvers.loops import Loops, Vector
 import numpy as np
 from numpy.typing import NDArray
 
+_ROUNDING = 2.0**-50
+"""Above what a centre is off by, of its size: a product of complex numbers, a sine of numpy's."""
+
+_LEAST = 2.0**-1020
+"""Above what a product is off by where it underflows."""
+
+_UP = 1.0 + 2.0**-48
+"""What makes up for the rounding of a radius."""
+
+
+class Disc(NamedTuple):
+    """Numbers, each within a radius of a centre."""
+
+    center: Any
+    radius: Any
+
+    @property
+    def size(self) -> Any:
+        """Return a bound of the absolute values."""
+        return (np.abs(self.center) + self.radius) * _UP
+
+
+Jet = list[Disc]
+"""The coefficients of a Taylor series, from order 0 on."""
+
+ZERO = Disc(0.0, 0.0)
+
+
+def total(discs: Sequence[Disc]) -> Disc:
+    """Return the sum."""
+    center = sum(disc.center for disc in discs)
+    sizes = sum(np.abs(disc.center) for disc in discs)
+    return Disc(center, sum(disc.radius for disc in discs) * _UP + len(discs) * _ROUNDING * sizes)
+
+
+def product(one: Disc, other: Disc) -> Disc:
+    """Return the product."""
+    a, b = np.abs(one.center), np.abs(other.center)
+    radius = (a * other.radius + b * one.radius + one.radius * other.radius) * _UP
+    return Disc(one.center * other.center, radius + _ROUNDING * a * b + _LEAST)
+
+
+def times(disc: Disc, factor: complex) -> Disc:
+    """Return the product with a number that is a double."""
+    size = abs(factor)
+    radius = disc.radius * size * _UP + _ROUNDING * size * np.abs(disc.center) + _LEAST
+    return Disc(disc.center * factor, radius)
+
+
+def facing(angle: Jet) -> Jet:
+    """
+    Return e^{iφ}: of order k it is i/k·Σ j·φ_j·e_(k−j).
+
+    An arc is no shorter than its chord, so that the radius of an angle is one of its direction.
+    """
+    center = np.exp(1j * np.asarray(angle[0].center))
+    found = [Disc(center, angle[0].radius * _UP + _ROUNDING)]
+    for k in range(1, len(angle)):
+        parts = [times(product(angle[j], found[k - j]), 1j * j) for j in range(1, k + 1)]
+        found.append(times(total(parts), 1.0 / k))
+    return found
+
+
+def jet_product(one: Jet, other: Jet) -> Jet:
+    """Return the product of two series."""
+    return [total([product(one[j], other[k - j]) for j in range(k + 1)]) for k in range(len(one))]
+
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_ROUNDING = 2.0**-50
 _LEAST_BOX = 2.0**-44
 """Of an unknown's size, or of 1: a narrower box could not be told from its rounding."""
 
-_UP = 1.0 + 2.0**-40
+_UP_MATRIX = 1.0 + 2.0**-40
 """What makes up for the rounding of bounds that are worked out in matrices."""
 
 
@@ -187,13 +258,13 @@ class _Group:
             step, spread = self._step(k, inverse)
             with np.errstate(all='ignore'):
                 largest = (np.abs(step) + spread).max(axis=1) / (1.0 - worst)
-            self._set(k, step, (spread + loss.sum(axis=2) * largest[:, None]) * _UP)
+            self._set(k, step, (spread + loss.sum(axis=2) * largest[:, None]) * _UP_MATRIX)
         return Unknowns(middle, box, radius, self._turning), proven
 
     def _within(self, box: Array, first: Array, inverse: Array) -> tuple[Array, Mask]:
         """Return how far from the middle a solution is, and where it is so within the box."""
         self._set(0, self._middle, box)
-        radius: Array = (first + _image(self._loss(inverse), box)) * _UP
+        radius: Array = (first + _image(self._loss(inverse), box)) * _UP_MATRIX
         held: Mask = np.asarray((radius < box).all(axis=1))
         return radius, held
 
@@ -202,7 +273,7 @@ class _Group:
         errors, spread = self._errors(order)
         n = errors.shape[1]
         radius = _image(np.abs(inverse), spread + n * _ROUNDING * np.abs(errors))
-        return -_image(inverse, errors), radius * _UP
+        return -_image(inverse, errors), radius * _UP_MATRIX
 
     def _loss(self, inverse: Array) -> Array:
         """Return a bound of |1 − Y·F_y| over the unknowns as they are set."""
@@ -210,7 +281,7 @@ class _Group:
         n = slopes.shape[1]
         size = np.abs(inverse)
         off = np.abs(np.eye(n) - inverse @ slopes) + n * _ROUNDING * (size @ np.abs(slopes) + 1.0)
-        loss: Array = (off + size @ spread) * _UP
+        loss: Array = (off + size @ spread) * _UP_MATRIX
         return loss
 
     def _set(self, order: int, middle: Array, radius: Array) -> None:

@@ -89,7 +89,7 @@ class Section:
     ) -> float:
         """Return a finite number within bounds: least ≤ value ≤ most, and value > above."""
         value = self._take(key, default, f'a number{unit and f" in [{unit}]"}')
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if not _is_number(value):
             raise self.error(key, f'{quoted(value)} is not a number', 'write a number')
         if not isfinite(value) or not least <= value <= most or value <= above:
             bounds = ' and '.join(
@@ -162,7 +162,7 @@ class Section:
         if (
             not isinstance(value, list)
             or len(value) != 2
-            or any(isinstance(v, bool) or not isinstance(v, int | float) for v in value)
+            or any(not _is_number(v) for v in value)
             or not all(map(isfinite, value))
         ):
             raise self.error(
@@ -184,7 +184,7 @@ class Section:
         if (
             not isinstance(value, list)
             or len(value) != 2
-            or any(isinstance(v, bool) or not isinstance(v, int | float) for v in value)
+            or any(not _is_number(v) for v in value)
             or any(map(isnan, value))
         ):
             raise self.error(
@@ -226,8 +226,7 @@ class Section:
         """Return a list of finite numbers, of which none is beyond ±most."""
         value = self._take(key, None, 'a list of numbers')
         if not isinstance(value, list) or any(
-            isinstance(v, bool) or not isinstance(v, int | float) or not abs(v) <= most
-            for v in value
+            not _is_number(v) or not abs(v) <= most for v in value
         ):
             raise self.error(
                 key, f'{quoted(value)} is no list of finite numbers', 'write [0.1, 0.2]'
@@ -246,10 +245,7 @@ class Section:
             if (
                 not isinstance(found, list)
                 or len(found) != len(columns)
-                or any(
-                    isinstance(v, bool) or not isinstance(v, int | float) or not abs(v) <= most
-                    for v in found
-                )
+                or any(not _is_number(v) or not abs(v) <= most for v in found)
             ):
                 raise self.error(
                     key, f'row {number}, {quoted(found)}, is not {row}', 'write finite numbers'
@@ -303,3 +299,7 @@ class Section:
                 raise self.error('', f'the key {key!r} is missing', f'add {key}: {expected}')
             return default
         return self._content[key]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -12,4 +12,5 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Motion generation: poses that the coupler shall take."""
+
+"""Files of users: sections of strict YAML."""

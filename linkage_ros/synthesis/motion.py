@@ -1,0 +1,440 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Motion generation: a four-bar whose coupler takes three poses.
+
+Any two points of the coupler can be its pins, and any two of the ground its pivots: the poses give
+the other end of each link. A pin A of the coupler has three places in the ground, P + e^{iθ}·a for
+the poses (P, θ); the circle through them has the fixed pivot in its centre. Seen from the coupler
+the fixed pivot O has three places, e^{−iθ}·(O − P), and the moving pivot is in the centre of these
+(L. Burmester, Lehrbuch der Kinematik, 1888).
+
+The circle through three places A₁, A₂, A₃, with the chords u = A₂ − A₁ and v = A₃ − A₁, has its
+centre at the place that is as far from A₂ and from A₃ as from A₁, ::
+
+    c = A₁ + i·(u·v² − v·u²)/(2·(u × v)).
+
+It is computed to 20 bits more than a double has: for places near a line, or near each other, u × v
+keeps little of u and v. How it follows a small move of the places comes from |Aᵢ − c|² = r². With
+n = A − c and g = n·dA, of each place, u·dc = g₂ − g₁ and v·dc = g₃ − g₁; so that ::
+
+    dc = i·((v − u)·g₁ − v·g₂ + u·g₃)/(u × v).
+"""
+
+from __future__ import annotations
+
+from cmath import phase
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from math import degrees, isfinite, remainder, tau
+from typing import Any, NamedTuple, TypeAlias
+
+from linkage_ros.errors import SynthesisError
+from linkage_ros.kinematics.batch import Array, Complex
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
+from linkage_ros.synthesis.design import Design, FourBar, Wanted
+from linkage_ros.synthesis.double_double import minus, over, plus, sine_cosine, times, Twofold
+from linkage_ros.synthesis.proof import assembled
+import numpy as np
+from numpy.typing import ArrayLike
+
+SAME = 1e-12
+"""Angles nearer than this are the same, in [rad], and places so near in parts of the motion."""
+
+
+class Pose(NamedTuple):
+    """Where the coupler shall be: the origin of its frame, in [m], and its angle, in [rad]."""
+
+    place: complex
+    angle: float
+
+
+def check_task(poses: Sequence[Pose], pivots: Mapping[str, complex]) -> None:
+    """
+    Refuse poses and pivots that no four-bar can have.
+
+    Raises
+    ------
+    SynthesisError
+        With the numbers of the poses, counted from 1, or the names of the pivots.
+
+    """
+    if len(poses) != 3:
+        raise SynthesisError('poses', f'{len(poses)} were given', 'give three')
+    for number, (place, angle) in enumerate(poses, 1):
+        if not (finite(place) and isfinite(angle)):
+            raise SynthesisError(
+                f'pose {number}', f'({place.real}, {place.imag}), {angle} is none', 'give numbers'
+            )
+    for name, place in pivots.items():
+        if not finite(place):
+            raise SynthesisError(name, f'({place.real}, {place.imag}) is no place', 'give numbers')
+    spread = max(abs(one.place - other.place) for one, other in combinations(poses, 2))
+    for (i, one), (j, other) in combinations(enumerate(poses, 1), 2):
+        if (
+            abs(remainder(one.angle - other.angle, tau)) < SAME
+            and abs(one.place - other.place) <= SAME * spread
+        ):
+            raise SynthesisError(
+                f'poses {i} and {j}',
+                f'are the same, {said(one.place)} at {degrees(one.angle):.10g}°',
+                'give each pose once',
+            )
+    (name, place), (other_name, other_place) = pivots.items()
+    if abs(place - other_place) <= 4.0 * UNIT_ROUNDOFF * (abs(place) + abs(other_place)):
+        raise SynthesisError(
+            f'{name} and {other_name}',
+            f'are the same place, {said(place)}: a link between them has no length',
+            'give two places',
+        )
+
+
+def columns(poses: Sequence[Pose]) -> tuple[Complex, Array]:
+    """Return the places of poses, and their angles, (3,) both."""
+    return (
+        np.array([pose.place for pose in poses], np.complex128),
+        np.array([pose.angle for pose in poses], np.float64),
+    )
+
+
+def finite(place: complex) -> bool:
+    """Return whether both coordinates are numbers."""
+    return isfinite(place.real) and isfinite(place.imag)
+
+
+def said(place: complex) -> str:
+    """Return a place as a human reads it."""
+    return f'({place.real:.6g}, {place.imag:.6g}) m'
+
+
+Place: TypeAlias = tuple[Twofold, Twofold]
+"""Its x and y."""
+
+
+class Circle(NamedTuple):
+    """
+    A circle; inf or nan where the places lie on a line, or two of them are the same.
+
+    Attributes
+    ----------
+    centre
+        (…).
+    spokes
+        From the centre to the places, (…, 3).
+    chords
+        Between the places, each opposite to its own: A₃ − A₂, A₁ − A₃ and A₂ − A₁, (…, 3).
+    pull
+        dc/dg of each place, as above, (…, 3).
+
+    """
+
+    centre: Complex
+    spokes: Complex
+    chords: Complex
+    pull: Complex
+
+
+def circle(places: Place) -> Circle:
+    """Return the circle through three places, (…, 3)."""
+    first, second, third = (_at(places, index) for index in range(3))
+    u, v = _minus(second, first), _minus(third, first)
+    with np.errstate(all='ignore'):
+        cross = minus(times(u[0], v[1]), times(u[1], v[0]))
+        twice = (2.0 * cross[0], 2.0 * cross[1])
+        u_square, v_square = (plus(times(w[0], w[0]), times(w[1], w[1])) for w in (u, v))
+        to_centre = (
+            over(minus(times(v[1], u_square), times(u[1], v_square)), twice),
+            over(minus(times(u[0], v_square), times(v[0], u_square)), twice),
+        )
+        centre = plus(first[0], to_centre[0]), plus(first[1], to_centre[1])
+        spokes = [number(_minus(place, centre)) for place in (first, second, third)]
+        chords = np.stack((number(_minus(v, u)), -number(v), number(u)), -1)
+        pull = 1j * chords / cross[0][..., None]
+    return Circle(number(centre), np.stack(spokes, -1), chords, pull)
+
+
+def sensitivity(found: Circle, own: Complex, shared: Complex) -> Array:
+    """
+    Return Σ|x·∂c/∂x| + ``abs(c)`` of the centre c over all inputs x; (…).
+
+    Times 2⁻⁵³ it is what rounding the inputs alone can make of the centre.
+
+    Parameters
+    ----------
+    found
+        The circle.
+    own
+        x·∂A/∂x of each place by the inputs that move it alone, (…, 3, k).
+    shared
+        x·∂A/∂x of each place by the inputs that move all three, (…, 3, m).
+
+    """
+    with np.errstate(all='ignore'):
+        back = np.conj(found.spokes)[..., None]
+        alone = np.abs(found.pull)[..., None] * np.abs((back * own).real)
+        together = np.abs((found.pull[..., None] * (back * shared).real).sum(-2))
+        total: Array = alone.sum((-2, -1)) + together.sum(-1) + np.abs(found.centre)
+    return total
+
+
+def number(place: Place) -> Complex:
+    """Return a place as the nearest complex number."""
+    found = np.empty(place[0][0].shape, np.complex128)
+    found.real, found.imag = place[0][0], place[1][0]
+    return found
+
+
+def _at(places: Place, index: int) -> Place:
+    (x, x_low), (y, y_low) = places
+    return (x[..., index], x_low[..., index]), (y[..., index], y_low[..., index])
+
+
+def _minus(one: Place, other: Place) -> Place:
+    return minus(one[0], other[0]), minus(one[1], other[1])
+
+
+TRUSTED = 2.0
+"""Units of roundoff times sensitivity that the error of a pivot stays within: one for the rounding
+of what is given, and one for what is worked out here, which measured is a third of that."""
+
+
+class Links(NamedTuple):
+    """
+    Links that lead from fixed pivots to moving ones; any number of them at once.
+
+    Attributes
+    ----------
+    pivots
+        The pivots that were found, (…), in [m]: fixed ones in the ground's frame, moving ones in
+        the coupler's. Infinite or nan where there is none.
+    arms
+        From the fixed pivot to the moving one in the ground's frame, at each pose, (…, 3).
+    sensitivity
+        Σ|x ∂p/∂x| + ``abs(p)`` of each pivot p over poses and given pivot x; (…). Times 2⁻⁵³ it
+        is what rounding these alone can make of the pivot.
+    chords
+        Between the places that the given pivot has, each opposite to its own, (…, 3).
+
+    """
+
+    pivots: Complex
+    arms: Complex
+    sensitivity: Array
+    chords: Complex
+
+    @property
+    def lengths(self) -> Array:
+        """Return the lengths of the links, (…)."""
+        return np.abs(self.arms[..., 0])
+
+    @property
+    def digits(self) -> Array:
+        """Return how many digits of each pivot, on the scale of its link, can be trusted; (…)."""
+        with np.errstate(all='ignore'):
+            lost = TRUSTED * UNIT_ROUNDOFF * self.sensitivity / self.lengths
+            digits: Array = np.clip(np.nan_to_num(-np.log10(lost), nan=0.0), 0.0, 16.0)
+        return digits
+
+
+def fixed_pivots(places: Complex, angles: Array, moving: ArrayLike) -> Links:
+    """
+    Return the links that carry moving pivots (…) through poses (…, 3); nothing is raised.
+
+    Parameters
+    ----------
+    places, angles
+        Of the coupler, in [m] and [rad].
+    moving
+        In the coupler's frame, in [m].
+
+    """
+    point = np.asarray(moving, np.complex128)[..., None]
+    sine, cosine = sine_cosine(_twofold(angles))
+    x, y = _turned(_twofold(point.real), _twofold(point.imag), cosine, sine)
+    found = circle((plus(_twofold(places.real), x), plus(_twofold(places.imag), y)))
+    turn = cosine[0] + 1j * sine[0]
+    own = np.stack(_every(places.real, 1j * places.imag, 1j * angles * turn * point), -1)
+    shared = np.stack(_every(turn * point.real, 1j * turn * point.imag), -1)
+    return Links(found.centre, found.spokes, sensitivity(found, own, shared), found.chords)
+
+
+def moving_pivots(places: Complex, angles: Array, fixed: ArrayLike) -> Links:
+    """
+    Return the links that lead from fixed pivots (…) to poses (…, 3); nothing is raised.
+
+    Parameters
+    ----------
+    places, angles
+        Of the coupler, in [m] and [rad].
+    fixed
+        In the ground's frame, in [m].
+
+    """
+    point = np.asarray(fixed, np.complex128)[..., None]
+    sine, cosine = sine_cosine(_twofold(-angles))
+    x = minus(_twofold(point.real), _twofold(places.real))
+    y = minus(_twofold(point.imag), _twofold(places.imag))
+    found = circle(_turned(x, y, cosine, sine))
+    turn = cosine[0] + 1j * sine[0]
+    about = -1j * angles * turn * (x[0] + 1j * y[0])
+    own = np.stack(_every(-turn * places.real, -1j * turn * places.imag, about), -1)
+    shared = np.stack(_every(turn * point.real, 1j * turn * point.imag), -1)
+    arms = -np.conj(turn) * found.spokes
+    return Links(found.centre, arms, sensitivity(found, own, shared), found.chords)
+
+
+def _turned(x: Twofold, y: Twofold, cosine: Twofold, sine: Twofold) -> tuple[Twofold, Twofold]:
+    return (
+        minus(times(cosine, x), times(sine, y)),
+        plus(times(sine, x), times(cosine, y)),
+    )
+
+
+def _twofold(numbers: ArrayLike) -> Twofold:
+    high = np.asarray(numbers, np.float64)
+    return high, np.zeros_like(high)
+
+
+def _every(*numbers: ArrayLike) -> list[Any]:
+    return list(np.broadcast_arrays(*numbers))
+
+
+_LONGEST = 1e9
+"""In chords: a link beyond it is an infinite one but for rounding."""
+
+_NEAR = 1e-3
+"""Places nearer than this, in parts of the motion, are at the pole rather than on a line."""
+
+
+def from_moving_pivots(poses: Sequence[Pose], a: complex, b: complex) -> tuple[Design, Links]:
+    """
+    Design the four-bar whose coupler has its pins in two given points.
+
+    Parameters
+    ----------
+    poses
+        Three.
+    a, b
+        The pins of crank and rocker, in the coupler's frame, in [m].
+
+    Raises
+    ------
+    SynthesisError
+        Where no link carries one of the pins through its places, or the ground has no length.
+
+    """
+    check_task(poses, {'A': a, 'B': b})
+    pins = np.array((a, b))
+    links = fixed_pivots(*columns(poses), pins)
+    for number, name in enumerate('AB'):
+        _check_link(poses, name, links, number, 'fixed', np.abs(pins[number]))
+    _check_distance(links, 'A and B', 'fixed', 'ground')
+    return _design(poses, links, links.pivots, pins), links
+
+
+def from_fixed_pivots(poses: Sequence[Pose], o2: complex, o4: complex) -> tuple[Design, Links]:
+    """
+    Design the four-bar that stands on two given places.
+
+    Parameters
+    ----------
+    poses
+        Three.
+    o2, o4
+        The pivots of crank and rocker, in the ground's frame, in [m].
+
+    Raises
+    ------
+    SynthesisError
+        Where no link leads from one of the pivots to the coupler, or the coupler has no length.
+
+    """
+    check_task(poses, {'O2': o2, 'O4': o4})
+    pivots = np.array((o2, o4))
+    links = moving_pivots(*columns(poses), pivots)
+    for number, name in enumerate(('O2', 'O4')):
+        _check_link(poses, name, links, number, 'moving', np.abs(pivots[number]))
+    _check_distance(links, 'O2 and O4', 'moving', 'coupler')
+    return _design(poses, links, pivots, links.pivots), links
+
+
+def _design(poses: Sequence[Pose], links: Links, fixed: Complex, moving: Complex) -> Design:
+    o2, o4 = (complex(pivot) for pivot in fixed)
+    a, b = (complex(pivot) for pivot in moving)
+    crank, rocker = (complex(length, 0.0) for length in links.lengths)
+    four_bar = FourBar((o2, o4), crank, (a, b), rocker, 'left', traced=0j)
+    wanted = tuple(
+        Wanted(phase(arm), coupler=pose.angle, place=pose.place)
+        for arm, pose in zip(links.arms[0].tolist(), poses, strict=True)
+    )
+    return assembled(Design(four_bar, wanted))
+
+
+def _check_link(
+    poses: Sequence[Pose], name: str, links: Links, index: int, kind: str, far: float
+) -> None:
+    """Refuse a pivot from which no link of one length leads to its other end."""
+    chords = np.abs(links.chords[index])
+    longest = float(chords.max())
+    resting = [
+        f'{i + 1} and {j + 1}'
+        for i, j in combinations(range(3), 2)
+        if chords[3 - i - j]
+        <= 16.0 * UNIT_ROUNDOFF * (abs(poses[i].place) + abs(poses[j].place) + far)
+    ]
+    if len(resting) == 3:
+        raise SynthesisError(
+            name,
+            'the coupler turns about it in all three poses: its link would have no length',
+            'choose another place for it',
+        )
+    if resting:
+        raise SynthesisError(
+            name,
+            f'is the pole of poses {resting[0]}, about which the coupler turns from one to the '
+            'other: links of any length would do',
+            'choose another place for it',
+        )
+    digits, length = float(links.digits[index]), float(links.lengths[index])
+    if digits >= 1.0 and length <= _LONGEST * longest:
+        return
+    if chords.min() > _NEAR * longest:
+        slope = degrees(phase(complex(links.chords[index][int(chords.argmax())]))) % 180.0
+        seen, slider = ('', '') if kind == 'fixed' else (', seen from the coupler,', ' of it')
+        raise SynthesisError(
+            name,
+            f'its three places{seen} lie on a line at {slope:.4g}°, so that its {kind} pivot is '
+            f'infinitely far: a slider along that line{slider} does it, not a link',
+            'choose another place for it, or turn a pose',
+        )
+    raise SynthesisError(
+        name,
+        f'is so near a pole that not a digit of its {kind} pivot is certain',
+        'choose another place for it',
+    )
+
+
+def _check_distance(links: Links, names: str, kind: str, link: str) -> None:
+    """Refuse two links that meet in the pivot that was found."""
+    one, other = (complex(pivot) for pivot in links.pivots)
+    size = TRUSTED * float(links.sensitivity.sum()) + 4.0 * float(links.lengths.max())
+    if abs(one - other) <= UNIT_ROUNDOFF * size:
+        raise SynthesisError(
+            names,
+            f'have the same {kind} pivot, since the coupler only turns about it: the {link} '
+            'would have no length',
+            'choose other places for them, or turn a pose',
+        )
