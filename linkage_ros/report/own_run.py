@@ -12,7 +12,8 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A run of a scene, read from its bag: ticks, samples, and what happened."""
+
+"""Read the run of a scene from its bag: ticks, samples, events, and spans with an open loop."""
 
 from __future__ import annotations
 
@@ -22,22 +23,48 @@ from linkage_ros.bag.reading.beginning import lost_beginning
 from linkage_ros.bag.reading.contents import Contents
 from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.bag.reading.run_events import run_said, RunAccount
+from linkage_ros.kinematics.batch import CODES
+from linkage_ros.kinematics.status import Status
 from linkage_ros.replay import own_joint_states
-from linkage_ros.report.arrays import Flags, Numbers
-from linkage_ros.report.blocks import Entry
-from linkage_ros.report.clock import RunClock
-from linkage_ros.report.crank import Crank
-from linkage_ros.report.health import Health
+from linkage_ros.report.blocks import Entry, Rows, rows_of, RunClock
+from linkage_ros.report.curves import MOST_LINKAGES, OwnCurves
+from linkage_ros.report.decimation import Flags, Numbers, Times
+from linkage_ros.report.diagnostics_summary import DiagnosticsSummary
 from linkage_ros.report.joint_states import JointBlock, JointStates
-from linkage_ros.report.judge import Judge
-from linkage_ros.report.openings import find_openings
-from linkage_ros.report.own_curves import MOST_LINKAGES, OwnCurves
-from linkage_ros.report.own_rows import Rows, rows_of
-from linkage_ros.report.run import LinkageRun, Run, Window
-from linkage_ros.report.silences import Silences
-from linkage_ros.report.spans import APART, Lane
+from linkage_ros.report.run import APART, Lane, LinkageRun, Run, Silences, Window
+from linkage_ros.report.samples import Crank, SampleJudge
 from linkage_ros.scene.scene import Scene
 import numpy as np
+
+
+def find_open_loop_spans(linkage: LinkageRun, times: Times, angles: Numbers, lane: Lane) -> None:
+    """
+    Put samples at which a linkage does not close onto a lane.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    times
+        Of the samples, in the time of the run in [ns].
+    angles
+        Where they have its driven joints, of shape (samples, inputs), in [rad] or [m].
+    lane
+        The lane.
+
+    """
+    if not len(times):
+        return
+    status = linkage.closure.solve(*angles.T, derivatives=0).status
+    found = status >= CODES[Status.OPEN]
+    for time, given in zip(times[found].tolist(), angles[found].tolist(), strict=True):
+        text = ''
+        # The text is that of the first of those that are one span.
+        if not lane.spans or time - lane.spans[-1].end > lane.near:
+            position = linkage.closure.position(*given)
+            text = f'{position.status.value}, the links miss by {position.gap:.3g} m'
+        lane.add(time, time, f'{linkage.name} {text}'.strip())
+
 
 LANES = (
     'fault', 'open', 'told_open', 'toggle', 'told_toggle', 'told_limited', 'silent', 'withheld',
@@ -72,7 +99,7 @@ class OwnRun:
 
     def __init__(self, bag: Bag, run: RunAccount, scene: Scene, window: Window) -> None:
         from_beginning = not lost_beginning(bag, run)
-        self._judge = Judge(bag, scene, from_beginning)
+        self._judge = SampleJudge(bag, scene, from_beginning)
         pipeline = self._judge.pipeline
         self._rate, self._window, self._clock = scene.rate, window, RunClock()
         self._lanes = {
@@ -113,7 +140,7 @@ class OwnRun:
         self._first_joints = [scene.joints.index(linkage.joints[0]) for linkage in self._linkages]
         self._has_limits = any(member.linkage.limits for member in scene.members)
         self._tells_toggles = len(scene.members) == 1 and 'velocity' in scene.members[0].effects
-        self._health = Health(self._lanes, from_beginning)
+        self._health = DiagnosticsSummary(self._lanes, from_beginning)
         bodies = sum(len(each.closure.structure.links) for each in self._linkages[:MOST_LINKAGES])
         topics = run.joint_states_topic, run.crank_topic
         self._curves = OwnCurves(scene, topics, bodies, window)
@@ -207,7 +234,7 @@ class OwnRun:
             alone = own & ~np.isin(samples.logged, states.logged[there])
             at = samples.logged if self._rate else told.stamps
             angles, _ = crank.at(samples.numbers[alone] + 1, at[alone])
-            find_openings(
+            find_open_loop_spans(
                 self._linkages[number], samples.passed[alone], angles, self._lanes['open']
             )
 

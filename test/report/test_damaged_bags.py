@@ -26,7 +26,7 @@ from linkage_ros.bag.reading.reader import read_bag
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
-from linkage_ros.report.diagnostics import statuses
+from linkage_ros.report.diagnostics_summary import statuses
 from linkage_ros.report.joint_states import JointStates
 from linkage_ros.report.run import Window
 import numpy as np

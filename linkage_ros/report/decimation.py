@@ -14,21 +14,52 @@
 
 
 """
-Curves of any length as a bounded number of intervals that keep minima and maxima.
+Runs of any length in bounded memory, and the size limits of a page.
 
-As long as there is room each interval is one row. When there is none left, two neighbours become
-one, and from then on an interval is filled with twice as many rows: its least and its greatest
-value stay, in the order in which they came. So nobody has to know beforehand how long a run is.
+A curve becomes a bounded number of intervals that keep minima and maxima. While there is space,
+each interval is one row. When there is none, two neighbours become one, and from then on an
+interval takes twice as many rows: its least and its greatest value stay, in the order in which
+they came. So the length of a run need not be known beforehand. Rows at equal steps are decimated
+likewise, and durations are counted in bins.
+
+Numbers go onto a page as base64, which takes 4 bytes for 3.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from linkage_ros.report.arrays import Numbers, Times
 import numpy as np
+from numpy.typing import NDArray
 
-_LEAST = 256
+Times = NDArray[np.int64]
+"""In [ns]."""
+
+Numbers = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+PAGE_BYTES = 20_000_000
+"""No page is larger, in [bytes], however long the run; a quarter of it is the plotting library."""
+
+STATE_BYTES, SAMPLE_BYTES, DURATION_BYTES, FRAME_BYTES = 3_600_000, 1_500_000, 500_000, 2_500_000
+"""
+The numbers, in [bytes], before they are text.
+
+Of the curves of joints and of the crank, of lateness and of age (each), and of the instants of the
+moving picture with the places of the links.
+"""
+
+MOST_FRAMES = 20_000
+
+SHAPE_BYTES = 500_000
+"""The shapes of the linkages, in [bytes]."""
+
+TABLE_BYTES = 600_000
+"""The tables, in [bytes]."""
+
+
+_FEWEST_INTERVALS = 256
 """Intervals, below which a curve tells nothing."""
 
 
@@ -55,19 +86,19 @@ class Intervals(NamedTuple):
     second: Numbers
 
 
-def most_columns(room: int) -> int:
-    """Return how many curves may share so much room, in [bytes]."""
-    return room // (16 * _LEAST) - 1
+def most_columns(space: int) -> int:
+    """Return how many curves may share so much space, in [bytes]."""
+    return space // (16 * _FEWEST_INTERVALS) - 1
 
 
-def capacity(columns: int, room: int) -> int:
-    """Return into how many intervals so many curves go that share so much room, in [bytes]."""
+def capacity(columns: int, space: int) -> int:
+    """Return into how many intervals so many curves go that share so much space, in [bytes]."""
     # Of each interval two times, and two values of each curve, of 8 bytes each.
-    most = room // (16 * columns + 16)
+    most = space // (16 * columns + 16)
     return 1 << (most.bit_length() - 1)
 
 
-class Extremes:
+class MinMaxCurve:
     """
     Curves that grow.
 
@@ -112,11 +143,11 @@ class Extremes:
                 self._go_on(times[at:end], values[at:end])
                 at = end
                 continue
-            room = (2 * self._most if self._rows == 1 else self._most) - self._count
-            if not room:
+            space = (2 * self._most if self._rows == 1 else self._most) - self._count
+            if not space:
                 self._merge()
                 continue
-            whole = min(room, (len(times) - at) // self._rows)
+            whole = min(space, (len(times) - at) // self._rows)
             end = at + whole * self._rows
             if whole:
                 self._take(times[at:end], values[at:end], whole)
@@ -198,3 +229,105 @@ def _least_and_greatest(values: Numbers) -> tuple[Numbers, Numbers]:
     first, second = greatest.copy(), least.copy()
     first[rising], second[rising] = least[rising], greatest[rising]
     return first, second
+
+
+class Decimation:
+    """
+    Rows at equal steps.
+
+    Parameters
+    ----------
+    columns
+        How many.
+    most
+        How many rows there may be, an even number.
+
+    Attributes
+    ----------
+    step
+        Of how many rows one is kept.
+
+    """
+
+    def __init__(self, columns: int, most: int) -> None:
+        self.step = 1
+        self._most = most
+        self._seen = self._count = 0
+        self._times = np.empty(most, np.int64)
+        self._values = np.empty((most, columns))
+
+    def add(self, times: Times, values: Numbers) -> None:
+        """Add rows: times in [ns], of shape (n,), and values, of shape (n, columns)."""
+        at = 0
+        while True:
+            at += -(self._seen + at) % self.step
+            space = self._most - self._count
+            rows = slice(at, at + space * self.step, self.step)
+            taken = len(times[rows])
+            start, end = self._count, self._count + taken
+            self._times[start:end], self._values[start:end] = times[rows], values[rows]
+            self._count = end
+            at += taken * self.step
+            if at >= len(times):
+                break
+            if self._count == self._most:
+                self._halve()
+        self._seen += len(times)
+
+    @property
+    def times(self) -> Times:
+        """Return the times of the rows that are kept, in [ns]."""
+        return self._times[: self._count]
+
+    @property
+    def values(self) -> Numbers:
+        """Return the rows that are kept."""
+        return self._values[: self._count]
+
+    def _halve(self) -> None:
+        n = self._count
+        half = n // 2
+        self._times[:half] = self._times[0:n:2]
+        self._values[:half] = self._values[0:n:2]
+        self._count = half
+        self.step *= 2
+
+
+_PER_DECADE = 10
+_FIRST, _LAST = 2, 12
+"""Powers of ten, in [ns], from which and up to which bins go."""
+
+EDGES = [10 ** (_FIRST + i / _PER_DECADE) for i in range(_PER_DECADE * (_LAST - _FIRST) + 1)]
+"""Of the bins, in [ns]; below the first and above the last there is one more bin each."""
+
+
+class Histogram:
+    """Durations, counted."""
+
+    def __init__(self) -> None:
+        self.counts = np.zeros(len(EDGES) + 1, np.int64)
+        self.least = self.greatest = 0
+
+    @property
+    def count(self) -> int:
+        """Return how many there are."""
+        return int(self.counts.sum())
+
+    def add(self, durations: Times) -> None:
+        """Count durations, in [ns]."""
+        if not len(durations):
+            return
+        least, greatest = int(durations.min()), int(durations.max())
+        first = not self.count
+        self.least = least if first else min(self.least, least)
+        self.greatest = greatest if first else max(self.greatest, greatest)
+        places = np.searchsorted(EDGES, durations, side='right')
+        self.counts += np.bincount(places, minlength=len(self.counts))
+
+    def percentile(self, percent: float) -> float:
+        """Return what so many per cent do not exceed, to the upper edge of its bin, in [ns]."""
+        if not self.count:
+            return 0.0
+        place = int(np.searchsorted(np.cumsum(self.counts), self.count * percent / 100.0))
+        edge = EDGES[place] if place < len(EDGES) else self.greatest
+        return float(min(edge, self.greatest))

@@ -13,15 +13,97 @@
 # limitations under the License.
 
 
-"""What the diagnostics of a run add to its messages: ticks that were lost, drops, warnings."""
+"""
+What the diagnostics of a run add to its messages: lost ticks, drops and warnings.
+
+``diagnostic_msgs/msg/DiagnosticArray`` messages are read as bytes. The reader stands on its own:
+the messages of a bag may have been written by any program.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from struct import error as StructError
+from struct import Struct
+from typing import NamedTuple
 
-from linkage_ros.report.diagnostics import Status, statuses
-from linkage_ros.report.spans import Lane
-from linkage_ros.report.words import short
+from linkage_ros.cdr import aligned, STAMP_END
+from linkage_ros.report.labels import short
+from linkage_ros.report.run import Lane
+
+_MOST_ITEMS = 10_000
+"""Statuses of a message, and values of a status; what says to have more is damaged."""
+
+
+class Status(NamedTuple):
+    """
+    What one task says.
+
+    Attributes
+    ----------
+    level
+        0 OK, 1 WARN, 2 ERROR, 3 STALE.
+    name
+        Of the task.
+    message
+        In words.
+    values
+        By key, as text.
+
+    """
+
+    level: int
+    name: str
+    message: str
+    values: Mapping[str, str]
+
+
+def statuses(data: bytes) -> list[Status]:
+    """Return what a message says; nothing of one that is damaged."""
+    order = {b'\x00\x00': '>', b'\x00\x01': '<'}.get(data[:2])
+    if order is None:
+        return []
+    try:
+        return _Cursor(data, Struct(f'{order}I')).statuses()
+    except (StructError, IndexError):
+        return []
+
+
+class _Cursor:
+    """Goes through a message from its header on."""
+
+    def __init__(self, data: bytes, count: Struct) -> None:
+        self._data, self._count, self._at = data, count, STAMP_END
+        self._text()
+
+    def statuses(self) -> list[Status]:
+        return [self._status() for _ in range(self._size())]
+
+    def _status(self) -> Status:
+        level = self._data[self._at]
+        self._at += 1
+        name, message, _ = self._text(), self._text(), self._text()
+        pairs = [(self._text(), self._text()) for _ in range(self._size())]
+        return Status(level, name, message, dict(pairs))
+
+    def _size(self) -> int:
+        at = aligned(self._at, 4)
+        self._at = at + 4
+        (number,) = self._count.unpack_from(self._data, at)
+        if number > _MOST_ITEMS:
+            raise StructError
+        return int(number)
+
+    def _text(self) -> str:
+        at = aligned(self._at, 4)
+        (length,) = self._count.unpack_from(self._data, at)
+        start = at + 4
+        self._at = start + length
+        if self._at > len(self._data):
+            raise StructError
+        end = self._at - 1
+        return self._data[start:end].decode('utf-8', 'backslashreplace')
+
 
 _LEVELS = {1: 'warning', 2: 'error', 3: 'stale'}
 _TASKS = ('tick', 'crank', 'loop closure', 'recording', 'faults')
@@ -37,11 +119,11 @@ _COUNTED = {
 
 _DROPPED = 'Dropped: '
 
-MOST_SAID = 500
+MOST_VALUES = 500
 """Values that are remembered; our node says some sixty."""
 
 
-class Health:
+class DiagnosticsSummary:
     """
     Follows the diagnostics.
 
@@ -56,7 +138,7 @@ class Health:
     Attributes
     ----------
     said
-        What was said last, by task and key; no more than `MOST_SAID`.
+        What was said last, by task and key; no more than `MOST_VALUES`.
 
     """
 
@@ -85,7 +167,7 @@ class Health:
             self._lanes['health'].add(self._before, time, text)
         for key, value in status.values.items():
             named = task, short(key)
-            if named not in self.said and len(self.said) >= MOST_SAID:
+            if named not in self.said and len(self.said) >= MOST_VALUES:
                 continue
             self.said[named] = short(value)
             if key in _COUNTED:

@@ -13,23 +13,140 @@
 # limitations under the License.
 
 
-"""The curves of a run of a scene, its instants for the moving picture, and its durations."""
+"""
+The curves of a run: joint states, poses for the moving picture, input ages and tick lateness.
+
+Lateness is computed from the times of the ticks alone. With the period T, the tick with number i
+of those that follow each other, at the time tᵢ, is off an even row by eᵢ = tᵢ − i·T. A tick is due
+on the row of the most punctual ticks shortly before it and shortly after it, b and a; where these
+are rows apart, on the later one::
+
+    lateness = eᵢ − min(b, a)   where |a − b| < T/2, else eᵢ − max(b, a)
+
+So late ticks that run one after the other are late until they have caught up, and lost ticks
+shift the row: ticks before them keep the old row, ticks after them have the new one. At the
+beginning and the end of a run there is only one side. A delay that all ticks nearby have in common
+cannot be seen. The least within a window is found in two sweeps (M. van Herk, *A fast algorithm
+for local minimum and maximum filters*, 1992).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from linkage_ros.kinematics.linkage import RevoluteJoint
-from linkage_ros.report.arrays import Flags, Numbers, Times
-from linkage_ros.report.extremes import capacity, Extremes, most_columns
-from linkage_ros.report.histogram import Histogram
-from linkage_ros.report.lateness import Lateness
-from linkage_ros.report.room import DURATIONS, FRAMES, MOST_FRAMES, SAMPLES, STATES
+from linkage_ros.report.decimation import (
+    capacity,
+    Decimation,
+    DURATION_BYTES,
+    Flags,
+    FRAME_BYTES,
+    Histogram,
+    MinMaxCurve,
+    most_columns,
+    MOST_FRAMES,
+    Numbers,
+    SAMPLE_BYTES,
+    STATE_BYTES,
+    Times,
+)
+from linkage_ros.report.labels import short
 from linkage_ros.report.run import Column, Curves, Frames, Window
-from linkage_ros.report.thinned import Thinned
-from linkage_ros.report.words import short
 from linkage_ros.scene.scene import Scene
 import numpy as np
+
+_WINDOW = 0.25
+"""In [s]: farther away the clocks have drifted, and nearer ticks may still be catching up."""
+
+_FEWEST, _MOST_TICKS = 32, 4096
+
+_NONE = 2**62
+"""In [ns]: where there is nothing to be the least."""
+
+
+class Lateness:
+    """
+    The lateness of ticks, as they come.
+
+    Parameters
+    ----------
+    rate
+        Ticks a second, in [Hz], more than 0.
+
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._period = 1e9 / rate
+        self._window = min(max(round(_WINDOW * rate), _FEWEST), _MOST_TICKS)
+        self._begin: int | None = None
+        self._number = 0
+        self._ended = False
+        # The last window of those that are done, and all that are not.
+        self._times = np.empty(0, np.int64)
+        self._off = np.empty(0, np.int64)
+        self._done = 0
+
+    def add(self, times: Times) -> tuple[Times, Times]:
+        """Take times of ticks, in [ns]; return those whose lateness is known by now, and it."""
+        if not len(times):
+            return self._found(0)
+        if self._begin is None:
+            self._begin = int(times[0])
+        numbers = np.arange(self._number, self._number + len(times))
+        self._number += len(times)
+        # In whole numbers: of long runs, or behind a long pause, a double loses the nanoseconds.
+        whole, part = divmod(self._period, 1.0)
+        due = numbers * int(whole) + np.rint(numbers * part).astype(np.int64)
+        self._times = np.concatenate([self._times, times])
+        self._off = np.concatenate([self._off, times - self._begin - due])
+        return self._found(max(0, len(self._off) - self._window - self._done))
+
+    def end(self) -> tuple[Times, Times]:
+        """Return what is left; nothing is to be added after it."""
+        self._ended = True
+        return self._found(len(self._off) - self._done)
+
+    def _found(self, count: int) -> tuple[Times, Times]:
+        first, end = self._done, self._done + count
+        if not count:
+            return np.empty(0, np.int64), np.empty(0, np.int64)
+        due = self._due()
+        late = self._off[first:end] - due[first:end]
+        times = self._times[first:end]
+        kept = max(0, end - self._window)
+        self._times, self._off, self._done = self._times[kept:], self._off[kept:], end - kept
+        return times, late
+
+    def _due(self) -> Times:
+        """Return the even row that each tick belongs to."""
+        before, after = _least_around(self._off, self._window)
+        few, n = self._window // 4, len(self._off)
+        if self._number == n:
+            before[:few] = -_NONE
+        if self._ended:
+            last = max(0, n - few)
+            after[last:] = -_NONE
+        due = np.maximum(before, after)
+        near = np.abs(before - after) < 0.5 * self._period
+        due[near] = np.minimum(before, after)[near]
+        return np.where(due == -_NONE, self._off.min(), due)
+
+
+def _least_around(values: Times, window: int) -> tuple[Times, Times]:
+    """Return the least of each value and so many before it, and of it and so many after it."""
+    size = window + 1
+    n = len(values)
+    padded = np.full(-(-n // size) * size + size, _NONE)
+    padded[:n] = values
+    blocks = padded.reshape(-1, size)
+    onward = np.minimum.accumulate(blocks, axis=1).ravel()
+    back = np.minimum.accumulate(blocks[:, ::-1], axis=1)[:, ::-1].ravel()
+    end = window + n
+    after = np.minimum(back[:n], onward[window:end])
+    before = onward[:n].copy()
+    before[window:] = np.minimum(before[window:], back[: max(0, n - window)])
+    return before, after
+
 
 MOST_LINKAGES = 16
 """Those that move in a picture."""
@@ -52,7 +169,7 @@ class Kept:
         What they are of.
     columns
         What each tells.
-    room
+    space
         How much of them may come onto a page, in [bytes].
     window
         Which part of the run is told.
@@ -64,12 +181,12 @@ class Kept:
 
     """
 
-    def __init__(self, title: str, columns: Sequence[Column], room: int, window: Window) -> None:
-        most = most_columns(room)
+    def __init__(self, title: str, columns: Sequence[Column], space: int, window: Window) -> None:
+        most = most_columns(space)
         self._title, self._columns, self._window = short(title), tuple(columns[:most]), window
         self.left_out = max(0, len(columns) - most)
         n = len(self._columns)
-        self._kept = Extremes(n, capacity(n, room))
+        self._kept = MinMaxCurve(n, capacity(n, space))
         self._rows = 0
 
     def add(self, times: Times, values: Numbers) -> None:
@@ -130,10 +247,12 @@ class OwnCurves:
         states, crank = topics
         columns = joint_columns(scene.joints, [turning[name] for name in scene.joints])
         self._window = window
-        self._states = Kept(states, columns, STATES, window)
-        self._samples = Kept(crank, joint_columns([*inputs], [*inputs.values()]), SAMPLES, window)
-        self._lates = Kept('ticks', [LATENESS], DURATIONS, window)
-        self._ages = Kept('ticks', [AGE], DURATIONS, window)
+        self._states = Kept(states, columns, STATE_BYTES, window)
+        self._samples = Kept(
+            crank, joint_columns([*inputs], [*inputs.values()]), SAMPLE_BYTES, window
+        )
+        self._lates = Kept('ticks', [LATENESS], DURATION_BYTES, window)
+        self._ages = Kept('ticks', [AGE], DURATION_BYTES, window)
         self._lateness = Lateness(scene.rate) if scene.rate else None
         self.late, self.age = Histogram(), Histogram()
         moving = scene.members[:MOST_LINKAGES]
@@ -142,8 +261,8 @@ class OwnCurves:
         # Beside the values the frames of the links come onto the page, three numbers each, and by
         # how much they are apart.
         size = 8 * (1 + len(self._places)) + 12 * bodies + 4 * len(moving)
-        most = min(MOST_FRAMES, FRAMES // size)
-        self._frames = Thinned(len(self._places), max(2, most - most % 2))
+        most = min(MOST_FRAMES, FRAME_BYTES // size)
+        self._frames = Decimation(len(self._places), max(2, most - most % 2))
         # The joints of a scene stand in the order of its linkages.
         self._joints = [self._places[name] for each in moving for name in each.joints]
 

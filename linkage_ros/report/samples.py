@@ -12,32 +12,99 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Which samples of a run were good, and which refused, and why.
 
-A sample is offered to the scene's own pipeline, as in the run, so that it is refused for the same
-reason.
+"""
+The crank samples of a run: which were good, which were refused and why, and the crank angle.
+
+Each sample is offered to the scene's own pipeline, as in the run, so that it is refused for the
+same reason. The crank angle is that of the newest good sample, carried forward by its rate.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.errors import BagError
 from linkage_ros.joint_state import Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import read_change, turn
-from linkage_ros.report.arrays import Flags
-from linkage_ros.report.own_rows import Rows
-from linkage_ros.report.spans import Lane
-from linkage_ros.report.words import short
-from linkage_ros.scene.scene import Scene
+from linkage_ros.report.blocks import Rows
+from linkage_ros.report.decimation import Flags, Numbers, Times
+from linkage_ros.report.labels import short
+from linkage_ros.report.run import Lane
+from linkage_ros.scene.scene import Member, Scene
 import numpy as np
 
 
-class Judge:
+class Crank:
+    """
+    The driven joints of a linkage, by the newest good sample.
+
+    Parameters
+    ----------
+    member
+        The linkage in its scene, driven from a topic.
+    columns
+        Of its inputs among those of the samples.
+
+    """
+
+    def __init__(self, member: Member, columns: Sequence[int]) -> None:
+        self._columns = list(columns)
+        self._carried = bool(getattr(member.drive[1], 'carry_forward', False))
+        width = len(columns)
+        self._number = np.array([-1])
+        self._stamp = np.zeros(1, np.int64)
+        self._angles, self._rates = np.full((1, width), np.nan), np.zeros((1, width))
+
+    def take(self, numbers: Times, stamps: Times, good: Flags, values: Numbers) -> Flags:
+        """
+        Take samples; return which were for this linkage.
+
+        Parameters
+        ----------
+        numbers
+            Of the messages in their block, rising.
+        stamps
+            Theirs, in [ns].
+        good
+            Which were not refused.
+        values
+            As `JointBlock.numbers` has them.
+
+        """
+        angles, rates = values[:, 0, self._columns], values[:, 1, self._columns]
+        own: Flags = good & ~np.isnan(angles).any(axis=1)
+        # The last one of before stands before the first message of this block.
+        self._number = np.concatenate([[-1], numbers[own]])
+        self._stamp = np.concatenate([self._stamp[-1:], stamps[own]])
+        self._angles = np.concatenate([self._angles[-1:], angles[own]])
+        self._rates = np.concatenate([self._rates[-1:], np.nan_to_num(rates[own])])
+        return own
+
+    def at(self, numbers: Times, times: Times) -> tuple[Numbers, Times]:
+        """
+        Return where the crank was at messages of the block, in [rad] or [m], and its stamp.
+
+        Parameters
+        ----------
+        numbers
+            Of the messages in their block.
+        times
+            That were solved for, in [ns].
+
+        """
+        places = np.searchsorted(self._number, numbers) - 1
+        stamps, angles = self._stamp[places], self._angles[places]
+        if self._carried:
+            ages = (times - stamps) * 1e-9
+            angles = angles + self._rates[places] * ages[:, None]
+        return angles, stamps
+
+
+class SampleJudge:
     """
     Tells good samples from those that are refused.
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""How a page names what it tells."""
+"""The words of a page: titles of lanes and plots, notes, durations."""
 
 from __future__ import annotations
 
