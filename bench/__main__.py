@@ -36,7 +36,7 @@ from bench.processes import BenchError, Graph
 from bench.report import say, show, Table
 from bench.tick_tables import cost_table, lateness_table
 from bench.ticks import asking, bare, idiomatic, many, measure_ticks, ours, TickPlan
-from linkage_ros.accuracy.machine import describe_machine
+from linkage_ros.measuring import describe_machine
 
 SLOW, FAST = 1000.0, 10_000.0
 

@@ -24,9 +24,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from linkage_ros.accuracy.machine import describe_machine
 from linkage_ros.cli.cost import all_effects
 from linkage_ros.cli.tables import Table
+from linkage_ros.measuring import describe_machine
 
 PAGE = Path(__file__).resolve().parent / 'cost.md'
 BEGIN, END = '<!-- measured: begin -->', '<!-- measured: end -->'

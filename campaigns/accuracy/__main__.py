@@ -36,7 +36,7 @@ from campaigns.accuracy.random_families import RANDOM
 from campaigns.accuracy.run import Part, parts, run
 from campaigns.accuracy.show import show_case
 from campaigns.accuracy.tally import Tally
-from linkage_ros.accuracy.machine import describe_machine
+from linkage_ros.measuring import describe_machine
 
 LIMIT = 4.0
 

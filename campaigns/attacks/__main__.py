@@ -31,7 +31,7 @@ import time
 from bench.report import say, show, Table
 from campaigns.attacks import bags, files, graph, signals
 from campaigns.page import load, write_page
-from linkage_ros.accuracy.machine import describe_machine
+from linkage_ros.measuring import describe_machine
 
 PAGE = Path('docs/recordings/attacks.md')
 

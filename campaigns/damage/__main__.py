@@ -34,7 +34,7 @@ from campaigns.damage.judge import FAULT
 from campaigns.damage.run import JUDGES, parts, run, Tally
 from campaigns.damage.subject import KINDS
 from campaigns.page import write_page
-from linkage_ros.accuracy.machine import describe_machine
+from linkage_ros.measuring import describe_machine
 
 PAGE = Path('docs/recordings/damage.md')
 

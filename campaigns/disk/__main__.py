@@ -34,7 +34,7 @@ from campaigns.disk.report import failing_tables, filling_table, INTRO, stalling
 from campaigns.disk.small_disks import DISKS, NotPermittedError
 from campaigns.disk.subject import SETTINGS
 from campaigns.page import write_page
-from linkage_ros.accuracy.machine import describe_machine
+from linkage_ros.measuring import describe_machine
 
 PAGE = Path('docs/recordings/disk.md')
 PARTS = ('failing', 'filling', 'stalling')

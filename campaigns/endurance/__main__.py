@@ -33,7 +33,7 @@ from campaigns.endurance.memory import flatness
 from campaigns.endurance.report import accelerated_tables, dds_tables, INTRO
 from campaigns.endurance.telling import telling
 from campaigns.page import load, write_page
-from linkage_ros.accuracy.machine import describe_machine
+from linkage_ros.measuring import describe_machine
 
 PAGE = Path('docs/recordings/endurance.md')
 _ONE_FILE = 0.25  # of the time: its index grows evenly

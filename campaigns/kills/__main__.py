@@ -34,7 +34,7 @@ from campaigns.kills.plan import plans
 from campaigns.kills.report import INTRO, is_beyond, tables
 from campaigns.kills.run import KillError, run
 from campaigns.page import load, write_page
-from linkage_ros.accuracy.machine import describe_machine
+from linkage_ros.measuring import describe_machine
 
 PAGE = Path('docs/recordings/kills.md')
 

@@ -31,7 +31,7 @@ import time
 from bench.report import say, show, Table
 from campaigns.synthesis.families import FAMILIES
 from campaigns.synthesis.run import make, Part, parts, run, Tally
-from linkage_ros.accuracy.machine import describe_machine
+from linkage_ros.measuring import describe_machine
 from linkage_ros.synthesis.pairs.freudenstein import links, three_pairs, TRUSTED
 import numpy as np
 

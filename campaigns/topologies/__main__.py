@@ -44,7 +44,7 @@ from campaigns.topologies.run import (
     run,
     Tally,
 )
-from linkage_ros.accuracy.machine import describe_machine
+from linkage_ros.measuring import describe_machine
 from linkage_ros.scene.linkage_text import linkage_text
 
 

@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from linkage_ros.accuracy.spread import Spread
+from linkage_ros.measuring import Spread
 
 
 class Axis(NamedTuple):
@@ -48,6 +48,11 @@ class Axis(NamedTuple):
     unit: str
     logarithmic: bool = True
     least: float = 0.0
+
+    @property
+    def title(self) -> str:
+        """Return its name with its unit."""
+        return f'{self.name} [{self.unit}]' if self.unit else self.name
 
 
 class Point(NamedTuple):

@@ -113,7 +113,7 @@ def plotting_library() -> str:
 
 def _joined(name: str, parts: Parts) -> str:
     """Return a file that all pages have, and those of a page's own behind it."""
-    found = (files(room).joinpath(file) for room, file in ((_HERE, name), *parts))
+    found = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
     return '\n'.join(file.read_text('utf-8') for file in found)
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import re
 
-from linkage_ros.accuracy.page.markdown import BEGIN, END, write_markdown
+from linkage_ros.accuracy.page.files import BEGIN, END, write_markdown
 from markdown_it import MarkdownIt
 import pytest
 

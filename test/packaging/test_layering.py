@@ -27,7 +27,7 @@ PACKAGE = 'linkage_ros'
 # Rooms by height: a room may import from below its own height, and from its neighbours as long
 # as no two import each other.
 HEIGHTS = (
-    ('errors', 'stop', 'regular_file', 'written', 'parameters', 'bounded_yaml'),
+    ('errors', 'stop', 'regular_file', 'written', 'parameters', 'bounded_yaml', 'measuring'),
     ('whole_file',),
     ('kinematics', 'shipped', 'cdr', 'bag', 'page'),
     ('joint_state', 'synthesis', 'dynamics', 'drawing', 'solvers', 'models'),
