@@ -29,10 +29,9 @@ from pathlib import Path
 import time
 from typing import Any
 
-from bench.cpu_time import cpu_time
 from bench.processes import BenchError, Graph, Process
 from bench.report import say, Table
-from bench.scenes import write_turning
+from bench.ticks import cpu_time, write_turning
 from linkage_ros.shipped import shipped
 
 _APPEARING = 15.0

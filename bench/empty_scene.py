@@ -28,9 +28,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, cos, isclose, sin, sqrt
 
-from bench.in_turn import compare, in_turn
 from bench.processes import BenchError, ROOT
-from bench.report import Table
+from bench.report import compare, in_turn, Table
 from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene

@@ -23,9 +23,9 @@ from math import isnan
 from pathlib import Path
 
 from bench.processes import Graph
-from bench.report import say, Table
-from bench.scenes import write_scene
-from bench.spread import percentile, ratios, spread
+from bench.report import ratios, say, spread, Table
+from bench.ticks import write_scene
+from linkage_ros.measuring import percentile
 
 TARGET = 1.25
 

@@ -24,19 +24,21 @@ but what that load does to the caches.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 import gc
 from importlib import metadata
+from math import nan
 import os
 from pathlib import Path
 import platform
 import re
-from statistics import quantiles
 from time import perf_counter, thread_time
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from linkage_ros import __version__
+
+Item = TypeVar('Item')
 
 Progress = Callable[[float], None]
 """Takes the share of a measurement that is done, 0 to 1; what it raises ends the measurement."""
@@ -50,11 +52,26 @@ class Spread(NamedTuple):
     high: float
 
 
+def percentile(values: Sequence[float], percent: float) -> float:
+    """Return a percentile, interpolated between neighbours; NaN of an empty sequence."""
+    if not values:
+        return nan
+    ordered = sorted(values)
+    rank = (len(ordered) - 1) * percent / 100.0
+    below = int(rank)
+    above = min(below + 1, len(ordered) - 1)
+    return ordered[below] + (rank - below) * (ordered[above] - ordered[below])
+
+
+def alternating(items: Sequence[Item], rounds: int) -> Iterator[Item]:
+    """Yield items forward in one round and backward in the next: no drift favours one of them."""
+    for number in range(rounds):
+        yield from items if number % 2 == 0 else reversed(items)
+
+
 def spread_of(values: Sequence[float]) -> Spread:
     """Return the quartiles of some values; of a single one, that."""
-    if len(values) == 1:
-        return Spread(values[0], values[0], values[0])
-    return Spread(*quantiles(values, n=4, method='inclusive'))
+    return Spread(*(percentile(values, percent) for percent in (25.0, 50.0, 75.0)))
 
 
 BLOCK = 1e-3
@@ -90,7 +107,7 @@ def in_turn(
     seconds
         About how long all may take; the fewest rounds are made even if that takes longer.
     progress
-        Called after each round with the share that is done, 0 to 1.
+        Called after each block with the share that is done, 0 to 1.
     clock
         Tells the time, in [s]; that of the thread, if not said.
 
@@ -109,17 +126,17 @@ def in_turn(
     forward = [*zip(contenders, repeats, times, strict=True)]
     collecting = gc.isenabled()
     try:
-        for number in range(rounds):
-            for (run, states), count, found in forward if number % 2 == 0 else forward[::-1]:
-                gc.disable()
-                begun = clock()
-                for _ in range(count):
-                    run()
-                taken = clock() - begun
-                if collecting:
-                    gc.enable()
-                found.append(taken / (count * states))
-            progress((number + 1) / rounds)
+        turns = enumerate(alternating(forward, rounds), 1)
+        for done, ((run, states), count, found) in turns:
+            gc.disable()
+            begun = clock()
+            for _ in range(count):
+                run()
+            taken = clock() - begun
+            if collecting:
+                gc.enable()
+            found.append(taken / (count * states))
+            progress(done / (rounds * len(forward)))
     finally:
         if collecting:
             gc.enable()

@@ -30,8 +30,8 @@ from time import monotonic, sleep, time_ns
 from typing import NamedTuple
 
 from bench.processes import BenchError, Graph
-from campaigns.disk.small_disks import Disk, mounted
-from campaigns.endurance.account import Account, account_of
+from campaigns.disk.filling import Disk, mounted
+from campaigns.endurance.memory import Account, account_of
 from linkage_ros.bag.metadata import METADATA_FILE
 from linkage_ros.bag.reading.reader import read_bag
 from linkage_ros.errors import BagError

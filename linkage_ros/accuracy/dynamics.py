@@ -44,7 +44,7 @@ from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.dynamics.motion import Motion, OneFreedom
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.measuring import Progress, Spread, spread_of
+from linkage_ros.measuring import alternating, Progress, Spread, spread_of
 from linkage_ros.scene.scene import Member, Scene
 
 SECONDS = 10.0
@@ -245,15 +245,13 @@ def measure_dynamics(scene: Scene, quick: bool, progress: Progress) -> Part | No
         return Part('dynamics', title, [f'Not measured: {error}.'])
     progress(0.2)
     settings = _settings(member, quick)
-    found = {setting: integrate(motion, *setting) for setting in settings}
+    found: dict[tuple[str, float], Integrated] = {}
     rounds = 1 if quick else _ROUNDS
-    for number in range(1, rounds):
-        progress(0.2 + 0.8 * number / rounds)
-        # There and back again, so that a drift of the machine favours no one.
-        for setting in reversed(settings) if number % 2 else settings:
-            once = found[setting]
-            again = integrate(motion, *setting)
-            found[setting] = once._replace(times=[*once.times, *again.times])
+    for done, setting in enumerate(alternating(settings, rounds)):
+        progress(0.2 + 0.8 * done / (rounds * len(settings)))
+        again = integrate(motion, *setting)
+        before = found[setting].times if setting in found else []
+        found[setting] = again._replace(times=[*before, *again.times])
     progress(1.0)
     results = list(found.values())
     drive = member.drive[1]

@@ -30,9 +30,16 @@ from math import remainder, sqrt, tau
 from typing import NamedTuple
 
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
-from linkage_ros.cost.feed import feed
-from linkage_ros.cost.measure import EffectCost, measure, SceneCost, Times
-from linkage_ros.cost.variants import faults_of, Names, Variants
+from linkage_ros.cost import (
+    EffectCost,
+    faults_of,
+    feed,
+    measure,
+    Names,
+    SceneCost,
+    Times,
+    Variants,
+)
 from linkage_ros.effects.stage import Reading
 from linkage_ros.measuring import Progress, Spread
 from linkage_ros.pipeline import Pipeline

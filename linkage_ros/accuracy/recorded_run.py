@@ -31,7 +31,7 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.recorder import Recorder, RecordingSummary
 from linkage_ros.bag.writing.storage import Storage
 from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cost.feed import feed
+from linkage_ros.cost import feed
 from linkage_ros.errors import RecordingError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline

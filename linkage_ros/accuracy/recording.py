@@ -33,7 +33,7 @@ from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Tabl
 from linkage_ros.bag.writing.packing import compression_type
 from linkage_ros.bag.writing.storage import COMPRESSIONS, FLUSH_AFTER, NONE, Storage
 from linkage_ros.errors import RecordingError
-from linkage_ros.measuring import Progress, Spread, spread_of
+from linkage_ros.measuring import alternating, Progress, Spread, spread_of
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 
@@ -138,16 +138,13 @@ def measure_costs(
     runs: list[list[Recorded]] = [[] for _ in compared]
     lengths = [max(seconds, _LONGER * each.flush_period if each else 0.0) for each in compared]
     done, whole = 0.0, rounds * sum(lengths)
-    places = range(len(compared))
     with tempfile.TemporaryDirectory(prefix='recording_', dir=folder) as temporary:
-        for number in range(rounds):
-            for place in places if number % 2 == 0 else reversed(places):
-                progress(done / whole)
-                setting = compared[place]
-                bag = Path(temporary, f'{number}_{place}') if setting else None
-                length = lengths[place]
-                runs[place].append(record_run(scene, closures, bag, setting or Storage(), length))
-                done += length
+        for place in alternating(range(len(compared)), rounds):
+            progress(done / whole)
+            setting, length = compared[place], lengths[place]
+            bag = Path(temporary, f'{len(runs[place])}_{place}') if setting else None
+            runs[place].append(record_run(scene, closures, bag, setting or Storage(), length))
+            done += length
     progress(1.0)
     return [cost_of(setting, each) for setting, each in zip(compared, runs, strict=True)]
 

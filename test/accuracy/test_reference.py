@@ -20,7 +20,7 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
-from campaigns.accuracy.loops import four_bar
+from campaigns.accuracy.adversarial import four_bar
 from campaigns.accuracy.reference import Outcome
 from campaigns.accuracy.reference import Reference as Elsewhere
 from campaigns.accuracy.run import make

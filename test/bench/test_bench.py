@@ -24,9 +24,9 @@ from shutil import which
 import subprocess
 import sys
 
-from bench.kinematics_pylinkage import AVAILABLE
-from bench.report import Table
-from bench.spread import percentile, ratios, spread
+from bench.kinematics_speed import AVAILABLE
+from bench.report import ratios, spread, Table
+from linkage_ros.measuring import percentile
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -172,7 +172,7 @@ def _bench(runs: Path, *arguments: str) -> str:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert 'machine' in done.stdout
+    assert 'Machine' in done.stdout
     (file,) = runs.iterdir()
     return file.read_text(encoding='utf-8')
 

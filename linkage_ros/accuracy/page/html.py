@@ -26,8 +26,7 @@ from typing import Any
 from linkage_ros.accuracy.page.diagrams import Placed, places, Range, Style, Styles
 from linkage_ros.accuracy.page.numbers import cell_text, numeric_columns
 from linkage_ros.accuracy.results import Diagram, Part, Results, Table
-from linkage_ros.page.document import document, picture
-from linkage_ros.page.parts import facts_html, table_html
+from linkage_ros.pages.document import document, facts_html, picture, table_html
 
 _ADVICE = 'What to take'
 _HERE = 'linkage_ros.accuracy.page'

@@ -12,17 +12,25 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The parts of a campaign, shared among processes."""
+
+"""What all campaigns share: parts for several processes, progress lines, percentiles."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 import multiprocessing
+import time
 from typing import TypeVar
+
+from bench.report import say
+from linkage_ros.measuring import percentile
 
 Part = TypeVar('Part')
 Result = TypeVar('Result')
+
+_PERIOD = 10.0
+"""Between two lines of progress, in [s]."""
 
 
 def results_of(do: Callable[[Part], Result], work: Sequence[Part], jobs: int) -> Iterator[Result]:
@@ -71,3 +79,25 @@ def tried_in_parts(
         tried += some
         findings += found
     return dict(sorted(tried.items())), findings
+
+
+def progress_lines(total: float, what: str) -> Callable[[float], None]:
+    """Return a function that takes how many more are done; it prints a line every ten seconds."""
+    begun = printed = time.monotonic()
+    done = 0.0
+
+    def advance(more: float) -> None:
+        nonlocal done, printed
+        done += more
+        if time.monotonic() - printed > _PERIOD or done == total:
+            printed = time.monotonic()
+            say(f'{done:,.0f} of {total:,.0f} {what}, {printed - begun:.0f} s')
+
+    return advance
+
+
+def percentile_texts(values: Sequence[float], digits: int) -> list[str]:
+    """Return median, 99th percentile and greatest as texts; '' each where there are no values."""
+    if not values:
+        return ['', '', '']
+    return [f'{percentile(values, percent):.{digits}f}' for percent in (50.0, 99.0, 100.0)]
