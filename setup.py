@@ -137,7 +137,7 @@ setup(
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={
-        f'{NAME}.page': ['page.css', 'page.js'],
+        f'{NAME}.pages': ['page.css', 'page.js'],
         f'{NAME}.accuracy.page': ['page.css', 'page.js'],
         f'{NAME}.report': ['*.css', '*.js'],
     },

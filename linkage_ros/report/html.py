@@ -26,8 +26,7 @@ from html import escape
 from typing import NamedTuple
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.page.document import document
-from linkage_ros.page.parts import facts_html, table_html
+from linkage_ros.pages.document import document, facts_html, table_html
 from linkage_ros.report.data import facts_of_thinning, lanes, page_data, plots
 from linkage_ros.report.decimation import Histogram, PAGE_BYTES, TABLE_BYTES
 from linkage_ros.report.labels import (

@@ -21,8 +21,7 @@ from itertools import islice
 from math import isclose, pi, radians, sin, sqrt, tau
 
 from linkage_ros.accuracy.effects import departure, measure_effects, WHOLE
-from linkage_ros.cost.feed import feed
-from linkage_ros.cost.variants import Names, Variants
+from linkage_ros.cost import feed, Names, Variants
 from linkage_ros.measuring import Spread
 from linkage_ros.scene.load import load_scene
 from linkage_ros.shipped import shipped

@@ -29,7 +29,7 @@ from linkage_ros.accuracy.page.numbers import diagram_csv, table_csv
 from linkage_ros.accuracy.results import Diagram, Part, Results, Table
 from linkage_ros.errors import LinkageError
 from linkage_ros.measuring import Spread
-from linkage_ros.page.document import POLICY
+from linkage_ros.pages.document import POLICY
 import numpy as np
 import pytest
 

@@ -25,9 +25,17 @@ from threading import Event
 
 from linkage_ros.cli import cost as command
 from linkage_ros.cli.tables import Table
-from linkage_ros.cost.feed import feed
-from linkage_ros.cost.measure import _difference, _times, EffectCost, measure, SceneCost, Times
-from linkage_ros.cost.variants import Variant, Variants
+from linkage_ros.cost import (
+    _difference,
+    _times,
+    EffectCost,
+    feed,
+    measure,
+    SceneCost,
+    Times,
+    Variant,
+    Variants,
+)
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import LinkageError

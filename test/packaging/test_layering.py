@@ -29,7 +29,7 @@ PACKAGE = 'linkage_ros'
 HEIGHTS = (
     ('errors', 'stop', 'regular_file', 'written', 'parameters', 'bounded_yaml', 'measuring'),
     ('whole_file',),
-    ('kinematics', 'shipped', 'cdr', 'bag', 'page'),
+    ('kinematics', 'shipped', 'cdr', 'bag', 'pages'),
     ('joint_state', 'synthesis', 'dynamics', 'drawing', 'solvers', 'models'),
     ('joint_trajectory', 'multi_dof_joint_state', 'joint_effort', 'marker_array'),
     ('drives',),

@@ -64,7 +64,7 @@ def told(file: Path) -> str:
 @pytest.mark.parametrize('seed', range(3))
 def test_flipped_and_cut_bytes(bag, tmp_path, seed, monkeypatch):
     # The library makes pages long, and nothing else.
-    monkeypatch.setattr('linkage_ros.page.document.plotting_library', lambda: '')
+    monkeypatch.setattr('linkage_ros.pages.document.plotting_library', lambda: '')
     random = np.random.default_rng(seed)
     whole = bag.read_bytes()
     file = tmp_path / 'odd.mcap'
@@ -86,7 +86,7 @@ def test_flipped_and_cut_bytes(bag, tmp_path, seed, monkeypatch):
 
 @pytest.mark.parametrize('seed', range(2))
 def test_what_fits_its_checksums_may_still_be_anything(bag, tmp_path, seed, monkeypatch):
-    monkeypatch.setattr('linkage_ros.page.document.plotting_library', lambda: '')
+    monkeypatch.setattr('linkage_ros.pages.document.plotting_library', lambda: '')
     random = np.random.default_rng(seed)
     whole = read_bag(bag)
     messages = [*whole.messages()]

@@ -29,7 +29,7 @@ from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.page.document import plotting_library
+from linkage_ros.pages.document import plotting_library
 from linkage_ros.replay import recorded_scene
 from linkage_ros.report.blocks import Blocks, Progress
 from linkage_ros.report.curves import Kept, MOST_LINKAGES

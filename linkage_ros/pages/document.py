@@ -14,15 +14,16 @@
 
 
 """
-A page that needs nothing but itself: style, script, data and plotting library within one file.
+A page that needs no other file: style, script, data and plotting library within one file.
 
-Its policy forbids the browser to ask anybody for anything, whatever the page holds.
+Its policy forbids the browser every request, whatever the page holds. Tables and facts are set
+here for all pages.
 """
 
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from importlib.resources import files
 from importlib.util import find_spec
@@ -36,7 +37,7 @@ POLICY = (
     "base-uri 'none'; form-action 'none'"
 )
 
-_HERE = 'linkage_ros.page'
+_HERE = 'linkage_ros.pages'
 
 Parts = Sequence[tuple[str, str]]
 """Files of a page's own: each with its package and its name."""
@@ -137,3 +138,52 @@ def _without(letters: set[str], text: str, before: str = '') -> str:
 
 def _within_script(text: str) -> str:
     return text.replace('</script', r'<\/script')
+
+
+_LONG = 28
+"""Letters from which on a cell may be broken."""
+
+
+def table_html(
+    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[bool]
+) -> Iterator[str]:
+    """
+    Yield a table, within a figure that is left open.
+
+    Parameters
+    ----------
+    title
+        What stands above it.
+    columns
+        Headings; all empty: none are written.
+    rows
+        The cells.
+    numbers
+        Which columns hold numbers, and are set right.
+
+    """
+    yield f'<figure><figcaption>{escape(title)}</figcaption>'
+    yield '<div class="scroll" tabindex="0"><table>'
+    if any(columns):
+        yield f'<thead><tr>{"".join(map(_head, columns, numbers))}</tr></thead>'
+    yield '<tbody>'
+    for row in rows:
+        yield f'<tr>{"".join(map(_cell, row, numbers))}</tr>'
+    yield '</tbody></table></div>'
+
+
+def facts_html(facts: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Yield facts, each with its name."""
+    yield '<dl class="facts">'
+    for name, value in facts:
+        yield f'<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>'
+    yield '</dl>'
+
+
+def _head(column: str, number: bool) -> str:
+    return f'<th{" class=number" if number else ""}>{escape(column)}</th>'
+
+
+def _cell(text: str, number: bool) -> str:
+    kind = ' class=number' if number else ' class=long' if len(text) >= _LONG else ''
+    return f'<td{kind}>{escape(text)}</td>'

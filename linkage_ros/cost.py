@@ -16,25 +16,175 @@
 """
 What each effect of a scene costs: the scene's own pipeline, with and without it.
 
-A stage is not timed by itself, since what it costs is also what it makes of the message and what
-it brings in. Variants of the scene tick in turn, a block of ticks each, over the same simulated
-times and crank messages: what disturbs the machine disturbs them alike.
+A stage is not timed by itself, since its cost includes what it changes in the message and what it
+brings in. Variants of the scene tick in turn, a block of ticks each, over the same simulated times
+and crank messages: a disturbance of the machine affects them alike.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import cos, sin, tau
 from random import Random
-from statistics import median, quantiles
+from statistics import median
+from time import perf_counter_ns
 from typing import NamedTuple
 
-from linkage_ros.cost.feed import feed
-from linkage_ros.cost.variants import faults_of, Names, Variant, Variants
-from linkage_ros.effects.stage import bringing, EFFECTS, in_order, LOADED
+from linkage_ros.effects.stage import bringing, brings, EFFECTS, in_order, LOADED, module_of
+from linkage_ros.errors import FileError
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.survey import usual_inputs, Way
+from linkage_ros.measuring import spread_of
 from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.scene import Scene
+from linkage_ros.scene.scene import Member, Scene
+
+_BEGIN = 1_000_000_000
+_USUAL_RATE = 1000.0
+_CRANK_RATE = 1.0
+"""Turns, or swings, of the crank a second."""
+
+
+def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
+    """Yield times, in [ns], each with a crank message, or b'' where nobody listens."""
+    period = 1e9 / (scene.rate or _USUAL_RATE)
+    names = [name for member in scene.members for name in member.inputs]
+    write = JointStateWriter(names).write
+    paths = [path for closure in pipeline.closures for path in _paths(closure)]
+    count = 0
+    while True:
+        now = _BEGIN + round(count * period)
+        message = b''
+        if pipeline.topic:
+            seconds = (now - _BEGIN) * 1e-9
+            angles, rates = zip(*[path(seconds) for path in paths], strict=True)
+            message = write(now, angles, rates, (0.0,) * len(names))
+        yield now, message
+        count += 1
+
+
+Path = Callable[[float], tuple[float, float]]
+
+
+def _paths(closure: Closure) -> list[Path]:
+    """Return for each input where it is, and its rate, at a time in [s]: round, or to and fro."""
+    centers = usual_inputs(closure)
+    speed = tau * _CRANK_RATE
+    if len(centers) > 1:
+        sizes = [0.01 * closure.scale if i.slider else 0.01 for i in closure.linkage.inputs]
+        return [_swing(c, size, speed) for c, size in zip(centers, sizes, strict=True)]
+    widest = Way(closure).widest_range
+    if widest is None or widest.whole:
+        return [lambda seconds: (speed * seconds, speed)]
+    middle, width = 0.5 * (widest.lowest + widest.highest), widest.highest - widest.lowest
+    return [_swing(middle, 0.4 * width, speed)]
+
+
+def _swing(center: float, amplitude: float, speed: float) -> Path:
+    return lambda seconds: (
+        center + amplitude * sin(speed * seconds),
+        amplitude * speed * cos(speed * seconds),
+    )
+
+
+_FAULT = 'fault '
+"""With the name of a fault, what stands in the place of an effect for it: it is not injected."""
+
+Names = frozenset[str]
+
+
+def faults_of(scene: Scene) -> Names:
+    """Return the faults of a scene, as they stand among the names of effects."""
+    return Names(f'{_FAULT}{name}' for name in scene.faults)
+
+
+class Variant:
+    """A variant of the scene at work, and how long its ticks took, in [ns]."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        self.pipeline = pipeline
+        self.ticks: list[int] = []
+        self.offers: list[int] = []
+        self.published = 0
+
+    def run(self, nows: Sequence[int], messages: Sequence[bytes]) -> None:
+        """Tick at these times, in [ns], each after its message, as the node does."""
+        offer, tick, clock = self.pipeline.offer, self.pipeline.tick, perf_counter_ns
+        injection = self.pipeline.injection
+        for now, message in zip(nows, messages, strict=True):
+            begin = clock()
+            if injection is not None:
+                injection.advance(now)
+                now = injection.clock(now)  # noqa: PLW2901 (the time by which the tick goes)
+            if message:
+                offer(message, now)
+                self.offers.append(clock() - begin)
+            done = tick(now)
+            self.ticks.append(clock() - begin)
+            self.published += bool(done.message)
+
+    def forget(self) -> None:
+        """Begin to count."""
+        self.ticks.clear()
+        self.offers.clear()
+        self.published = 0
+
+
+class Variants:
+    """Variants of a scene, by the effects that they have."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.built: dict[Names, Variant] = {}
+        self._closures: dict[bool, list[Closure]] = {}
+
+    def build(self, named: Names) -> Variant:
+        """Return the scene with these of its effects, and without its recording; one of each."""
+        if named not in self.built:
+            self.built[named] = Variant(self.pipeline(named))
+        return self.built[named]
+
+    def pipeline(self, named: Names) -> Pipeline:
+        """Return the scene with these of its effects at its start; another one each time."""
+        scene = replace(
+            self.scene,
+            members=tuple(_with(member, named) for member in self.scene.members),
+            faults={
+                # Nobody injects it, nor does a timeline.
+                name: replace(fault, at=(), seconds=0.0)
+                for name, fault in self.scene.faults.items()
+                if f'{_FAULT}{name}' in named
+            },
+            record=None,
+        )
+        # To solve a linkage for the first time may take a second where it is iterated.
+        altered = 'tolerance' in named
+        pipeline = Pipeline(scene, self._closures.get(altered))
+        self._closures.setdefault(altered, pipeline.closures)
+        return pipeline
+
+    def attempt(self, named: Names) -> Variant | None:
+        """Return the scene with these effects; nothing where they do not go together."""
+        try:
+            return self.build(named)
+        except FileError:
+            return None
+
+
+def _with(member: Member, named: Names) -> Member:
+    """Return a linkage with these effects, of those that it has or that they bring in."""
+    own = member.effects
+    brought = {need for effect in own for need in brings(effect)}
+    effects = {
+        name: own[name] if name in own else module_of(name).PARAMETERS()
+        for name in in_order({*own, *brought})
+        if name in named
+    }
+    forced = member.drive[0] == 'torque' or not named.isdisjoint(LOADED)
+    return replace(member, effects=effects, loads=member.loads if forced else None)
+
 
 _BLOCK = 100
 """Ticks of a variant in one go: long enough for the caches, short beside a drift."""
@@ -304,9 +454,7 @@ def _medians(nanoseconds: Sequence[int]) -> list[float]:
 
 
 def _quartiles(values: Sequence[float]) -> tuple[float, float]:
-    if len(values) < 2:
-        return values[0], values[0]
-    low, _, high = quantiles(values, n=4, method='inclusive')
+    low, _, high = spread_of(values)
     return low, high
 
 
