@@ -26,6 +26,7 @@ import time
 
 from bench.processes import ROOT
 from linkage_ros.measuring import alternating, describe_machine, spread_of
+from linkage_ros.pages.markdown import table_lines
 
 try:
     from rich.console import Console
@@ -70,11 +71,9 @@ class Table:
 
     def markdown(self) -> str:
         """Return it as Markdown."""
-        rule = ['---', *(['---:'] * (len(self.head) - 1))]
-        lines = [self.head, rule, *self.rows]
-        return '\n'.join(
-            [f'## {self.title}', '', *(f'| {" | ".join(line)} |' for line in lines), '']
-        )
+        numbers = [False, *[True] * (len(self.head) - 1)]
+        lines = table_lines(self.head, self.rows, numbers)
+        return '\n'.join([f'## {self.title}', '', *lines, ''])
 
 
 def say(line: str) -> None:

@@ -28,7 +28,6 @@ import shutil
 from linkage_ros.accuracy.page.diagrams import Styles, styles_of
 from linkage_ros.accuracy.page.html import results_html
 from linkage_ros.accuracy.page.numbers import (
-    Cell,
     cell_text,
     diagram_csv,
     numeric_columns,
@@ -37,6 +36,7 @@ from linkage_ros.accuracy.page.numbers import (
 from linkage_ros.accuracy.page.svg import diagram_svg
 from linkage_ros.accuracy.results import Part, Results, Table
 from linkage_ros.errors import LinkageError
+from linkage_ros.pages.markdown import filled, marks, table_lines
 
 PAGE = 'index.html'
 """What a browser opens."""
@@ -131,8 +131,7 @@ def _check_keys(keys: list[str]) -> None:
         raise ValueError(f'{unfit[0]!r} is no name of a file, or that of two')
 
 
-BEGIN, END = '<!-- measured: begin -->', '<!-- measured: end -->'
-"""Between them stands what is made here; what is around them is written by hand."""
+_MARK = 'measured'
 
 
 def write_markdown(results: Sequence[Results], page: Path) -> None:
@@ -144,8 +143,8 @@ def write_markdown(results: Sequence[Results], page: Path) -> None:
     results
         Of some scenes, which have different names.
     page
-        Where it goes. Of one that is there, with `BEGIN` and `END` in it, only what stands between
-        them is replaced.
+        Where it goes. If it exists and has the marks ``measured``, only the text between them is
+        replaced.
 
     Raises
     ------
@@ -156,12 +155,10 @@ def write_markdown(results: Sequence[Results], page: Path) -> None:
     styles = styles_of(results)
     pictures = page.with_suffix('')
     text = '\n'.join(line for each in results for line in _scene(each, pictures.name))
-    old = page.read_text('utf-8') if page.exists() else f'{BEGIN}\n{END}\n'
-    head, _, rest = old.partition(BEGIN)
-    _, _, tail = rest.partition(END)
+    old = page.read_text('utf-8') if page.exists() else f'{"".join(marks(_MARK))}\n'
     for each in results:
         _draw(each, styles, pictures / _folder(each))
-    page.write_text(f'{head}{BEGIN}\n{text}\n{END}{tail}', 'utf-8')
+    page.write_text(filled(old, _MARK, text), 'utf-8')
 
 
 def _draw(results: Results, styles: Styles, folder: Path) -> None:
@@ -206,14 +203,9 @@ def _table(table: Table) -> Iterator[str]:
     numbers = numeric_columns(table)
     yield f'{_escaped(table.title)}:'
     yield ''
-    yield _row(table.columns)
-    yield f'| {" | ".join("---:" if number else "---" for number in numbers)} |'
-    yield from map(_row, table.rows)
+    rows = ([_escaped(cell_text(cell)) for cell in row] for row in (table.columns, *table.rows))
+    yield from table_lines(next(rows), rows, numbers)
     yield ''
-
-
-def _row(cells: Sequence[Cell]) -> str:
-    return f'| {" | ".join(_escaped(cell_text(cell)) for cell in cells)} |'
 
 
 def _folder(results: Results) -> str:
