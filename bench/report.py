@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Progress lines and tables: with rich where it is installed, as plain text, and as Markdown."""
+"""Progress lines and tables: for the terminal, and as Markdown pages."""
 
 from __future__ import annotations
 
@@ -25,18 +25,9 @@ from pathlib import Path
 import time
 
 from bench.processes import ROOT
+from linkage_ros.cli import tables
 from linkage_ros.measuring import alternating, describe_machine, spread_of
 from linkage_ros.pages.markdown import table_lines
-
-try:
-    from rich.console import Console
-    from rich.table import Table as RichTable
-except ImportError:
-    _console = None
-else:
-    _console = Console()
-    if not _console.is_terminal:
-        _console = Console(width=120)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,15 +50,10 @@ class Table:
     head: Sequence[str]
     rows: list[Sequence[str]] = field(default_factory=list)
 
-    def plain(self) -> str:
-        """Return it as aligned text."""
-        lines = [list(self.head), *map(list, self.rows)]
-        widths = [max(len(line[i]) for line in lines) for i in range(len(self.head))]
-        text = [
-            '  '.join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-            for line in lines
-        ]
-        return '\n'.join([self.title, text[0], '-' * max(map(len, text)), *text[1:], ''])
+    def for_terminal(self) -> tables.Table:
+        """Return it as a table for the terminal, with numbers aligned to the right."""
+        name, *values = self.head
+        return tables.Table(self.title, [name, *(f'>{value}' for value in values)], self.rows)
 
     def markdown(self) -> str:
         """Return it as Markdown."""
@@ -78,23 +64,13 @@ class Table:
 
 def say(line: str) -> None:
     """Print a line of progress."""
-    if _console is None:
-        print(line, flush=True)
-    else:
-        _console.print(line, highlight=False, markup=False, style='dim')
+    print(line, flush=True)
 
 
 def show(table: Table) -> None:
-    """Print a table."""
-    if _console is None:
-        print(table.plain(), flush=True)
-        return
-    rich = RichTable(title=table.title, title_justify='left')
-    for number, name in enumerate(table.head):
-        rich.add_column(name, justify='right' if number else 'left')
-    for row in table.rows:
-        rich.add_row(*row)
-    _console.print(rich)
+    """Print a table, and an empty line after it."""
+    tables.show(table.for_terminal())
+    say('')
 
 
 def machine_table(begun: datetime, *rows: tuple[str, str]) -> Table:
@@ -112,10 +88,10 @@ def machine_table(begun: datetime, *rows: tuple[str, str]) -> Table:
     return Table('Machine', ('', ''), [*known])
 
 
-def write_page(file: Path, title: str, intro: str, tables: Sequence[Table]) -> None:
+def write_page(file: Path, title: str, intro: str, found: Sequence[Table]) -> None:
     """Write tables as a page of Markdown, after an introduction."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    text = '\n'.join([f'# {title}', '', intro.strip(), '', *(t.markdown() for t in tables)])
+    text = '\n'.join([f'# {title}', '', intro.strip(), '', *(t.markdown() for t in found)])
     file.write_text(text, encoding='utf-8')
     say(f'kept in {file}')
 
