@@ -166,7 +166,7 @@ class Variants:
         return pipeline
 
     def attempt(self, named: Names) -> Variant | None:
-        """Return the scene with these effects; nothing where they do not go together."""
+        """Return the scene with these effects; None if they do not go together."""
         try:
             return self.build(named)
         except FileError:
@@ -218,7 +218,7 @@ class Times(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class EffectCost:
     """
-    What an effect costs.
+    The cost of an effect.
 
     Attributes
     ----------
@@ -250,12 +250,12 @@ class EffectCost:
 @dataclass(frozen=True, slots=True)
 class SceneCost:
     """
-    What a scene costs.
+    The cost of a scene.
 
     Attributes
     ----------
     offer
-        A crank message, read and taken; nothing where the drives listen to no topic.
+        A crank message, read and taken; None if the drives listen to no topic.
     bare
         A tick of the scene without effects, its crank message with it.
     whole

@@ -66,7 +66,7 @@ class FreeMotion(NamedTuple):
     end
         Where it is after `SECONDS`.
     scale
-        What its energy goes up and down by, in [J]: a drift is told in parts of it.
+        Range of its potential energy, in [J]; a drift is given as a part of it.
     unit
         Of the input: 'rad' or 'm'.
     words
@@ -84,7 +84,7 @@ class FreeMotion(NamedTuple):
 
 class Integrated(NamedTuple):
     """
-    What a method comes to with a step.
+    The result of a method with one length of step.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class Integrated(NamedTuple):
 
 def free_motion(member: Member) -> FreeMotion:
     """
-    Return a free motion of a linkage and where it leads to.
+    Return a free motion of a linkage, with its known end.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def free_motion(member: Member) -> FreeMotion:
 
 
 def integrate(motion: FreeMotion, method: str, step: float) -> Integrated:
-    """Integrate a motion once, and time it without the looks at its energy."""
+    """Integrate a motion once; the evaluations of its energy are not timed."""
     mechanics = motion.mechanics
     freedom = OneFreedom(mechanics.equation, import_module(METHODS[method]).step)
     at = freedom.at(*motion.start)
@@ -212,7 +212,7 @@ STEPS = {
 """For each method lengths of its step, in [s]."""
 
 _QUICK = 4
-"""How many of them where a few seconds are to do, the longest first."""
+"""Number of steps in a quick measurement, the longest first."""
 
 _ROUNDED = 1e-11
 _WANTED = (1e-2, 1e-4, 1e-6, 1e-8)
@@ -221,7 +221,7 @@ _ROUNDS = 3
 
 def measure_dynamics(scene: Scene, quick: bool, progress: Progress) -> Part | None:
     """
-    Measure the integration of a scene's first linkage that a torque drives; nothing without one.
+    Measure the integration of the first linkage that a torque drives; None without one.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def measure_dynamics(scene: Scene, quick: bool, progress: Progress) -> Part | No
 
 
 def _settings(member: Member, quick: bool) -> list[tuple[str, float]]:
-    """Return methods and steps, those of the scene among them."""
+    """Return methods and steps, with those of the scene."""
     drive = member.drive[1]
     settings = [
         (method, step)
@@ -366,7 +366,7 @@ def _slopes(results: Sequence[Integrated]) -> Table:
 
 def slope(errors: Sequence[tuple[float, float]]) -> float | None:
     """
-    Return by which power of the step an error falls, between the two shortest steps that tell it.
+    Return the order of an error in the step, from the two shortest steps that show it.
 
     Errors near what rounding does tell nothing.
 
@@ -404,7 +404,7 @@ def _text(motion: FreeMotion, own: Integrated, rounds: int) -> list[str]:
 
 
 def _advice(results: Sequence[Integrated], unit: str) -> Iterator[str]:
-    """Yield for some accuracies what takes the least time."""
+    """Yield the fastest setting for each of some accuracies."""
     for wanted in _WANTED:
         enough = [result for result in results if result.error <= wanted]
         words = f'For {wanted:g} {unit} after {SECONDS:g} s'

@@ -48,15 +48,15 @@ from linkage_ros.scene.scene import Scene
 
 class Departure(NamedTuple):
     """
-    How far what is published is from the truth.
+    The error of what is published.
 
     Attributes
     ----------
     angles, slides, rates
-        Root of the mean square and greatest, in [rad], in [m], in [rad/s] or [m/s]; nothing where
+        Root of the mean square and greatest, in [rad], in [m], in [rad/s] or [m/s]; None if
         none is published.
     silent
-        The part of the ticks at which the truth is known and nothing is published.
+        Share of the ticks at which the truth is known but no state is published.
 
     """
 
@@ -67,7 +67,7 @@ class Departure(NamedTuple):
 
 
 class _Errors:
-    """Adds up errors."""
+    """Accumulate errors: root of the mean square, and the greatest."""
 
     def __init__(self) -> None:
         self._count, self._squares, self._worst = 0, 0.0, 0.0
@@ -83,14 +83,14 @@ class _Errors:
 
 def departure(true: Pipeline, real: Pipeline, fed: Iterable[tuple[int, bytes]]) -> Departure:
     """
-    Return how far what one pipeline publishes is from what another does.
+    Return the error of what one pipeline publishes against another.
 
     Parameters
     ----------
     true
-        What knows the truth, rates too.
+        The pipeline that gives the truth, with rates.
     real
-        What is judged.
+        The pipeline that is judged.
     fed
         Times, in [ns], each with its crank message; b'' where nobody listens.
 
@@ -135,7 +135,7 @@ _RATES = Names({'velocity'})
 
 def measure_effects(scene: Scene, quick: bool, progress: Progress) -> Part | None:
     """
-    Measure the effects of a scene; nothing where it has none.
+    Measure the effects of a scene; None if it has none.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def _table(
 
 
 def _diagram(rows: Sequence[tuple[str, Times | None, Departure | None, str]]) -> Diagram:
-    """Return what is told of positions, by what it costs; what changes no angle is not in it."""
+    """Return the error of positions against cost; effects that change no angle are left out."""
     curves = [
         Curve(name, [Point(times.median, found.angles[0], _spread(times))], joined=False)
         for name, times, found, _ in rows

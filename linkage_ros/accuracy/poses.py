@@ -128,7 +128,7 @@ def pose_sets(name: str, linkage: Linkage, count: int) -> list[Poses]:
 
 
 def easy(closure: Closure, count: int) -> tuple[tuple[float, ...], ...]:
-    """Return inputs that are spread over all that closes, away from trouble."""
+    """Return inputs spread over all ranges where the loops close, away from singular poses."""
     if len(closure.linkage.inputs) > 1:
         lines = 2 + int((8 * count) ** (1.0 / len(closure.linkage.inputs)))
         candidates = [inputs for inputs, _ in grid(closure, lines)]
@@ -155,7 +155,7 @@ def easy(closure: Closure, count: int) -> tuple[tuple[float, ...], ...]:
 
 def path(poses: Poses, count: int) -> Poses | None:
     """
-    Return a way through all of a single input's range; a whole turn where it turns fully.
+    Return a path through the whole range of a single input, or one full turn.
 
     Parameters
     ----------
@@ -180,12 +180,12 @@ def path(poses: Poses, count: int) -> Poses | None:
 
 
 def there_and_back(states: Sequence[tuple[float, ...]]) -> tuple[tuple[float, ...], ...]:
-    """Return a row of states in an order that comes back to the first with no leap."""
+    """Return states in an order that returns to the first without a jump."""
     return (*states[::2], *states[1::2][::-1])
 
 
 def near_toggle(closure: Closure) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
-    """Return inputs next to where the input's widest range ends, and how far from it."""
+    """Return inputs next to an end of the widest range, with their distances from it."""
     interval = Way(closure).widest_range if len(closure.linkage.inputs) == 1 else None
     if interval is None or interval.whole or not any(interval.limited):
         return (), ()
@@ -196,7 +196,7 @@ def near_toggle(closure: Closure) -> tuple[tuple[tuple[float, ...], ...], tuple[
 
 
 def near_change_point(closure: Closure) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
-    """Return inputs on both sides of a change point, on the way through it, and how far off."""
+    """Return inputs on both sides of a change point, with their distances from it."""
     if len(closure.linkage.inputs) > 1:
         return (), ()
     inner = [
@@ -285,7 +285,7 @@ Of the distance, where poses are next to a change point: there the other assembl
 
 class Errors(NamedTuple):
     """
-    What a method was off by.
+    The errors of a method.
 
     Attributes
     ----------
@@ -352,7 +352,7 @@ def position_errors(method: Method, poses: Poses, truths: Sequence[Truth]) -> Er
     """
     Return the errors of a method's positions.
 
-    What starts from its last state goes through the states twice and is judged the second time.
+    A method that starts from its last state runs twice and is judged the second time.
     """
     solve = method.position
     assert solve is not None
@@ -377,7 +377,7 @@ def motion_errors(
 def batch_errors(
     solve: Callable[[Sequence[Any], int], Sequence[Any]], poses: Poses, truths: Sequence[Truth]
 ) -> tuple[Errors, Errors, Errors]:
-    """Return the errors of what solves arrays."""
+    """Return the errors of a method that solves arrays."""
     found = solve([np.array(row) for row in zip(*poses.inputs, strict=True)], 2)
     one, two, three = (
         _errors(poses, [*zip(*rows, strict=True)], truths, order)
@@ -388,7 +388,7 @@ def batch_errors(
 
 def off(linkage: Linkage, found: Sequence[Any], truth: Truth, order: int = 0) -> float:
     """
-    Return what joints, rates or accelerations are off by.
+    Return the greatest error of joints, rates or accelerations.
 
     Parameters
     ----------

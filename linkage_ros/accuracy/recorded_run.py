@@ -54,7 +54,7 @@ class Flush(NamedTuple):
     begin, end
         By the steady clock.
     cpu
-        What the recorder's thread worked in between.
+        Processor time of the recorder thread in between.
     stake
         From the beginning of the flush before to the end of this one: what was recorded in that
         time, a power cut just before the end would have taken.
@@ -69,7 +69,7 @@ class Flush(NamedTuple):
 
 class Recorded(NamedTuple):
     """
-    What a run took.
+    What a run cost.
 
     Attributes
     ----------
@@ -230,7 +230,7 @@ def _as_in_the_node() -> Iterator[None]:
 
 
 class _Watched(BagWriter):
-    """A writer that notes what it takes; all but its making happens on the recorder's thread."""
+    """A writer that measures its cost; only its constructor runs outside the recorder thread."""
 
     def __init__(
         self,
@@ -259,7 +259,7 @@ class _Watched(BagWriter):
         return super().close(custom)
 
     def written(self) -> tuple[int, float] | None:
-        """Return what was given to disks by the last flush, in [bytes], and in which time, [s]."""
+        """Return the bytes given to disks until the last flush, and the time that took, in [s]."""
         if self._given is None or self._given_at_first is None:
             return None
         seconds = (self.flushes[-1].end - self._begun) * 1e-9

@@ -46,26 +46,26 @@ NO_BAG = 'no bag'
 
 class Cost(NamedTuple):
     """
-    What a setting costs; of several runs the quartiles.
+    The cost of a setting: the quartiles of several runs.
 
     Attributes
     ----------
     setting
-        The setting; nothing for no bag.
+        The setting; None for no bag.
     cpu
-        What the recorder's thread works for a message, in [µs].
+        Processor time of the recorder thread for a message, in [µs].
     waited
         How long it waits for the disk in a second, in [ms].
     waits
         How long it waits at a flush, of all flushes the median and the greatest, in [ms].
     stake
-        What a power cut may take at worst, in [ms].
+        The most that a power cut can destroy, in [ms].
     stake_messages
         The same in messages, at the rate at which they come.
     written
-        What the system is given for its disks, in [kB] a second; nothing where it does not say.
+        Bytes given to the disks, in [kB] a second; None where the system does not count them.
     size
-        What a message takes in the bag with its share of the index, in [bytes].
+        Size of a message in the bag with its share of the index, in [bytes].
     late, late_p99
         How late ticks are, the median and the 99th percentile, in [µs].
     dropped
@@ -105,7 +105,7 @@ class Cost(NamedTuple):
 
 
 def settings(periods: Sequence[float], packed_at: float, folder: Path) -> list[Storage | None]:
-    """Return what is compared: no bag, the flush periods, and the compressions that are here."""
+    """Return the settings to compare: no bag, the flush periods, the installed compressions."""
     found: list[Storage | None] = [None, *(Storage(flush_period=each) for each in periods)]
     here = [name for name in COMPRESSIONS if name != NONE and _is_here(name, folder)]
     return found + [Storage(flush_period=packed_at, compression=name) for name in here]
@@ -127,7 +127,7 @@ def measure_costs(
     scene, folder, progress
         As `measure_recording`.
     compared
-        The settings; nothing for no bag.
+        The settings; None for no bag.
     seconds
         How long a run is at least, in [s].
     rounds
@@ -214,7 +214,7 @@ QUICK_PACKED_AT = 0.2
 
 _WANTED = (0.1, 1.0, 5.0)
 _NEAR = 0.9
-"""What of the processor time of a flush period the least has to be for it to be near that."""
+"""A flush period is near the cheapest if the least time is at least this part of its own."""
 
 _NOT_PACKED = 'not packed'
 
@@ -250,7 +250,7 @@ def measure_recording(scene: Scene, folder: Path, quick: bool, progress: Progres
 
 
 def part_of(scene: Scene, costs: Sequence[Cost], *, quick: bool = False) -> Part:
-    """Return what was found as a part of the page."""
+    """Return the results as a part of the page."""
     bags = [cost for cost in costs if cost.setting]
     return Part(
         'recording',

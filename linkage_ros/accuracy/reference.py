@@ -60,14 +60,14 @@ _MOST = 800
 
 class Truth(NamedTuple):
     """
-    A state, as it is.
+    An exact state.
 
     Attributes
     ----------
     joints, rates, accelerations
         Of the published joints, mpmath's numbers, in [rad] or [m] and by the second.
     error
-        What they may be off by, of 1.
+        Bound of their relative error.
     links
         For each link but the ground the angle and the place (x, y) of its frame, then the rates of
         these, then their accelerations.
@@ -286,7 +286,7 @@ class ExactEquations:
 
     def off(self, motion: list[list[Any]], given: Sequence[Sequence[Any]]) -> list[Any]:
         """
-        Return what the equations are off by, derived as often as the motion has derivatives.
+        Return the residuals of the equations, differentiated as often as the motion.
 
         Parameters
         ----------
@@ -407,7 +407,7 @@ class ExactEquations:
 
 
 def solved(rows: Sequence[Row], rest: Sequence[Any]) -> tuple[list[Any], Any]:
-    """Return what solves linear equations, and the smallest pivot; most factors are not there."""
+    """Return the solution of sparse linear equations, and the smallest pivot."""
     left = [(dict(row), value) for row, value in zip(rows, rest, strict=True)]
     steps: list[tuple[int, Row, Any]] = []
     least: Any = None

@@ -101,7 +101,7 @@ def measure_solving(scene: Scene, quick: bool, progress: Progress) -> Part:
 
 def judge(poses: Poses, quick: bool) -> list[Measured]:
     """
-    Return the errors of all methods on a set of poses, without times; they do not vary.
+    Return the errors of all methods on a set of poses, without times.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def judge(poses: Poses, quick: bool) -> list[Measured]:
 def take_times(
     found: Sequence[Measured], seconds: float, progress: Progress = lambda _: None
 ) -> None:
-    """Time all that was judged, in turn, in about so many seconds."""
+    """Time all judged methods in turn, for about a number of seconds."""
     jobs = [(one, what, job) for one in found for what, job in _contenders(one)]
     times = in_turn([job for _, _, job in jobs], seconds, progress)
     for (one, what, _), time in zip(jobs, times, strict=True):
@@ -137,7 +137,7 @@ def true_states(poses: Poses) -> list[Truth]:
 
 
 def _integrated(poses: Poses, quick: bool) -> Iterator[Measured]:
-    """Yield what integration along a turn comes to; its error is that at the end."""
+    """Yield the results of integration along a turn; its error is that at the end."""
     way = path(poses, STATES)
     if way is None:
         return
@@ -155,7 +155,7 @@ def _judged(method: Method, poses: Poses, truths: Sequence[Truth]) -> Measured:
     motion = motion_errors(method, poses, truths) if method.motion else None
     position = motion[0] if motion and method.together else position_errors(method, poses, truths)
     batch = None
-    # What is iterated is so one state at a time; in arrays it is no faster.
+    # Iteration takes one state at a time; arrays make it no faster.
     if method.batch is not None and poses.key in ('easy', 'five_dyads'):
         batch = batch_errors(method.batch, poses, truths)
     return Measured(poses, method, position, motion, batch, {})
@@ -270,7 +270,7 @@ _SAMPLE = 3
 
 def confirmed(poses: Poses, truths: Sequence[Truth]) -> int:
     """
-    Return how many states were confirmed by balls; none where python-flint is not installed.
+    Return how many states balls have confirmed; 0 if python-flint is not installed.
 
     Raises
     ------

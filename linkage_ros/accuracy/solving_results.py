@@ -40,7 +40,7 @@ _LEAST = 1e-19
 _ERRORS = Axis(_ERROR, _UNIT, least=_LEAST)
 
 _WITH_PATH = ('easy', 'path')
-"""What is integrated goes along a path; it is drawn and told with the easy poses."""
+"""Integration goes along a path; it is shown with the easy poses."""
 
 
 def part_of(found: Sequence[Measured], quick: bool) -> Part:
@@ -271,11 +271,11 @@ WANTED = (1e-3, 1e-6, 1e-9, 1e-12)
 _TROUBLE = ('toggle', 'change_point')
 
 _IN_A_SCENE = (*NODE_DEFAULTS, FROM_KNOTS, TABLES['hermite'])
-"""What ``solver`` of a scene can ask for."""
+"""The methods that ``solver`` of a scene can choose."""
 
 
 def text(found: Sequence[Measured], quick: bool) -> list[str]:
-    """Return how it was measured, and what came out, in paragraphs."""
+    """Return paragraphs on the method of measurement and on the results."""
     sets = {one.poses.key: one.poses for one in found}
     easy = sets['easy']
     how = (
@@ -308,7 +308,7 @@ def text(found: Sequence[Measured], quick: bool) -> list[str]:
 
 
 def advice(found: Sequence[Measured]) -> list[str]:
-    """Return for each wanted accuracy the cheapest way that a scene can have, a sentence each."""
+    """Return a sentence for each accuracy: the cheapest method that a scene can choose."""
     easy = [one for one in found if one.poses.key == 'easy' and one.times.get('position')]
     offered = [one for one in easy if one.method.name in _IN_A_SCENE]
     winners = [_cheapest(offered, wanted) for wanted in WANTED]
@@ -343,7 +343,7 @@ def advice(found: Sequence[Measured]) -> list[str]:
 
 def _cheapest(found: Sequence[Measured], wanted: float) -> Measured | None:
     """
-    Return what takes the least time of all that never fail and are as accurate as wanted.
+    Return the fastest method of those that never fail and reach the accuracy.
 
     Of those that are within each other's spreads what the node does wins, else what holds least.
     """
@@ -370,7 +370,7 @@ def _compared(one: Measured, node: Measured) -> str:
 
 
 def _fails_in(found: Sequence[Measured], one: Measured, wanted: float) -> str:
-    """Say where a method does not keep the accuracy, with its setting if that was measured."""
+    """Return where a method does not keep the accuracy, with its setting if that was measured."""
     bad = []
     for key in _TROUBLE:
         there = [other for other in found if other.poses.key == key]

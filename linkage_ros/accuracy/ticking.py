@@ -80,7 +80,7 @@ class Motions(NamedTuple):
 
 def motions_of(closure: Closure, seconds: float) -> Motions:
     """
-    Return motions that stay where the loops close.
+    Return motions within the range where the loops close.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ _DOMAINS = 101
 
 class Used(NamedTuple):
     """
-    What a subscriber met at a rate of ticks, in one motion of the crank.
+    The states that a subscriber used, at one rate of ticks and in one motion of the crank.
 
     Attributes
     ----------
@@ -271,7 +271,7 @@ def _answer(process: subprocess.Popen[bytes], folder: Path) -> dict[str, Any]:
 
 
 def _processor_time(pid: int) -> float:
-    """Return what a process has used of processors, in [s]."""
+    """Return the processor time that a process has used, in [s]."""
     fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
@@ -287,7 +287,7 @@ _UNIT = {True: 'rad', False: 'm'}
 
 def measure_ticking(scene: Scene, quick: bool, progress: Progress) -> Part | None:
     """
-    Measure what a subscriber gets of a scene's first linkage; nothing without rclpy or one input.
+    Measure the states that a subscriber gets; None without rclpy or with several inputs.
 
     Parameters
     ----------
@@ -423,7 +423,7 @@ def _text(closure: Closure, seconds: float, found: Sequence[Used], unit: str) ->
 
 
 def _gain(motion: str, slow: Used, fast: Used, unit: str) -> str:
-    """Return what the fastest ticks gain over the slowest."""
+    """Return the gain of the fastest ticks over the slowest."""
     parts = [
         f'{way} from {rms(slow.errors[way]):.2g} to {rms(fast.errors[way]):.2g} {unit}'
         for way in (HELD, CARRIED)
@@ -436,7 +436,7 @@ def _gain(motion: str, slow: Used, fast: Used, unit: str) -> str:
 
 
 def _advice(found: Sequence[Used], unit: str) -> Iterator[str]:
-    """Yield for some accuracies the slowest ticks that give it, in both motions."""
+    """Yield the slowest ticks that reach each of some accuracies, in both motions."""
     for wanted in _WANTED:
         held, carried = (_slowest(found, way, wanted) for way in (HELD, CARRIED))
         words = f'For {wanted:g} {unit} (rms) when used: '

@@ -56,7 +56,7 @@ def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts:
     data
         For the script, as JSON has it; numbers are finite.
     styles, scripts
-        What the page has beside what all pages have, in their order.
+        Files that the page has beside those of all pages, in their order.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def _json(data: Any) -> str:
     # No text within can end the element, or open a comment.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
     text = text.replace('<', r'\u003c')
-    # What the script shows is to be read as it is here, too; json itself has escaped the rest.
+    # Text that the script shows is made readable here, too; json has escaped the rest.
     return _without({letter for letter in set(text) if not letter.isprintable()}, text, '\\')
 
 
@@ -153,7 +153,7 @@ def table_html(
     Parameters
     ----------
     title
-        What stands above it.
+        Its caption.
     columns
         Headings; all empty: none are written.
     rows

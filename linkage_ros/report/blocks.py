@@ -123,14 +123,14 @@ _FARTHEST = 4
 """By how many times a block may be larger, for the sake of one log time."""
 
 _RECORD_BYTES = 31
-"""What a message takes in an MCAP file beside its own bytes."""
+"""Size of a record of a message in an MCAP file without the message itself, in [bytes]."""
 
 Entry = tuple[int, int, int, bytes]
 """Number of the message, log time, publish time, bytes; none of a topic that is only counted."""
 
 
 class Progress(NamedTuple):
-    """What is told how many bytes were read, now and then; and whether to stop."""
+    """Called with the bytes read, now and then; and whether to stop."""
 
     told: Callable[[int], None] = lambda _read: None
     stopped: Callable[[], bool] = lambda: False
@@ -150,7 +150,7 @@ class Blocks:
     wanted
         Topics whose messages are wanted, not their counts alone.
     progress
-        Whom to tell, and whether to stop.
+        Receives the progress, and says whether to stop.
 
     """
 
@@ -236,7 +236,7 @@ class Blocks:
 
 KINDS = ('samples', 'faults', 'withheld', 'resets', 'states', 'health')
 _OTHER_RECORDER = 'health'
-"""What is not recorded by the hand of the ticks; the clock of the run does not go by it."""
+"""Topics that another thread records; the clock of the run does not follow them."""
 
 
 class Rows(NamedTuple):

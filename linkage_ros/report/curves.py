@@ -172,7 +172,7 @@ class Kept:
     space
         How much of them may come onto a page, in [bytes].
     window
-        Which part of the run is told.
+        The part of the run that is shown.
 
     Attributes
     ----------
@@ -216,7 +216,7 @@ def joint_columns(names: Sequence[str], turning: Sequence[bool]) -> list[Column]
     ]
 
 
-class OwnCurves:
+class SceneCurves:
     """
     Collects what is drawn of a run.
 
@@ -229,7 +229,7 @@ class OwnCurves:
     bodies
         How many links there are to be moved in the picture.
     window
-        Which part of the run is told.
+        The part of the run that is shown.
 
     """
 

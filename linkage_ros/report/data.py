@@ -64,7 +64,7 @@ class Poses(NamedTuple):
         Those that move, and the blocks of sliders that are none.
     frames
         Of shape (instants, links, 3): where the frame of a link is, in [m], and its angle, in
-        [rad], in (−π, π]; NaN where it is not told.
+        [rad], in (−π, π]; NaN where it is unknown.
     apart
         The farthest that two links miss a pin, or a point its line, in [m]; NaN likewise.
     untold
@@ -95,7 +95,7 @@ def poses(
     prefix
         What its joints have before their own names in messages.
     values
-        By the names in messages what the joints are at, in [rad] or [m]; NaN where not told. All
+        By the names in messages what the joints are at, in [rad] or [m]; NaN where unknown. All
         of one length; the inputs are among them.
     inputs
         Names of the driven joints in messages.

@@ -37,7 +37,7 @@ _MOST_ITEMS = 10_000
 
 class Status(NamedTuple):
     """
-    What one task says.
+    The status of one task.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class DiagnosticsSummary:
     Attributes
     ----------
     said
-        What was said last, by task and key; no more than `MOST_VALUES`.
+        The last values, by task and key; no more than `MOST_VALUES`.
 
     """
 

@@ -62,7 +62,7 @@ class TableOf(NamedTuple):
     rows
         The cells.
     folded
-        Whether it is only shown to who asks for it.
+        Whether the reader has to open it.
 
     """
 
@@ -172,18 +172,18 @@ _SPEEDS = ('0.01', '0.1', '0.25', '0.5', '1', '2', '5', '10', '60')
 
 class ReportHeader(NamedTuple):
     """
-    What a page tells of a bag beside its run.
+    The facts of a bag that a page shows beside its run.
 
     Attributes
     ----------
     title
         Of the page.
     facts
-        What stands at its head.
+        The facts at its head.
     warnings
-        What is missing or damaged, a line each.
+        Missing or damaged parts, a line each.
     tables
-        What stands at its end.
+        The tables at its end.
     wrapped
         Whether published angles jump from π to −π.
 
@@ -196,7 +196,7 @@ class ReportHeader(NamedTuple):
     wrapped: bool = False
 
 
-def run_html(run: Run, told: ReportHeader) -> str:
+def run_html(run: Run, header: ReportHeader) -> str:
     """
     Return the page of a run.
 
@@ -206,9 +206,9 @@ def run_html(run: Run, told: ReportHeader) -> str:
         Where plotly is not installed, or the page would be larger than `PAGE_BYTES`.
 
     """
-    data = page_data(run, told.wrapped)
-    title = short(told.title)
-    page = document(title, _body(run, told, data), data, _STYLES, _SCRIPTS)
+    data = page_data(run, header.wrapped)
+    title = short(header.title)
+    page = document(title, _body(run, header, data), data, _STYLES, _SCRIPTS)
     # The limits of the parts add up to less, but names in a scene have no limit.
     if len(page.encode('utf-8', 'backslashreplace')) > PAGE_BYTES:
         bound = f'{PAGE_BYTES // 1_000_000} MB'
@@ -216,13 +216,13 @@ def run_html(run: Run, told: ReportHeader) -> str:
     return page
 
 
-def _body(run: Run, told: ReportHeader, data: dict[str, object]) -> Iterator[str]:
-    yield f'<header><h1>{escape(short(told.title))}</h1>'
-    yield from facts_html([(name, short(value, _LONGEST_FACT)) for name, value in told.facts])
-    if told.warnings:
+def _body(run: Run, header: ReportHeader, data: dict[str, object]) -> Iterator[str]:
+    yield f'<header><h1>{escape(short(header.title))}</h1>'
+    yield from facts_html([(name, short(value, _LONGEST_FACT)) for name, value in header.facts])
+    if header.warnings:
         yield '<ul class="warnings" role="alert">'
         yield from (
-            f'<li>{escape(short(warning, _LONGEST_FACT))}</li>' for warning in told.warnings
+            f'<li>{escape(short(warning, _LONGEST_FACT))}</li>' for warning in header.warnings
         )
         yield '</ul>'
     yield '<noscript><p class="warnings">Pictures and plots need JavaScript.</p></noscript>'
@@ -237,7 +237,7 @@ def _body(run: Run, told: ReportHeader, data: dict[str, object]) -> Iterator[str
     yield from _histograms(run)
     yield '</div>'
     yield '<section class="tables"><h2>In numbers</h2>'
-    yield from tables_html([*told.tables, *run_tables(run)])
+    yield from tables_html([*header.tables, *run_tables(run)])
     yield '</section></main>'
 
 

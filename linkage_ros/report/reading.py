@@ -34,8 +34,8 @@ from linkage_ros.report.curves import Kept, NO_ROOM, UNITS
 from linkage_ros.report.decimation import STATE_BYTES
 from linkage_ros.report.joint_states import JointStates
 from linkage_ros.report.labels import short
-from linkage_ros.report.own_run import OwnRun
 from linkage_ros.report.run import APART, Column, Lane, Run, Silences, Window
+from linkage_ros.report.scene_run import SceneRun
 from linkage_ros.scene.scene import Scene
 import numpy as np
 
@@ -57,7 +57,7 @@ class ForeignRun:
     bag
         The bag.
     window
-        Which part is told.
+        The part of the run that is shown.
 
     """
 
@@ -152,18 +152,18 @@ def read_run(
     Parameters
     ----------
     bag
-        The bag. Where it is damaged, what lies before the damage is told.
+        The bag. If it is damaged, the part before the damage is shown.
     window
-        Which part of the run is told.
+        The part of the run that is shown.
     progress
-        Whom to tell how far it is, and whether to stop.
+        Receives the progress, and says whether to stop.
     scene_of
         Gives the scene that a bag carries.
 
     Returns
     -------
     run
-        What it holds.
+        Its contents.
     scene
         Its scene, if it carries one.
     missing
@@ -171,10 +171,10 @@ def read_run(
 
     """
     scene, missing = None, ''
-    reader: OwnRun | ForeignRun
+    reader: SceneRun | ForeignRun
     try:
         scene = scene_of(bag)
-        reader = OwnRun(bag, run_account(bag), scene, window)
+        reader = SceneRun(bag, run_account(bag), scene, window)
     except LinkageError as error:
         # A page is handed on, and does not say where its bag lay.
         missing = f'{Path(error.where).name}: {error.reason}'

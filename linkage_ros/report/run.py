@@ -14,7 +14,7 @@
 
 
 """
-What a page tells of a run: its curves, its linkages, and what happened, as spans on lanes.
+The contents of a report: the curves, the linkages, and events as spans on lanes.
 
 Events of one kind that follow each other closely are one span, with their number. Where there are
 more spans than a lane may have, the closest ones become one: none is lost from the count.
@@ -57,7 +57,7 @@ class Span:
     count
         How many.
     text
-        What the first of them was.
+        Description of the first of them.
 
     """
 
@@ -76,20 +76,20 @@ class Lane:
     near
         How far apart two may be, in [ns], and be one span.
     alike
-        Whether those that say something else are one, too; the first is what is told.
+        Whether events with different texts join, too; the first text stays.
     longest
         Whether, where there is no room for all, the longest spans stay, not all of them as one.
     most
         How many spans there may be.
     window
-        From when to when, in [ns]; what lies outside is not told.
+        Begin and end, in [ns]; events outside are left out.
 
     Attributes
     ----------
     count
         How many there were.
     spans
-        They, in the order in which they were told.
+        The spans, in the order in which they were added.
     near
         As it has become.
 
@@ -113,7 +113,7 @@ class Lane:
 
     @property
     def in_order(self) -> list[Span]:
-        """Return the spans in the order of their begins: what lasts is told at its end."""
+        """Return the spans in the order of their begins; a span is added at its end."""
         return sorted(self.spans, key=attrgetter('begin'))
 
     def add(self, begin: int, end: int, text: str = '', count: int = 1) -> None:
@@ -221,7 +221,7 @@ class Silences:
 
 
 class Window(NamedTuple):
-    """Which part of a run is told, in the time of the run, in [ns]."""
+    """The part of a run that is shown, in the time of the run, in [ns]."""
 
     since: int = 0
     until: int = 2**63 - 1
@@ -323,34 +323,34 @@ class Frames(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Run:
     """
-    What a bag holds of a run.
+    The contents of a bag, as a run.
 
     Attributes
     ----------
     begin
-        The log time at which its time begins, in [ns]; nothing without messages.
+        The log time at which its time begins, in [ns]; None without messages.
     end
         The time of the run at its end, in [ns].
     window
-        Which part of it is told.
+        The part of it that is shown.
     contents
         Counts of all messages, and what is damaged.
     curves
         Joints, cranks, lateness and age over time.
     frames
-        For the moving picture; nothing where there is no scene.
+        For the moving picture; None without a scene.
     linkages
         Of the scene; none where there is none.
     lanes
-        What happened, by kind.
+        The events, by kind.
     lateness, age
-        How they are spread; nothing where they cannot be told.
+        Their histogram; None where they are unknown.
     rejected
         How many samples were rejected, by reason.
     left_out
         How many messages, or joints of messages, could not be read, by topic and reason.
     said
-        What the last diagnostics say, by task and key.
+        The values of the last diagnostics, by task and key.
 
     """
 

@@ -106,7 +106,7 @@ class Crank:
 
 class SampleJudge:
     """
-    Tells good samples from those that are refused.
+    Separates good samples from refused ones.
 
     Parameters
     ----------

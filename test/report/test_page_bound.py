@@ -46,7 +46,6 @@ from linkage_ros.report.decimation import (  # fmt: skip
     TABLE_BYTES,
 )
 from linkage_ros.report.html import ReportHeader, run_html, TableOf
-from linkage_ros.report.own_run import LANES, OwnRun
 from linkage_ros.report.run import (
     Column,
     Frames,
@@ -57,6 +56,7 @@ from linkage_ros.report.run import (
     Run,
     Window,
 )
+from linkage_ros.report.scene_run import LANES, SceneRun
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 from linkage_ros.shipped import shipped
@@ -115,7 +115,7 @@ def long(tmp_path_factory):
     """Return a run of two minutes, and what was held block by block."""
     scene = 'effects: {velocity: {}}\n'
     bag = Long(recorded(tmp_path_factory.mktemp('long'), scene), 120_000)
-    reader = OwnRun(bag, run_account(bag), recorded_scene(bag), Window())
+    reader = SceneRun(bag, run_account(bag), recorded_scene(bag), Window())
     blocks, sizes = Blocks(bag, reader.topics, Progress()), []
     for block in blocks:
         reader.take(block)
@@ -286,7 +286,7 @@ def test_the_same_bag_makes_the_same_page(tmp_path):
     bag = recorded(tmp_path, 'effects: {velocity: {}}\n')
 
     def made():
-        reader = OwnRun(bag, run_account(bag), recorded_scene(bag), Window())
+        reader = SceneRun(bag, run_account(bag), recorded_scene(bag), Window())
         blocks = Blocks(bag, reader.topics, Progress())
         for block in blocks:
             reader.take(block)

@@ -47,16 +47,16 @@ class Method(NamedTuple):
     setting
         In words; '' where it has none.
     position
-        Takes the inputs of one state; or nothing, where a state is never asked for alone.
+        Takes the inputs of one state; None if single states are never solved.
     motion
         Likewise, with rates and accelerations at those of above.
     batch
         Takes an array for each input, and how many derivatives are asked for; returns arrays of
         joints, rates and accelerations, as many of them, of shape (joints, states).
     memory
-        What it holds, in [bytes], where that is of note.
+        Memory that it needs, in [bytes]; None where it is negligible.
     build
-        How long it took to make, in [s], where that is of note.
+        Time to build it, in [s]; None where it is negligible.
     remembers
         Whether an answer depends on the states before.
     together

@@ -53,7 +53,7 @@ import numpy as np
 
 class VelocityEquations:
     """
-    What the links' angles and places do, and no dyad.
+    The constraint equations in the angles and positions of the links, without dyads.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class VelocityEquations:
         self._constraints = self._listed()
 
     def start(self, inputs: Sequence[float]) -> Any:
-        """Return for each link its angle and the place of its first point, as the closure says."""
+        """Return the angle and the position of the first point of each link, from the closure."""
         position = self._closure.position(*inputs)
         angles, points = self._closure.link_angles(position), self._closure.points(position)
         found = []
@@ -163,7 +163,7 @@ STEPS = (1, 4, 16, 64)
 
 def integrations(path: Poses, quick: bool) -> Iterator[Method]:
     """
-    Yield the methods; their positions hold along a path, from its first state on.
+    Yield the integration methods; their positions hold along a path, from its first state.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def integrations(path: Poses, quick: bool) -> Iterator[Method]:
 
 
 def integration(path: Poses, name: str, steps: int, projected: bool) -> Method:
-    """Return one of them, with so many steps between two states."""
+    """Return an integration method with a number of steps between two states."""
     rules = VelocityEquations(path.linkage)
     first = path.inputs[0]
     last, unknowns = first, rules.start(first)
@@ -232,7 +232,7 @@ _DIGITS, _GUARD = 30, 8
 
 
 def extended(linkage: Linkage) -> Method:
-    """Return it; rates and accelerations come with the position, whether asked for or not."""
+    """Return extended precision as a method; rates and accelerations come with each position."""
     reference = Reference(linkage, _DIGITS, _GUARD)
     driven = len(linkage.inputs)
     rates, accelerations = [RATE] * driven, [ACCELERATION] * driven

@@ -82,11 +82,11 @@ class PlainFourBar(NamedTuple):
     terms: tuple[tuple[int, int, float], ...]
 
     def joints(self, directions: Sequence[Any]) -> tuple[Any, ...]:
-        """Return the published joints of directions, from the line of the ground."""
+        """Return the published joints for directions measured from the line of the ground."""
         return tuple(directions[i] - directions[j] + constant for i, j, constant in self.terms)
 
     def changes(self, directions: Sequence[Any]) -> tuple[Any, ...]:
-        """Return what the published joints' derivatives are, of those of the directions."""
+        """Return the derivatives of the published joints for those of the directions."""
         return tuple(directions[i] - directions[j] for i, j, _ in self.terms)
 
     def closed_at(self, theta: float) -> tuple[float, float]:
@@ -105,7 +105,7 @@ class PlainFourBar(NamedTuple):
 
 
 def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
-    """Return a linkage as a four-bar, if it is one and nothing else."""
+    """Return a linkage as a four-bar, or None if it is anything else."""
     structure = find_groups(linkage)
     found = list(four_bars(structure))
     driven = [group for group in structure.groups if isinstance(group, Driven)]

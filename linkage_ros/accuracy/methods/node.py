@@ -41,7 +41,7 @@ _CLOSED = Status.CLOSED
 
 
 def closed_form(linkage: Linkage) -> Method:
-    """Return it; links that no dyad covers are iterated, as the node does."""
+    """Return the closed form; links that no dyad covers are iterated, as in the node."""
     closure = Closure(linkage)
     poses, motions = closure.compiled(0), closure.compiled(2)
     fast, fast_motion = poses.fast, motions.fast
@@ -72,7 +72,7 @@ def closure_method(
     memory: int | None = None,
     build: float | None = None,
 ) -> Method:
-    """Return what a closure comes to, or anything with its calls, as a method."""
+    """Return a closure, or an object with the same calls, as a method."""
     linkage: Linkage = closure.linkage
     rates = [RATE] * len(linkage.inputs)
     accelerations = [ACCELERATION] * len(linkage.inputs)
@@ -120,14 +120,14 @@ STARTS = {FROM_KNOTS: None, WARM: True, COLD: False}
 
 def newton(linkage: Linkage, tolerance: float, name: str) -> Method:
     """
-    Return it.
+    Return Newton's method from a given start.
 
     Parameters
     ----------
     linkage
         The linkage.
     tolerance
-        What the last correction is below, in [rad] or [m].
+        Upper bound of the last correction, in [rad] or [m].
     name
         Where it starts, of `STARTS`.
 
@@ -142,7 +142,7 @@ TABLES: dict[Order, str] = {'linear': 'table, linear', 'hermite': 'table, Hermit
 
 
 def table(linkage: Linkage, knots: int, order: Order) -> Method:
-    """Return it, with its memory and how long it took to build."""
+    """Return a table as a method, with its memory and the time to build it."""
     closure = TableClosure(linkage, knots=knots, order=order)
     return closure_method(
         closure, TABLES[order], f'{knots:,} knots', closure.memory, closure.build_time

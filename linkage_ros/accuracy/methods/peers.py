@@ -47,7 +47,7 @@ _STEPS = 20
 
 
 def newton_on_the_cut(shape: PlainFourBar, name: str, gap: Gap, slopes: Slopes) -> Method:
-    """Return it as a method of this name, which starts where it was last."""
+    """Return a method of this name, which starts from its last state."""
     enough, joints = _ENOUGH * (shape.a + shape.b + shape.c + shape.d), shape.joints
     angles = np.zeros(3)
     started = False
@@ -219,9 +219,9 @@ PYLINKAGE = 'pylinkage'
 
 def pylinkage(linkage: Linkage) -> Method | None:
     """
-    Return it, of a four-bar, where it is installed.
+    Return pylinkage for a four-bar, or None if it is not installed.
 
-    It takes the assembly that is nearest to its last state; of the first it is told which.
+    It takes the assembly that is nearest to its last state; the first one is given to it.
     """
     shape = plain_four_bar(linkage)
     if shape is None or find_spec(PYLINKAGE) is None:

@@ -38,7 +38,7 @@ _LEAST_MARGIN = 0.05
 """Of a logarithmic axis, in decades."""
 
 _LEAST, _GREATEST = 1e-300, 1e300
-"""Beyond them what draws loses its way: they count as 0 and ∞."""
+"""Plotting libraries fail beyond these values: they count as 0 and ∞."""
 
 _EMPTY = (0.1, 10.0)
 """Range of an axis without a point."""
@@ -46,7 +46,7 @@ _EMPTY = (0.1, 10.0)
 
 class Range(NamedTuple):
     """
-    What an axis shows.
+    The range of an axis.
 
     Attributes
     ----------
@@ -62,12 +62,12 @@ class Range(NamedTuple):
     high: float
 
     def has(self, value: float) -> bool:
-        """Say whether the axis has a place for a value."""
+        """Return whether the axis can show a value."""
         least = max(_LEAST, self.axis.least)
         return abs(value) <= _GREATEST and (value >= least or not self.axis.logarithmic)
 
     def place(self, value: float) -> float:
-        """Return where a value is drawn; one without a place on the nearer edge."""
+        """Return where a value is drawn: one that the axis cannot show lies on the nearer edge."""
         if self.has(value):
             return value
         return self.high if value > _GREATEST else self.low
@@ -84,9 +84,9 @@ class Placed(NamedTuple):
     x_arms, y_arms
         How far the quartiles are from it, below and above, both positive; 0 without quartiles.
     on_edge
-        Whether it stands for something that has no place.
+        Whether it stands for a value that the axis cannot show.
     text
-        What it is, in lines.
+        Its description, in lines.
 
     """
 
@@ -116,12 +116,12 @@ class PlacedCurve(NamedTuple):
 
     @property
     def within(self) -> list[Placed | None]:
-        """Return the points that have a place; None for the others."""
+        """Return the points within the range; None for the others."""
         return [point and (None if point.on_edge else point) for point in self.points]
 
     @property
     def on_edge(self) -> list[Placed]:
-        """Return the points that have none."""
+        """Return the points on an edge."""
         return [point for point in self.points if point is not None and point.on_edge]
 
 

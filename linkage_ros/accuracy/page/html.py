@@ -188,7 +188,7 @@ def _on_edge(trace: dict[str, Any], named: bool) -> dict[str, Any]:
 
 
 def _arms(arms: Sequence[tuple[float, float] | None]) -> list[list[float]]:
-    """Return what is below the points, and what is above; nothing where no point has arms."""
+    """Return the lengths below and above the points; an empty list if no point has arms."""
     if not any(each and any(each) for each in arms):
         return []
     return [[each[side] if each else 0.0 for each in arms] for side in (0, 1)]

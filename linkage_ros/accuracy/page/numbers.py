@@ -44,7 +44,7 @@ _MOST_DIGITS = 4
 
 
 def cell_text(cell: Cell) -> str:
-    """Return what stands in a table: '' for nothing, '0.70 (0.68–0.75)' for a spread."""
+    """Return the text of a cell: '' for None, '0.70 (0.68–0.75)' for a spread."""
     if cell is None:
         return ''
     if isinstance(cell, str):
@@ -55,7 +55,7 @@ def cell_text(cell: Cell) -> str:
 
 
 def number_text(value: float | Integral) -> str:
-    """Return a number with three digits that count; a whole number as it is."""
+    """Return a number with three significant digits; an integer with all."""
     if isinstance(value, Integral):
         return str(int(value))
     value = float(value)
@@ -95,7 +95,7 @@ def spread_text(spread: Spread) -> str:
 
 
 def numeric_columns(table: Table) -> list[bool]:
-    """Say which columns of a table hold numbers, if only in some rows; they are set right."""
+    """Return which columns hold numbers, if only in some rows; they are aligned to the right."""
     return [
         any(isinstance(row[place], Real | Spread) for row in table.rows)
         for place in range(len(table.columns))
@@ -107,7 +107,7 @@ def _range(low: str, high: str) -> str:
 
 
 def _decimals(low: float, middle: float, high: float) -> int:
-    """Return how many decimals tell the quartiles apart, and the median from 0 if these let it."""
+    """Return the number of decimals that distinguish the quartiles, and the median from 0."""
     power = _power(middle or high or low)
     apart = ceil(-log10(high - low))
     wanted = min(max(1 - power, apart), apart + 1, _MOST_DIGITS - 1 - power)
@@ -126,7 +126,7 @@ _QUARTILES = ('low', 'middle', 'high')
 
 
 def table_csv(table: Table) -> str:
-    """Return a table as CSV; what is no spread in a column of spreads is in its middle."""
+    """Return a table as CSV; a number in a column of spreads stands in the middle one."""
     spreads = [
         any(isinstance(row[number], Spread) for row in table.rows)
         for number in range(len(table.columns))

@@ -27,7 +27,7 @@ from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.status import Status
 from linkage_ros.replay import own_joint_states
 from linkage_ros.report.blocks import Entry, Rows, rows_of, RunClock
-from linkage_ros.report.curves import MOST_LINKAGES, OwnCurves
+from linkage_ros.report.curves import MOST_LINKAGES, SceneCurves
 from linkage_ros.report.decimation import Flags, Numbers, Times
 from linkage_ros.report.diagnostics_summary import DiagnosticsSummary
 from linkage_ros.report.joint_states import JointBlock, JointStates
@@ -79,7 +79,7 @@ _MOST_SILENCES = 400
 _NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving picture'
 
 
-class OwnRun:
+class SceneRun:
     """
     Reads a run of a scene block by block.
 
@@ -88,7 +88,7 @@ class OwnRun:
     bag, run, scene
         The bag, what its run says of itself, and its scene.
     window
-        Which part is told.
+        The part of the run that is shown.
 
     Raises
     ------
@@ -143,7 +143,7 @@ class OwnRun:
         self._health = DiagnosticsSummary(self._lanes, from_beginning)
         bodies = sum(len(each.closure.structure.links) for each in self._linkages[:MOST_LINKAGES])
         topics = run.joint_states_topic, run.crank_topic
-        self._curves = OwnCurves(scene, topics, bodies, window)
+        self._curves = SceneCurves(scene, topics, bodies, window)
         period = round(1e9 / scene.rate) if scene.rate else 0
         self._silences = [Silences(each.silent, period) for each in self._linkages]
         self._stale = Silences(self._lanes['stale'], 0, pipeline.max_age)
