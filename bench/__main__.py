@@ -30,7 +30,6 @@ from bench.compiled import CompiledPlan, measure_arrays, measure_chains, measure
 from bench.empty_scene import EmptyPlan, measure_empty_scene
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
-from bench.processes import BenchError, Graph
 from bench.report import FOLDER, machine_table, PAGES, say, show, Table, write_page
 from bench.ticks import (
     asking,
@@ -43,6 +42,7 @@ from bench.ticks import (
     ours,
     TickPlan,
 )
+from linkage_ros.processes import Graph, MeasurementError
 
 SLOW, FAST = 1000.0, 10_000.0
 
@@ -116,7 +116,7 @@ def main() -> int:
                 tables += [measure_gallery(compiled_plan), measure_chains(compiled_plan, picture)]
                 arrays_plan = (1, 20_000) if arguments.quick else (11, 1_000_000)
                 tables.append(measure_arrays(folder, *arrays_plan))
-    except BenchError as error:
+    except MeasurementError as error:
         print(f'bench: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:

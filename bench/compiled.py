@@ -32,7 +32,7 @@ import shutil
 import subprocess
 import time
 
-from bench.processes import BenchError, ROOT
+from bench import ROOT
 from bench.report import in_turn, ratios, say, spread, Table
 from linkage_ros.kinematics.batch import Array
 from linkage_ros.kinematics.closure import Closure
@@ -40,6 +40,7 @@ from linkage_ros.kinematics.compiled.c import C
 from linkage_ros.kinematics.compiled.linkage import Compiled
 from linkage_ros.kinematics.compiled.source import source, Subject
 from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.processes import MeasurementError
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
 import numpy as np
@@ -278,7 +279,7 @@ def _measured(
     out = closure.solve(*inputs, rates=rates, accelerations=accelerations)
     in_c = _compiled(folder, closure, file)
     if in_c(inputs, values) or out.status.any():
-        raise BenchError(f'{file.stem}: not all states are closed')
+        raise MeasurementError(f'{file.stem}: not all states are closed')
     for one, other in zip(out[1:], values, strict=True):
         _agree(file.stem, one, other)
     found = in_turn(
@@ -321,7 +322,7 @@ def _compiled(folder: Path, closure: Closure, file: Path) -> _Solve:
         check=False,
     )
     if done.returncode:
-        raise BenchError(f'cc: {done.stderr.strip().splitlines()[-1]}')
+        raise MeasurementError(f'cc: {done.stderr.strip().splitlines()[-1]}')
     function = ctypes.CDLL(str(library)).solve_all
     array = np.ctypeslib.ndpointer(np.float64, flags='C_CONTIGUOUS')
     function.argtypes = [ctypes.c_long, array, array, array, array]
@@ -339,4 +340,4 @@ def _agree(name: str, one: Array, other: Array) -> None:
     """Refuse results that differ by more than rounding and whole turns."""
     off = np.abs(np.remainder(one - other + 1.0, 2.0 * np.pi) - 1.0) / (1.0 + np.abs(other))
     if not off.max() < _AGREEMENT:
-        raise BenchError(f'{name}: solve and C differ by {off.max():.2g}')
+        raise MeasurementError(f'{name}: solve and C differ by {off.max():.2g}')

@@ -29,11 +29,12 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from math import atan2, cos, sin, sqrt, tau
 
-from bench.processes import BenchError, ROOT
+from bench import ROOT
 from bench.report import compare, in_turn, say, Table
 from linkage_ros.kinematics.batch import Batch
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiled.linkage import Compiled
+from linkage_ros.processes import MeasurementError
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 import numpy as np
@@ -185,7 +186,7 @@ def _one_at_a_time(plan: SpeedPlan, table: Table) -> None:
     for angle in angles[:: plan.states // 10]:
         found = four_bar(angle, RATE, ACCELERATION)
         if found is None:
-            raise BenchError('four-bar: leaves the compiled way')
+            raise MeasurementError('four-bar: leaves the compiled way')
         for one, other in zip(found, line(angle, RATE, ACCELERATION), strict=True):
             _agree('straight line', one, other)
 
@@ -248,4 +249,4 @@ def _closure(name: str) -> Closure:
 def _agree(name: str, one: ArrayLike, other: ArrayLike) -> None:
     difference = float(np.max(np.abs(np.remainder(np.subtract(one, other) + 1.0, tau) - 1.0)))
     if not difference < _AGREEMENT:
-        raise BenchError(f'{name}: differs by {difference:.2g}')
+        raise MeasurementError(f'{name}: differs by {difference:.2g}')

@@ -24,7 +24,7 @@ import os
 from pathlib import Path
 import time
 
-from bench.processes import ROOT
+from bench import ROOT
 from linkage_ros.cli import tables
 from linkage_ros.measuring import alternating, describe_machine, spread_of
 from linkage_ros.pages.markdown import table_lines

@@ -24,9 +24,10 @@ from math import nan
 from pathlib import Path
 import time
 
-from bench.processes import BenchError, Graph, Process, ROOT
+from bench import ROOT
 from bench.report import ratios, say, spread, Table
 from linkage_ros.measuring import alternating
+from linkage_ros.processes import Graph, MeasurementError, Process
 
 
 def cpu_time(pid: int) -> tuple[int, int]:
@@ -272,7 +273,7 @@ def _measure(graph: Graph, contender: Contender, listener: Process, plan: TickPl
     duration = after['time'] - before['time']
     ticks = after['published'] - before['published']
     if ticks <= 0:
-        raise BenchError(f'{contender.name}: did not tick in {plan.window:g} s')
+        raise MeasurementError(f'{contender.name}: did not tick in {plan.window:g} s')
     return Measurement(
         cpu=(ran_then - ran) / ticks / 1e3,
         rate=ticks / duration * 1e9,
@@ -287,7 +288,7 @@ def _wait_for(condition: Callable[[], bool], process: Process) -> None:
     while not condition():
         process.check()
         if time.monotonic() > until:
-            raise BenchError(f'{process.name}: no joint state in {_APPEARING:g} s')
+            raise MeasurementError(f'{process.name}: no joint state in {_APPEARING:g} s')
         time.sleep(0.05)
 
 

@@ -37,11 +37,11 @@ from tempfile import TemporaryDirectory
 import time
 from typing import Any
 
-from bench.processes import BenchError, Graph
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from linkage_ros.joint_state import JointStateReader, JointStateWriter
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.processes import Graph, MeasurementError
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 from linkage_ros.shipped import shipped
@@ -205,7 +205,7 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
                 node.check()
             # 1: the memory of the last seconds had no room for all of a flood; it says so.
             node.check_end(1)
-        except BenchError as error:
+        except MeasurementError as error:
             return {}, [str(error)]
         log = (folder / 'linkage_node.log').read_text(errors='replace')
     findings = outcome['findings'] + _judged(log, outcome['tried'])

@@ -27,11 +27,11 @@ from tempfile import TemporaryDirectory
 import time
 from typing import Any
 
-from bench.processes import BenchError, Graph
 from campaigns.campaign import progress_lines
 from campaigns.endurance.accelerated import SCENES
 from campaigns.endurance.memory import Account, account_of, shortcomings, Usage, usage
 from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.processes import Graph, MeasurementError
 from rosbags.typesys import get_typestore, Stores
 
 _CRANK_RATE = 500
@@ -86,7 +86,7 @@ def run(minutes: float) -> DdsRun:
         done = DdsRun(minutes)
         try:
             _record(graph, scene, folder / 'bag', done)
-        except BenchError as error:
+        except MeasurementError as error:
             done.faults.append(str(error))
             return done
         done.faults += shortcomings(folder / 'bag')

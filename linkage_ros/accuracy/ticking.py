@@ -31,12 +31,9 @@ import json
 from math import sqrt
 import os
 from pathlib import Path
-import select
-import subprocess
-import sys
 import tempfile
 from time import monotonic
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
 from linkage_ros.drives.chirp import Chirp, curve
@@ -46,6 +43,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.survey import usual_inputs, Way
 from linkage_ros.measuring import Progress, Spread, spread_of
+from linkage_ros.processes import Graph, MeasurementError
 from linkage_ros.scene.linkage_text import linkage_text
 from linkage_ros.scene.scene import Scene
 
@@ -199,16 +197,18 @@ def use_states(folder: Path, linkage: Linkage, rate: float, seconds: float) -> l
         'crank_rate': CRANK_RATE,
         'use_rate': USE_RATE,
     }
-    node = ('linkage_ros.ros.linkage_node', '--ros-args', '-p', f'scene:={scene}')
+    graph = Graph(1 + os.getpid() % _DOMAINS, folder)
+    arguments = ('--ros-args', '-p', f'scene:={scene}')
     found = []
     with (
-        _process(folder, *node) as server,
-        _process(folder, 'linkage_ros.ros.consumer', json.dumps(task)) as consumer,
+        _in_one_line(),
+        graph.run('linkage_ros.ros.linkage_node', arguments) as server,
+        graph.run('linkage_ros.ros.consumer', [json.dumps(task)]) as consumer,
     ):
         for _ in range(2):
-            _answer(consumer, folder)
+            consumer.read(_PATIENCE)
             begun, spent = monotonic(), _processor_time(server.pid)
-            said = _answer(consumer, folder)
+            said = consumer.read(_PATIENCE)
             spent = _processor_time(server.pid) - spent
             found.append(
                 Used(
@@ -226,48 +226,13 @@ def use_states(folder: Path, linkage: Linkage, rate: float, seconds: float) -> l
 
 
 @contextmanager
-def _process(folder: Path, module: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
-    """Have a module run in a process of its own, on a graph that nobody else hears."""
-    environment = {
-        **os.environ,
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'ROS_DOMAIN_ID': str(1 + os.getpid() % _DOMAINS),
-        'ROS_LOG_DIR': str(folder),
-    }
-    # With this one inherited, the rclpy wheels believe that their library path is set already.
-    environment.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
-    with (folder / f'{module}.log').open('wb') as log:
-        process = subprocess.Popen(
-            [sys.executable, '-m', module, *arguments],
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=log,
-            start_new_session=True,  # Ctrl-C is for this process, which ends the others
-        )
+def _in_one_line() -> Iterator[None]:
+    """Let a process that does not do its part be an error that a user can read."""
     try:
-        yield process
-    finally:
-        process.terminate()
-        try:
-            process.wait(10.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        if process.stdout is not None:
-            process.stdout.close()
-
-
-def _answer(process: subprocess.Popen[bytes], folder: Path) -> dict[str, Any]:
-    """Return the next line of a consumer."""
-    assert process.stdout is not None
-    if select.select([process.stdout], [], [], _PATIENCE)[0]:
-        line = process.stdout.readline()
-        if line:
-            answer: dict[str, Any] = json.loads(line)
-            return answer
-    logs = [log.read_text(errors='replace').strip() for log in sorted(folder.glob('*.log'))]
-    last = next((text.splitlines()[-1] for text in logs if text), 'nothing was said')
-    raise LinkageError('ticking', f'node and subscriber did not meet: {last}', 'run it by hand')
+        yield
+    except MeasurementError as error:
+        reason = f'node and subscriber did not meet: {error}'
+        raise LinkageError('ticking', reason, 'run it by hand') from None
 
 
 def _processor_time(pid: int) -> float:

@@ -27,8 +27,8 @@ PACKAGE = 'linkage_ros'
 # Rooms by height: a room may import from below its own height, and from its neighbours as long
 # as no two import each other.
 HEIGHTS = (
-    ('errors', 'stop', 'regular_file', 'written', 'parameters', 'bounded_yaml', 'measuring'),
-    ('whole_file',),
+    ('errors', 'stop', 'regular_file', 'written', 'parameters', 'bounded_yaml'),
+    ('whole_file', 'measuring', 'processes'),
     ('kinematics', 'shipped', 'cdr', 'bag', 'pages'),
     ('joint_state', 'synthesis', 'dynamics', 'drawing', 'solvers', 'models'),
     ('joint_trajectory', 'multi_dof_joint_state', 'joint_effort', 'marker_array'),

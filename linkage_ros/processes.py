@@ -13,7 +13,12 @@
 # limitations under the License.
 
 
-"""A ROS graph of a benchmark's own: its processes, started, asked and ended by their pid."""
+"""
+Processes on a ROS graph of their own: started, asked, and ended by their pid.
+
+Each lives for a bounded time: an alarm outlives the change of program and any parent, so that no
+process is left running.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +34,6 @@ import sys
 import time
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-
 _PATIENCE = 15.0
 """How long a process may take to answer, in [s]."""
 
@@ -41,8 +44,15 @@ _MOST = 5 + (os.cpu_count() or 1)
 """How many processes may live at once."""
 
 
-class BenchError(Exception):
-    """A process of the benchmark did not do its part."""
+_BOUNDED = (
+    'import os, signal, sys; signal.alarm(int(sys.argv[1])); '
+    'os.execv(sys.executable, [sys.executable, *sys.argv[2:]])'
+)
+"""Runs Python with the arguments behind the first, for so many seconds at most."""
+
+
+class MeasurementError(Exception):
+    """A process, or something else that is measured, did not do its part."""
 
 
 class Process:
@@ -83,10 +93,12 @@ class Process:
         while b'\n' not in self._rest:
             left = until - time.monotonic()
             if left <= 0 or not select.select([self._popen.stdout], [], [], left)[0]:
-                raise BenchError(f'{self.name}: no answer for {patience:g} s{self._last_words()}')
+                raise MeasurementError(
+                    f'{self.name}: no answer for {patience:g} s{self._last_words()}'
+                )
             more = os.read(self._popen.stdout.fileno(), 1 << 16)
             if not more:
-                raise BenchError(f'{self.name}: ended without an answer{self._last_words()}')
+                raise MeasurementError(f'{self.name}: ended without an answer{self._last_words()}')
             self._rest += more
         line, self._rest = self._rest.split(b'\n', 1)
         return json.loads(line)
@@ -94,7 +106,7 @@ class Process:
     def check(self) -> None:
         """Raise where it has ended by itself."""
         if (code := self._popen.poll()) is not None:
-            raise BenchError(f'{self.name}: ended with {code}{self._last_words()}')
+            raise MeasurementError(f'{self.name}: ended with {code}{self._last_words()}')
 
     def end(self) -> None:
         """End it: ask, insist, and kill; only this very process."""
@@ -112,7 +124,7 @@ class Process:
     def check_end(self, *well: int) -> None:
         """Raise where it has ended otherwise than well: with 0, or another code that is given."""
         if self._popen.returncode not in (0, *well):
-            raise BenchError(
+            raise MeasurementError(
                 f'{self.name}: ended with {self._popen.returncode}{self._last_words()}'
             )
 
@@ -167,14 +179,15 @@ class Graph:
 
         """
         if len(self._alive) >= _MOST:
-            raise BenchError(f'{module}: {_MOST} processes run already')
+            raise MeasurementError(f'{module}: {_MOST} processes run already')
         name = module.rsplit('.', 1)[-1]
         log = self._folder / f'{name}.log'
-        command = ['-m', 'bench.bounded', str(self._longest), '-m', module, *arguments]
+        command = ['-c', _BOUNDED, str(self._longest), '-m', module, *arguments]
         with log.open('wb') as errors:
             popen = subprocess.Popen(
                 [sys.executable, *command],
-                cwd=ROOT,
+                # Where the modules of a checkout are found.
+                cwd=Path(__file__).parents[1],
                 env={**self._environment, **(more or {})},
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
