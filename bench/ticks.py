@@ -165,8 +165,6 @@ class Measurement:
         Of all its threads, in [µs] a tick.
     rate
         Ticks a second, as the listener tells.
-    unheard
-        Messages of the window that the listener did not get.
     waited
         For how much of the time its threads waited for a processor, all together: others had it.
     health
@@ -176,7 +174,6 @@ class Measurement:
 
     cpu: float
     rate: float
-    unheard: int
     waited: float
     health: dict[str, str]
 
@@ -277,7 +274,6 @@ def _measure(graph: Graph, contender: Contender, listener: Process, plan: TickPl
     return Measurement(
         cpu=(ran_then - ran) / ticks / 1e3,
         rate=ticks / duration * 1e9,
-        unheard=ticks - (after['received'] - before['received']),
         waited=(waited_then - waited) / duration,
         health=listener.ask('?')['health'],
     )

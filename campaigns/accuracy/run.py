@@ -46,8 +46,6 @@ from linkage_ros.kinematics.closure import Closure
 _PART = 20
 """Linkages that a process is given at a time: about a tenth of a second's work."""
 
-_FEWEST_ANGLES = 5
-
 
 class Part(NamedTuple):
     """Some linkages of a family, or the rest of them until there are cases enough."""

@@ -100,8 +100,6 @@ class Stalled:
     ----------
     plan
         What it was.
-    stalls_in
-        What stood still.
     account
         What the bag says of its messages.
     ticks, during
@@ -122,7 +120,6 @@ class Stalled:
     """
 
     plan: Plan
-    stalls_in: str
     account: Account = field(default_factory=dict)
     ticks: int = 0
     during: int = 0
@@ -165,7 +162,7 @@ def run(plan: Plan, *, frozen: bool) -> Stalled:
 
 
 def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
-    done = Stalled(plan, 'the process' if file else 'the kernel')
+    done = Stalled(plan)
     scene = work / 'scene.yaml'
     scene.write_text(
         _SCENE.format(linkage=_LINKAGE, rate=plan.rate, folder=folder, queue=plan.queue)
