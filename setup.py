@@ -138,7 +138,7 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={
         NAME: ['py.typed', '*.pyi'],
-        f'{NAME}.page': ['page.css', 'page.js'],
+        f'{NAME}.pages': ['page.css', 'page.js'],
         f'{NAME}.accuracy.page': ['page.css', 'page.js'],
         f'{NAME}.report': ['*.css', '*.js'],
     },

@@ -13,3 +13,7 @@
 # limitations under the License.
 
 """``make bench``: what a tick costs, how late it is, how long a sample takes."""
+
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]

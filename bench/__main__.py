@@ -26,17 +26,23 @@ from tempfile import TemporaryDirectory
 import time
 
 from bench.coming import ComersPlan, measure_comers
-from bench.compiled_arrays import measure_arrays
-from bench.compiled_steps import CompiledPlan, measure_chains, measure_gallery
+from bench.compiled import CompiledPlan, measure_arrays, measure_chains, measure_gallery
 from bench.empty_scene import EmptyPlan, measure_empty_scene
 from bench.kinematics_speed import measure_speed, SpeedPlan
 from bench.latency import LatencyPlan, measure_latency
-from bench.pages import FOLDER, PAGES, write_page
-from bench.processes import BenchError, Graph
-from bench.report import say, show, Table
-from bench.tick_tables import cost_table, lateness_table
-from bench.ticks import asking, bare, idiomatic, many, measure_ticks, ours, TickPlan
-from linkage_ros.accuracy.machine import describe_machine
+from bench.report import FOLDER, machine_table, PAGES, say, show, Table, write_page
+from bench.ticks import (
+    asking,
+    bare,
+    cost_table,
+    idiomatic,
+    lateness_table,
+    many,
+    measure_ticks,
+    ours,
+    TickPlan,
+)
+from linkage_ros.processes import Graph, MeasurementError
 
 SLOW, FAST = 1000.0, 10_000.0
 
@@ -76,7 +82,7 @@ def main() -> int:
     wanted = parts.get(arguments.only, arguments.only or 'abc')
     started = time.monotonic()
     begin = datetime.now().astimezone()
-    tables = [Table('machine', ('', ''), [*describe_machine(), ('begun', f'{begin:%F %T}')])]
+    tables = [machine_table(begin)]
     try:
         with TemporaryDirectory(prefix='linkage_ros_bench_') as name:
             folder = Path(name)
@@ -110,7 +116,7 @@ def main() -> int:
                 tables += [measure_gallery(compiled_plan), measure_chains(compiled_plan, picture)]
                 arrays_plan = (1, 20_000) if arguments.quick else (11, 1_000_000)
                 tables.append(measure_arrays(folder, *arrays_plan))
-    except BenchError as error:
+    except MeasurementError as error:
         print(f'bench: {error}', file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -119,7 +125,7 @@ def main() -> int:
     for table in tables:
         show(table)
     if arguments.write:
-        write_page(arguments.only, tables)
+        write_page(FOLDER / f'{arguments.only}.md', *PAGES[arguments.only], tables)
     arguments.runs.mkdir(parents=True, exist_ok=True)
     file = arguments.runs / f'bench_{begin:%Y-%m-%d_%H-%M-%S}.md'
     file.write_text('\n'.join(table.markdown() for table in tables), encoding='utf-8')

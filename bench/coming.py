@@ -29,10 +29,9 @@ from pathlib import Path
 import time
 from typing import Any
 
-from bench.cpu_time import cpu_time
-from bench.processes import BenchError, Graph, Process
 from bench.report import say, Table
-from bench.scenes import write_turning
+from bench.ticks import cpu_time, write_turning
+from linkage_ros.processes import Graph, MeasurementError, Process
 from linkage_ros.shipped import shipped
 
 _APPEARING = 15.0
@@ -173,6 +172,6 @@ def _heard(listener: Process, node: Process) -> dict[str, Any]:
     while not (heard := listener.ask('?'))['health']:
         node.check()
         if time.monotonic() > until:
-            raise BenchError(f'{node.name}: no diagnostics in {_APPEARING:g} s')
+            raise MeasurementError(f'{node.name}: no diagnostics in {_APPEARING:g} s')
         time.sleep(0.1)
     return dict(heard)

@@ -28,11 +28,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, cos, isclose, sin, sqrt
 
-from bench.in_turn import compare, in_turn
-from bench.processes import BenchError, ROOT
-from bench.report import Table
+from bench import ROOT
+from bench.report import compare, in_turn, Table
 from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
+from linkage_ros.processes import MeasurementError
 from linkage_ros.scene.load import parse_scene
 
 BEGIN = 1_700_000_000_000_000_000
@@ -68,9 +68,11 @@ def measure_empty_scene(plan: EmptyPlan) -> Table:
     (look,) = empty.tick(BEGIN).looks
     joints = JointStateReader(empty.lines[0].member.joints).read(by_hand(BEGIN))
     if isinstance(joints, Rejection) or look.reading is None:
-        raise BenchError('empty scene: publishes nothing')
+        raise MeasurementError('empty scene: publishes nothing')
     if not all(map(isclose, joints.angles, look.reading.joints)):
-        raise BenchError('empty scene: publishes something else than what is written by hand')
+        raise MeasurementError(
+            'empty scene: publishes something else than what is written by hand'
+        )
     times = [BEGIN + PERIOD * number for number in range(plan.ticks)]
 
     def all_of(tick: Callable[[int], object]) -> Callable[[], None]:
@@ -129,5 +131,5 @@ def _pipeline(text: str) -> Pipeline:
     angle, rate = _CRANK
     sample = JointStateWriter(pipeline.lines[0].member.inputs).write(BEGIN, [angle], [rate])
     if pipeline.offer(sample, BEGIN) is not None:
-        raise BenchError('empty scene: refuses its crank')
+        raise MeasurementError('empty scene: refuses its crank')
     return pipeline

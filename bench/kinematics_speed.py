@@ -13,26 +13,130 @@
 # limitations under the License.
 
 
-"""How fast linkages are solved with acceleration: one state at a time, and a million at once."""
+"""
+How fast linkages are solved with acceleration: one state at a time, and a million at once.
+
+They are compared with pylinkage, and with the formulas of a four-bar in one straight function: no
+status, no pose, no steps. That function serves linkages whose crank turns fully and passes no
+change point. Its arithmetic is that of `linkage_ros.kinematics.dyads.rrr` over
+`linkage_ros.kinematics.crank_diagonal`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import tau
+from importlib.util import find_spec
+from math import atan2, cos, sin, sqrt, tau
 
-from bench.in_turn import compare, in_turn
-from bench.kinematics_pylinkage import AVAILABLE, HAS_NUMBA, stepping
-from bench.kinematics_straight import straight_line
-from bench.processes import BenchError, ROOT
-from bench.report import say, Table
+from bench import ROOT
+from bench.report import compare, in_turn, say, Table
 from linkage_ros.kinematics.batch import Batch
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiled.linkage import Compiled
+from linkage_ros.processes import MeasurementError
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 import numpy as np
 from numpy.typing import ArrayLike
+
+try:
+    from pylinkage.actuators import Crank
+    from pylinkage.components import Ground
+    from pylinkage.dyads import RRRDyad
+    from pylinkage.simulation import Linkage
+except ImportError:
+    AVAILABLE = False
+else:
+    AVAILABLE = True
+
+HAS_NUMBA = find_spec('numba') is not None
+"""With it pylinkage compiles what finds all states in one call."""
+
+
+def stepping(
+    a: float, b: float, c: float, d: float, steps: int, rate: float, acceleration: float
+) -> tuple[Callable[[], object], Callable[[], object]]:
+    """
+    Return two functions that turn a four-bar once: state by state, and all states in one call.
+
+    Both find places, velocities and accelerations of its pins.
+
+    Parameters
+    ----------
+    a, b, c, d
+        Lengths of crank, coupler, rocker and ground.
+    steps
+        States of a turn.
+    rate, acceleration
+        The crank's, in [rad/s] and [rad/s²].
+
+    """
+    pivot, other = Ground(0.0, 0.0), Ground(d, 0.0)
+    crank = Crank(anchor=pivot, radius=a, angular_velocity=tau / steps)
+    pin = RRRDyad(anchor1=crank.output, anchor2=other, distance1=b, distance2=c)
+    linkage = Linkage([pivot, other, crank, pin])
+    linkage.set_input_velocity(crank, rate, acceleration)
+
+    def one_by_one() -> None:
+        for _ in linkage.step_with_derivatives(iterations=steps):
+            pass
+
+    def at_once() -> object:
+        return linkage.step_fast_with_kinematics(iterations=steps)
+
+    return one_by_one, at_once
+
+
+Joints = tuple[float, float]
+Solve = Callable[[float, float, float], tuple[Joints, Joints, Joints]]
+"""Takes the crank's angle, rate and acceleration and returns both joints' of each."""
+
+
+def straight_line(a: float, b: float, c: float, d: float, sign: float) -> Solve:
+    """Return the function of the four-bar with crank a, coupler b, rocker c and ground d."""
+    twice_a, apart, apart_square, root = 2.0 * a, d - a, (d - a) * (d - a), 2.0 * sqrt(a * d)
+    fold = (abs(d - a) - abs(b - c)) * (abs(d - a) + abs(b - c))
+    stretch = (b + c - a - d) * (a + b + c + d)
+    difference, lengths = (b - c) * (b + c), (d - a) * (d + a)
+    constant_more, constant_less = difference + apart_square, difference - apart_square
+    along = a * (d - a)
+
+    def solve(phi: float, rate: float, acceleration: float) -> tuple[Joints, Joints, Joints]:
+        half = 0.5 * phi
+        half_sine, half_cosine = sin(half), cos(half)
+        near, far = root * half_sine, root * half_cosine
+        near_square, far_square = near * near, far * far
+        square = apart_square + near_square
+        fold_root, stretch_root = sqrt(fold + near_square), sqrt(stretch + far_square)
+        cross = sign * fold_root * stretch_root
+        direction = atan2(
+            -twice_a * half_sine * half_cosine, apart + twice_a * half_sine * half_sine
+        )
+        more, less = constant_more + near_square, constant_less - near_square
+        coupler = direction + atan2(cross, more)
+        rocker = direction + atan2(cross, less)
+
+        p, q = (along - 0.5 * near * near) / square, 0.5 * near * far / square
+        cot_beta, cot_gamma = more / cross, less / cross
+        coupler_part, rocker_part = q * cot_gamma - p, q * cot_beta - p
+
+        bend = fold * (far / fold_root) * (far / fold_root)
+        bend -= stretch * (near / stretch_root) * (near / stretch_root)
+        bend = 0.25 * bend / square
+        swirl = q * (lengths / square) - 2.0 * q * (q * (difference / cross))
+        whirl = rate * rate
+        return (
+            (coupler - phi, rocker),
+            (rate * coupler_part - rate, rate * rocker_part),
+            (
+                acceleration * coupler_part + whirl * (swirl + cot_gamma * bend) - acceleration,
+                acceleration * rocker_part + whirl * (swirl + cot_beta * bend),
+            ),
+        )
+
+    return solve
+
 
 LENGTHS = (0.04, 0.12, 0.08, 0.1)
 """Crank, coupler, rocker and ground of config/linkages/four_bar.yaml."""
@@ -82,7 +186,7 @@ def _one_at_a_time(plan: SpeedPlan, table: Table) -> None:
     for angle in angles[:: plan.states // 10]:
         found = four_bar(angle, RATE, ACCELERATION)
         if found is None:
-            raise BenchError('four-bar: leaves the compiled way')
+            raise MeasurementError('four-bar: leaves the compiled way')
         for one, other in zip(found, line(angle, RATE, ACCELERATION), strict=True):
             _agree('straight line', one, other)
 
@@ -145,4 +249,4 @@ def _closure(name: str) -> Closure:
 def _agree(name: str, one: ArrayLike, other: ArrayLike) -> None:
     difference = float(np.max(np.abs(np.remainder(np.subtract(one, other) + 1.0, tau) - 1.0)))
     if not difference < _AGREEMENT:
-        raise BenchError(f'{name}: differs by {difference:.2g}')
+        raise MeasurementError(f'{name}: differs by {difference:.2g}')

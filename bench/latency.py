@@ -22,10 +22,10 @@ from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
 
-from bench.processes import Graph
-from bench.report import say, Table
-from bench.scenes import write_scene
-from bench.spread import percentile, ratios, spread
+from bench.report import ratios, say, spread, Table
+from bench.ticks import write_scene
+from linkage_ros.measuring import percentile
+from linkage_ros.processes import Graph
 
 TARGET = 1.25
 

@@ -20,13 +20,92 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from math import nan
 from pathlib import Path
 import time
 
-from bench.cpu_time import cpu_time
-from bench.processes import BenchError, Graph, Process
-from bench.report import say
-from bench.scenes import write_many, write_scene
+from bench import ROOT
+from bench.report import ratios, say, spread, Table
+from linkage_ros.measuring import alternating
+from linkage_ros.processes import Graph, MeasurementError, Process
+
+
+def cpu_time(pid: int) -> tuple[int, int]:
+    """Return what all threads of a process have run, and waited for a processor, in [ns]."""
+    run = waited = 0
+    for task in Path(f'/proc/{pid}/task').iterdir():
+        ran, queued, _ = map(int, (task / 'schedstat').read_text().split())
+        run += ran
+        waited += queued
+    return run, waited
+
+
+def write_scene(folder: Path, rate: float, record: bool = False) -> Path:
+    """
+    Write a scene and return its file.
+
+    Parameters
+    ----------
+    folder
+        Where to; a bag goes there too.
+    rate
+        Ticks a second; 0 for one for every sample.
+    record
+        Whether it is recorded.
+
+    """
+    file = folder / f'four_bar_{rate:g}{"_recorded" if record else ""}.yaml'
+    lines = [
+        f'linkage: {ROOT / "config" / "linkages" / "four_bar.yaml"}',
+        f'rate: {rate:g}',
+        'drive: {topic: {carry_forward: true, max_age: 0.2}}',
+        'effects: {velocity: {}}',
+    ]
+    if record:
+        lines.append(f'record: {{directory: {folder / "bags"}}}')
+    file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    return file
+
+
+def write_turning(folder: Path, rate: float) -> Path:
+    """Write a scene of a four-bar that turns by itself, at a rate in [Hz]; return its file."""
+    file = folder / f'turning_{rate:g}.yaml'
+    lines = [
+        f'linkage: {ROOT / "config" / "linkages" / "four_bar.yaml"}',
+        f'rate: {rate:g}',
+        'drive: {constant_rate: {rate: 1.0}}',
+        'effects: {velocity: {}}',
+    ]
+    file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    return file
+
+
+def write_many(folder: Path, rate: float, count: int) -> Path:
+    """
+    Write a scene of several four-bars that turn by themselves, each at a speed of its own.
+
+    Parameters
+    ----------
+    folder
+        Where to.
+    rate
+        Ticks a second.
+    count
+        How many.
+
+    """
+    file = folder / f'{count}_four_bars.yaml'
+    linkage = ROOT / 'config' / 'linkages' / 'four_bar.yaml'
+    lines = [f'rate: {rate:g}', 'effects: {velocity: {}}', 'linkages:']
+    for number in range(count):
+        lines += [
+            f'  - name: bar_{number}',
+            f'    linkage: {linkage}',
+            f'    drive: {{constant_rate: {{rate: {1.0 + 0.01 * number:g}}}}}',
+        ]
+    file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    return file
+
 
 _APPEARING = 15.0
 """How long a node may take to publish its first joint state, in [s]."""
@@ -86,8 +165,6 @@ class Measurement:
         Of all its threads, in [µs] a tick.
     rate
         Ticks a second, as the listener tells.
-    unheard
-        Messages of the window that the listener did not get.
     waited
         For how much of the time its threads waited for a processor, all together: others had it.
     health
@@ -97,7 +174,6 @@ class Measurement:
 
     cpu: float
     rate: float
-    unheard: int
     waited: float
     health: dict[str, str]
 
@@ -170,16 +246,14 @@ def measure_ticks(
         listener = stack.enter_context(graph.run('bench.listener'))
         for _ in range(busy):
             stack.enter_context(graph.run('bench.busy'))
-        for number in range(plan.rounds):
-            # There and back again, so that a drift of the machine favours no one.
-            for contender in contenders if number % 2 == 0 else reversed(contenders):
-                measured = _measure(graph, contender, listener, plan)
-                found[contender].append(measured)
-                say(
-                    f'  {number + 1}/{plan.rounds} {contender.name} at {contender.rate:g} Hz: '
-                    f'{measured.cpu:.1f} µs a tick, {measured.rate:.0f} ticks a second, '
-                    f'waited {measured.waited:.0%}'
-                )
+        for contender in alternating(contenders, plan.rounds):
+            measured = _measure(graph, contender, listener, plan)
+            found[contender].append(measured)
+            say(
+                f'  {len(found[contender])}/{plan.rounds} {contender.name} at '
+                f'{contender.rate:g} Hz: {measured.cpu:.1f} µs a tick, {measured.rate:.0f} ticks '
+                f'a second, waited {measured.waited:.0%}'
+            )
     return found
 
 
@@ -196,11 +270,10 @@ def _measure(graph: Graph, contender: Contender, listener: Process, plan: TickPl
     duration = after['time'] - before['time']
     ticks = after['published'] - before['published']
     if ticks <= 0:
-        raise BenchError(f'{contender.name}: did not tick in {plan.window:g} s')
+        raise MeasurementError(f'{contender.name}: did not tick in {plan.window:g} s')
     return Measurement(
         cpu=(ran_then - ran) / ticks / 1e3,
         rate=ticks / duration * 1e9,
-        unheard=ticks - (after['received'] - before['received']),
         waited=(waited_then - waited) / duration,
         health=listener.ask('?')['health'],
     )
@@ -211,5 +284,81 @@ def _wait_for(condition: Callable[[], bool], process: Process) -> None:
     while not condition():
         process.check()
         if time.monotonic() > until:
-            raise BenchError(f'{process.name}: no joint state in {_APPEARING:g} s')
+            raise MeasurementError(f'{process.name}: no joint state in {_APPEARING:g} s')
         time.sleep(0.05)
+
+
+Found = dict[Contender, list[Measurement]]
+
+
+def cost_table(title: str, ours: Contender, other: Contender, target: str, found: Found) -> Table:
+    """
+    Return the cost of a tick of ours beside that of another.
+
+    Parameters
+    ----------
+    title
+        Of the table.
+    ours, other
+        Whom to compare.
+    target
+        For the ratio; '' where there is none.
+    found
+        What was measured.
+
+    """
+    table = Table(title, ('', 'CPU µs a tick', 'ticks a second', 'ratio', 'target'))
+    ratio = ratios([m.cpu for m in found[ours]], [m.cpu for m in found[other]])
+    for contender in (ours, other):
+        table.rows.append(
+            (
+                contender.name,
+                spread([m.cpu for m in found[contender]]),
+                spread([m.rate for m in found[contender]], 0),
+                spread(ratio, 3) if contender is ours else '1',
+                target if contender is ours else '',
+            )
+        )
+    return table
+
+
+def lateness_table(contenders: Sequence[Contender], found: Found, load: str = '') -> Table:
+    """
+    Return how late ticks were and how many were lost, from start to end of every run.
+
+    Parameters
+    ----------
+    contenders
+        Whom to show: nodes that tell in their diagnostics.
+    found
+        What was measured.
+    load
+        What else ran.
+
+    """
+    table = Table(
+        f'lateness{load} from start to end of each run; target: no tick lost on a quiet core',
+        ('', 'p50 µs', 'p99 µs', 'longest µs', '> period', 'lost', 'of ticks', 'CPU µs',
+         'bag dropped', 'waited for CPU'),
+    )  # fmt: skip
+    for contender in contenders:
+        healths = [m.health for m in found[contender] if m.health]
+        table.rows.append(
+            (
+                f'{contender.name}, {contender.rate / 1e3:g} kHz',
+                spread([float(h['Lateness p50 (us)']) for h in healths], 0),
+                spread([float(h['Lateness p99 (us)']) for h in healths], 0),
+                f'{max((float(h["Lateness max (us)"]) for h in healths), default=nan):.0f}',
+                str(sum(int(h['Late by more than a period']) for h in healths)),
+                str(sum(int(h['Lost ticks']) for h in healths)),
+                str(sum(int(h['Events since startup']) for h in healths)),
+                spread([m.cpu for m in found[contender]]),
+                str(sum(_dropped(h) for h in healths)),
+                spread([100.0 * m.waited for m in found[contender]], 0) + ' %',
+            )
+        )
+    return table
+
+
+def _dropped(health: dict[str, str]) -> int:
+    return sum(int(value) for key, value in health.items() if key.startswith('Dropped: '))

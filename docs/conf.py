@@ -31,7 +31,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from linkage_ros import __version__
 
-from docs.website.made import put_in
+from docs.website.reference import put_in
 from docs.website.tutorial import PercentParser
 
 project = 'linkage_ros'

@@ -27,7 +27,7 @@ from pathlib import Path
 import sys
 
 from linkage_ros.accuracy.measure import measure_accuracy, PARTS
-from linkage_ros.accuracy.page.markdown import write_markdown
+from linkage_ros.accuracy.page.files import write_markdown
 from linkage_ros.scene.load import load_scene
 
 DOCS = Path(__file__).resolve().parent

@@ -24,13 +24,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from linkage_ros.accuracy.machine import describe_machine
 from linkage_ros.cli.cost import all_effects
 from linkage_ros.cli.tables import Table
+from linkage_ros.measuring import describe_machine
+from linkage_ros.pages.markdown import filled, table_lines
 
 PAGE = Path(__file__).resolve().parent / 'cost.md'
-BEGIN, END = '<!-- measured: begin -->', '<!-- measured: end -->'
-"""Between them stands what is measured; the rest of the page is written by hand."""
 
 _TICKS = 50_000
 _LEFT_OUT = ('governor', 'kernel', 'rclpy', 'middleware')
@@ -41,23 +40,16 @@ def main() -> int:
     """Measure and write."""
     table = all_effects(_TICKS)
     assert table is not None, 'nobody stops it'
-    PAGE.write_text(filled(PAGE.read_text('utf-8'), measured(table, describe_machine())), 'utf-8')
+    text = measured(table, describe_machine())
+    PAGE.write_text(filled(PAGE.read_text('utf-8'), 'measured', text), 'utf-8')
     return 0
-
-
-def filled(page: str, text: str) -> str:
-    """Return a page with a text between its marks."""
-    head, _, rest = page.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    return f'{head}{BEGIN}\n{text}\n{END}{tail}'
 
 
 def measured(table: Table, machine: Sequence[tuple[str, str]]) -> str:
     """Return what is measured as Markdown: the machine, and the table."""
     on = ', '.join(f'{name} {value}' for name, value in machine if name not in _LEFT_OUT)
-    rule = ['---:' if column.startswith('>') else '---' for column in table.columns]
-    rows = [[column.lstrip('>') for column in table.columns], rule, *table.rows]
-    lines = ['| ' + ' | '.join(row) + ' |' for row in rows]
+    heads = [column.lstrip('>') for column in table.columns]
+    lines = table_lines(heads, table.rows, [column.startswith('>') for column in table.columns])
     return '\n'.join([f'{table.title}; {on}.', '', *lines])
 
 

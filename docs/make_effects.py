@@ -23,7 +23,7 @@ every picture of runs of the scene that stands beside it. Run it in the checkout
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 import re
@@ -33,6 +33,7 @@ from typing import NamedTuple
 from linkage_ros.cli.parameter_tables import REGISTRIES, table_of
 from linkage_ros.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
 from linkage_ros.errors import FileError
+from linkage_ros.pages import markdown
 from linkage_ros.parameters import summary
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
@@ -101,8 +102,8 @@ def _draw(page: str) -> Iterator[Path]:
     # The page can be checked where matplotlib is missing.
     from .pictures import drives, faults, markers, mechanism, paper, sensors
 
-    rooms = (drives, mechanism, sensors, markers, faults)
-    draw = {name: picture for room in rooms for name, picture in room.PICTURES.items()}
+    modules = (drives, mechanism, sensors, markers, faults)
+    draw = {name: picture for module in modules for name, picture in module.PICTURES.items()}
     for section in sections(page):
         if section.scene:
             name = section.name.lower()
@@ -135,20 +136,14 @@ def filled(page: str) -> str:
     for section in sections(page):
         text = section.text
         for mark, made in (('order', order), ('refused', refused)):
-            if f'<!-- {mark}: begin -->' in text:
-                text = _between(text, mark, made())
+            if markdown.marks(mark)[0] in text:
+                text = markdown.filled(text, mark, made())
         if section.name in kinds:
             kind = kinds[section.name]
-            text = _between(text, 'place', place(kind, section.name))
-            text = _between(text, 'parameters', parameters(kind, section.name))
+            text = markdown.filled(text, 'place', place(kind, section.name))
+            text = markdown.filled(text, 'parameters', parameters(kind, section.name))
         parts.append(text)
     return ''.join(parts)
-
-
-def _between(text: str, mark: str, made: str) -> str:
-    head, begin, rest = text.partition(f'<!-- {mark}: begin -->\n')
-    _, end, tail = rest.partition(f'<!-- {mark}: end -->\n')
-    return f'{head}{begin}{made}\n{end}{tail}'
 
 
 def order() -> str:
@@ -212,13 +207,14 @@ def parameters(kind: str, name: str) -> str:
     _, heads, rows = table_of(kind, name)
     if len(heads) == 1:
         return 'It has no parameters.'
-    return _table(heads, [(f'`{row[0]}`', *row[1:]) for row in rows])
+    return '\n'.join(markdown.table_lines(heads, [(f'`{row[0]}`', *row[1:]) for row in rows]))
 
 
 def refused() -> str:
     """Return what is refused, each with what is then said."""
     scenes = yaml.safe_load(REFUSED.read_text('utf-8'))
-    return _table(('what', 'said'), [(each['what'], f'`{_said(**each)}`') for each in scenes])
+    rows = [(each['what'], f'`{_said(**each)}`') for each in scenes]
+    return '\n'.join(markdown.table_lines(('what', 'said'), rows))
 
 
 def _said(what: str, linkage: str, scene: str) -> str:
@@ -231,11 +227,6 @@ def _said(what: str, linkage: str, scene: str) -> str:
     except FileError as error:
         return str(error).removeprefix('here: ')
     raise AssertionError(f'{what}: is not refused')
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [heads, ('---',) * len(heads), *rows]
-    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
 
 
 if __name__ == '__main__':

@@ -12,17 +12,307 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Random linkages: one dyad of each type on a crank, and chains of three."""
+
+"""
+Random linkages: one dyad of each type on a crank, and chains of three.
+
+A linkage is made from a pose: pins are put where they shall be, and the links follow. So it closes
+at the crank angle that it was made at, whatever its dyads. Frames are plain (origin on the first
+pin, x axis towards the second) or anywhere: a file may have either.
+"""
 
 from __future__ import annotations
 
+from cmath import phase
 from collections.abc import Callable
+from dataclasses import replace
 from math import pi
 import random
 
-from campaigns.accuracy.builder import Builder
-from campaigns.accuracy.mechanism import CRANK, GROUND, Mechanism, Spot
-from campaigns.accuracy.random_dyads import add_prp, add_rpp, add_rpr, add_rrp, add_rrr
+from campaigns.accuracy.dyads import PRP, RPP, RPR, RRP, RRR
+from campaigns.accuracy.mechanism import CRANK, Dyad, GROUND, Mechanism, polar, Slide, Spot, Turn
+from flint import arb
+
+
+class Builder:
+    """
+    A linkage in the making.
+
+    Parameters
+    ----------
+    rng
+        Source of everything random.
+    phi
+        Crank angle of the pose.
+    plain
+        Whether the frames are plain.
+
+    """
+
+    def __init__(self, rng: random.Random, phi: float, plain: bool) -> None:
+        self.rng = rng
+        self.phi = phi
+        self.plain = plain
+        self.spread = 0.5
+        self.offset = 1.0
+        self._frames: dict[str, tuple[complex, complex]] = {GROUND: (0j, 1 + 0j)}
+        self._links: dict[str, dict[str, tuple[float, float]]] = {GROUND: {}}
+        self._sliders: dict[str, Slide] = {}
+        self._dyads: list[Dyad] = []
+        self._joints: dict[str, Turn | str] = {}
+        self._names = 0
+
+    def mechanism(self) -> Mechanism:
+        """Return what has been built."""
+        return Mechanism(self._links, self._sliders, tuple(self._dyads), self._joints)
+
+    def is_first(self) -> bool:
+        """Return whether no dyad has been added yet."""
+        return not self._dyads
+
+    def name(self, stem: str) -> str:
+        """Return a name that is not taken."""
+        self._names += 1
+        return f'{stem}{self._names}'
+
+    def length(self) -> float:
+        """Return a random length about 1."""
+        return float(10.0 ** self.rng.uniform(-self.spread, self.spread))
+
+    def direction(self) -> float:
+        """Return a random direction."""
+        return self.rng.uniform(-pi, pi)
+
+    def crank(self) -> Spot:
+        """Add the crank, from a pivot on the ground to a pin A."""
+        pivot, pin = 0j, polar(self.length(), self.phi)
+        if not self.plain:
+            pivot = polar(self.length(), self.direction())
+        self.put(GROUND, 'O', pivot)
+        origin = (
+            pivot if self.plain else pivot + polar(self.offset * self.length(), self.direction())
+        )
+        self._frames[CRANK] = (origin, polar(1.0, self.phi))
+        self._links[CRANK] = {}
+        self.put(CRANK, 'O', pivot)
+        self.put(CRANK, 'A', pivot + pin)
+        if self.plain:
+            self._links[CRANK]['A'] = (abs(pin), 0.0)
+        return Spot(CRANK, 'A')
+
+    def add_crank_by_points(self, points: dict[str, complex]) -> None:
+        """Add a crank whose frame lies in the ground's while the crank is at 0."""
+        self._frames[CRANK] = (0j, 1 + 0j)
+        self._links[CRANK] = {point: (z.real, z.imag) for point, z in points.items()}
+
+    def put(self, link: str, point: str, where: complex) -> None:
+        """Add a point to a link where it is in the pose."""
+        origin, unit = self._frames[link]
+        z = (where - origin) * unit.conjugate()
+        self._links[link][point] = (z.real, z.imag)
+
+    def where(self, spot: Spot) -> complex:
+        """Return where a point is in the pose."""
+        origin, unit = self._frames[spot.link]
+        return origin + unit * complex(*self._links[spot.link][spot.point])
+
+    def spot(self, link: str) -> Spot:
+        """Add a random point to a link."""
+        origin = next(iter(self._links[link]))
+        spot = Spot(link, self.name('P'))
+        where = self.where(Spot(link, origin)) + polar(self.length(), self.direction())
+        self.put(link, spot.point, where)
+        return spot
+
+    def link(self, stem: str, pins: dict[str, complex], axis: complex | None = None) -> str:
+        """Add a link by its pins; without an axis the first two fix a plain frame."""
+        name = self.name(stem)
+        first, *others = pins.values()
+        if not self.plain:
+            origin = first + polar(self.offset * self.length(), self.direction())
+            self._frames[name] = (origin, polar(1.0, self.direction()))
+        elif axis is None:
+            self._frames[name] = (first, (others[0] - first) / abs(others[0] - first))
+        else:
+            self._frames[name] = (first, axis)
+        self._links[name] = {}
+        for point, where in pins.items():
+            self.put(name, point, where)
+        if self.plain:
+            self._links[name][next(iter(pins))] = (0.0, 0.0)
+        if self.plain and axis is None:
+            self._links[name][list(pins)[1]] = (abs(others[0] - first), 0.0)
+        return name
+
+    def slide(self, line: complex, along: str, through: str, point: str, block: str | None) -> str:
+        """Add a slider whose line has a direction in the pose."""
+        name = self.name('s')
+        unit = self._frames[along][1]
+        local = line * unit.conjugate()
+        angle = 0.0
+        if self.plain and abs(local.imag) < 1e-12:
+            local = complex(round(local.real))
+        elif not self.plain:
+            local *= self.length()
+        if block is not None and not self.plain:
+            angle = phase(self._frames[block][1] * unit.conjugate())
+        self._sliders[name] = Slide(point, along, through, (local.real, local.imag), block, angle)
+        return name
+
+    def axis(self, link: str) -> complex:
+        """Return the direction of a link's x axis in the pose."""
+        return self._frames[link][1]
+
+    def add(self, dyad: Dyad, *joints: Turn | str) -> None:
+        """Add a dyad and what is published of it."""
+        self._dyads.append(dyad)
+        for joint in joints:
+            self._joints[self.name('joint')] = joint
+
+    def parent(self) -> str:
+        """Return a link that a published angle may be counted from."""
+        return self.rng.choice((GROUND, CRANK))
+
+
+_LEAST_SINE = 0.05
+"""Of the angle between the two lines of a dyad, in its pose."""
+
+
+def add_rrr(
+    build: Builder,
+    a: Spot,
+    d: Spot,
+    pin: complex | None = None,
+    *,
+    fold: bool = False,
+    stretch: bool = False,
+) -> list[str]:
+    """Add two links pinned together, at a given place or a random one."""
+    start, end = build.where(a), build.where(d)
+    where = start + polar(build.length(), build.direction()) if pin is None else pin
+    name = build.name('B')
+    one = build.link('link', {a.point: start, name: where})
+    two = build.link('link', {d.point: end, name: where})
+    side = 1 if _cross(end - start, where - start) > 0 else -1
+    dyad = RRR(one, two, a, d, name, 1, fold, stretch)
+    # The side that is told is the one for 0 < φ < π.
+    dyad = replace(dyad, side=side * dyad.side_at(arb(build.phi)))
+    build.add(dyad, Turn(build.parent(), one), Turn('ground', two))
+    return [one, two]
+
+
+def add_rrp(build: Builder, a: Spot, along: str) -> list[str]:
+    """Add a link whose far pin a slider, with or without a block, keeps on a line."""
+    start = build.where(a)
+    where = start + polar(build.length(), build.direction())
+    line = _line(build, along)
+    pin = build.name('B')
+    one = build.link('link', {a.point: start, pin: where})
+    links, block, point, on_line = [one], None, pin, where
+    if build.rng.random() < 0.5:
+        block, point, on_line = _block(build, pin, where, along)
+        links.append(block)
+    through = build.name('Q')
+    build.put(along, through, on_line - line * build.length() * build.rng.choice((1, -1)))
+    slider = build.slide(line, along, through, point, block)
+    side = 1 if ((where - start) * line.conjugate()).real > 0 else -1
+    build.add(RRP(one, a, pin, slider, side), Turn(build.parent(), one), slider)
+    return links
+
+
+def add_rpr(build: Builder, a: Spot, d: Spot) -> list[str]:
+    """Add a rod, straight or bent, that slides through a swivel."""
+    start, end = build.where(a), build.where(d)
+    straight = build.rng.random() < 0.4
+    line = polar(1.0, build.direction())
+    if straight:
+        line = (end - start) / abs(end - start) * build.rng.choice((1, -1))
+    rail = build.link('rail', {a.point: start}, axis=line)
+    links, block, point, on_line = [rail], None, d.point, end
+    if build.rng.random() < 0.5:
+        block, point, on_line = _block(build, d.point, end, rail)
+        links.append(block)
+    through = a.point
+    if not (straight and build.plain):
+        through = build.name('Q')
+        build.put(rail, through, on_line - line * build.length() * build.rng.choice((1, -1)))
+    elif block is not None:
+        # A block that stands beside its pin would move the line off the swivel.
+        point = d.point
+    slider = build.slide(line, rail, through, point, block)
+    side = 1 if ((end - start) * line.conjugate()).real > 0 else -1
+    build.add(RPR(rail, a, d, slider, side), Turn(build.parent(), rail), slider)
+    return links
+
+
+def add_prp(build: Builder, known: str, other: str) -> list[str]:
+    """Add a block on each of two lines, pinned together; the second block may be virtual."""
+    where = polar(build.length(), build.direction())
+    pin = build.name('B')
+    links, sliders = [], []
+    line = 0j
+    for i, along in enumerate((known, other)):
+        line = _line(build, along, line)
+        block, point, on_line = None, pin, where
+        if i == 0 or build.rng.random() < 0.5:
+            block, point, on_line = _block(build, pin, where, along)
+            links.append(block)
+        through = build.name('Q')
+        build.put(along, through, on_line - line * build.length() * build.rng.choice((1, -1)))
+        sliders.append(build.slide(line, along, through, point, block))
+    build.add(PRP(sliders[0], sliders[1], pin), *sliders)
+    return links
+
+
+def add_rpp(build: Builder, a: Spot, along: str) -> list[str]:
+    """Add a yoke on a line, and in its slot a pin or a block."""
+    start = build.where(a)
+    guide = build.where(build.spot(along)) + polar(build.length(), build.direction())
+    line = _line(build, along)
+    yoke_point, through = build.name('C'), build.name('Q')
+    yoke = build.link('yoke', {yoke_point: guide}, axis=build.axis(along))
+    build.put(along, through, guide - line * build.length())
+    outer = build.slide(line, along, through, yoke_point, yoke)
+    links, block, point, on_line = [yoke], None, a.point, start
+    if build.rng.random() < 0.5:
+        block, point, on_line = _block(build, a.point, start, yoke)
+        links.append(block)
+    slot = _line(build, along, line)
+    if build.plain and build.rng.random() < 0.5:
+        slot = line * 1j
+    start_of_slot = build.name('Q')
+    build.put(yoke, start_of_slot, on_line - slot * build.length() * build.rng.choice((1, -1)))
+    inner = build.slide(slot, yoke, start_of_slot, point, block)
+    build.add(RPP(a, inner, outer), inner, outer)
+    return links
+
+
+def _block(build: Builder, pin: str, where: complex, along: str) -> tuple[str, str, complex]:
+    """Add a block; return it, its point on the line, and where that is."""
+    axis = build.axis(along)
+    if build.rng.random() < 0.5:
+        return build.link('block', {pin: where}, axis=axis), pin, where
+    point = build.name('C')
+    beside = where + polar(0.3 * build.length(), build.direction())
+    return build.link('block', {pin: where, point: beside}, axis=axis), point, beside
+
+
+def _line(build: Builder, along: str, other: complex = 0j) -> complex:
+    """
+    Return a direction: that of the x axis of the link, or any; not along another.
+
+    Only the first dyad has lines along axes: two sliders on parallel lines of links that do not
+    turn cancel each other, and nothing moves, or nothing can be told.
+    """
+    line = polar(1.0, build.direction())
+    if build.plain and build.is_first() and build.rng.random() < 0.5:
+        line = build.axis(along) * build.rng.choice((1, -1))
+    return line if abs(_cross(line, other)) > _LEAST_SINE * abs(other) or not other else 1j * line
+
+
+def _cross(one: complex, other: complex) -> float:
+    return (one.conjugate() * other).imag
+
 
 Case = tuple[Mechanism, list[float]]
 """A linkage and the input angles to solve it at."""

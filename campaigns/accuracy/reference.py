@@ -12,26 +12,62 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The truth at one input angle, to fifty digits and more, or that there is none."""
+
+"""
+The truth at one input angle, to fifty digits and more, with its condition numbers.
+
+Where there is no solution, the reference says so. Where rounding of the inputs may decide whether
+there is one, the case is at a limit.
+
+Condition numbers κ = Σ|xᵢ ∂y/∂xᵢ| + |y| of positions, velocities and accelerations.
+
+The sum goes over all coordinates, directions and angles of the linkage, the input angle at its
+size within (-π, π], its rate and its acceleration. A published angle counts as π at least: a
+direction is a sum of angles of up to half a turn, and where they cancel, rounding stays. |y| is
+the sum of the sizes of what a joint is the difference of: the angles of two links, or their rates.
+
+A linkage of several dyads is solved one after the other, and what one hands on is a double. So it
+is a datum of all that follow. Let a stage return zₖ with an error of at most C·u·κₖ, κₖ its own
+condition. To first order the error of y is then at most C·u·Σ|∂y/∂zₖ|·κₖ: a sum over stages joins
+that over numbers, and a solver whose dyads are each within C·u·κ stays within it as a whole. No
+solver can do without: two data that come from one number are rounded each by itself, and what
+would cancel between them does not. The stages are
+
+- the angle between what the first dyad sees on crank and ground: φ and a direction of the file,
+  where that is not 0, at the size of the sum;
+- the angles and slides that a dyad finds, their rates and accelerations, with the κ of each;
+- the pins by which links are held, and the points that a later dyad is given, with their
+  velocities and accelerations, each coordinate at its own size: sums of what has been counted.
+
+All of it is the reference's: ∂y/∂zₖ is found by changing zₖ between two of its dyads.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum
+from math import inf, pi, remainder
 from typing import Any, NamedTuple
 
-from campaigns.accuracy.mechanism import CRANK, Key, Mechanism, Turn
+from campaigns.accuracy.mechanism import CRANK, GROUND, Key, Mechanism, Spot, Turn
 from campaigns.accuracy.motion import (
+    Array,
     conjugate,
     Constants,
     Handed,
+    handed_on,
+    imag,
     Motion,
     OpenError,
     ORDER,
+    Tangent,
+    turn_sizes,
+    turn_values,
     turning,
     UndecidedError,
 )
 from flint import arb, ctx
+import numpy as np
 
 PRECISIONS = (256, 512, 1024, 2048, 4096)
 """In bits; the next is taken where a result has fewer than 50 digits in common with all others."""
@@ -137,3 +173,240 @@ def series(values: Any) -> list[complex]:
     """Return a power series as doubles, all of its coefficients."""
     coefficients = [complex(c) for c in values.coeffs()]
     return coefficients + [0j] * (ORDER - len(coefficients))
+
+
+FACTORIALS = (1.0, 1.0, 2.0)
+
+_PRECISION = 1024
+_STEP = 300
+"""Exponent of the step of the differences: truncation and rounding are both beyond 50 digits."""
+
+
+def condition_numbers(
+    reference: Reference, truths: list[Truth], phi: list[float], alpha: list[float]
+) -> Array:
+    """
+    Return κ of all cases in doubles, [case, joint, derivative].
+
+    Parameters
+    ----------
+    reference
+        The linkage.
+    truths
+        Its solution in each case; all are closed.
+    phi, alpha
+        Input angles and accelerations.
+
+    """
+    mechanism = reference.mechanism
+    motions = [truth.motion for truth in truths]
+    values: dict[str | int, Array] = {}
+    for name in mechanism.links:
+        values[name] = np.array([series(m.unit[name]) for m in motions]).T
+    for name in mechanism.sliders:
+        values[name] = np.array([series(m.slide[name]) for m in motions]).real.T
+    for i in range(len(mechanism.dyads)):
+        values[i] = np.array([series(m.inverse[i]) for m in motions]).real.T
+    tangent = Tangent(
+        mechanism,
+        reference.constants(),
+        reference.numbers,
+        values,
+        {
+            handed.owner: np.array([series(_place(m, handed.owner)) for m in motions]).T
+            for handed in handed_on(mechanism)
+            if handed.what == 'x' and not handed.power
+        },
+        np.array([remainder(angle, 2 * pi) for angle in phi]),
+        np.array(alpha),
+        np.array([_opening(reference, angle) for angle in phi]),
+    )
+    kappa = np.empty((len(truths), len(mechanism.joints), 3))
+    for j, joint in enumerate(mechanism.joints.values()):
+        if isinstance(joint, Turn):
+            change = tangent.shown[joint.child] - tangent.shown[joint.parent]
+        else:
+            change = tangent.slide[joint]
+        kappa[:, j] = np.abs(change).sum(axis=2).T
+    return (kappa + _published(reference, motions)) * FACTORIALS
+
+
+def exact_condition_numbers(
+    reference: Reference, phi: float, alpha: float, apart: bool = False
+) -> Array | None:
+    """
+    Return κ of one case by differences in balls, [joint, derivative]; None where it is singular.
+
+    Parameters
+    ----------
+    reference
+        The linkage.
+    phi, alpha
+        Input angle and acceleration.
+    apart
+        Whether each number is to change by itself even where the linkage says what hangs together.
+
+    """
+    base = reference.solve(phi, alpha, _PRECISION)
+    if base.outcome is not Outcome.CLOSED:
+        return None
+    precision = base.precision
+    ctx.prec = precision
+    step = arb(2) ** -_STEP
+    numbers = reference.numbers
+    ties = reference.mechanism.ties
+    if ties is None or apart:
+        ties = tuple({key: value} for key, value in numbers.items() if value)
+    kappa = np.zeros((len(base.joints), 3))
+    exact = _coefficients(base)
+    found = handed_on(reference.mechanism)
+    conditions = [0.0] * len(found)
+
+    def add(changed: Truth) -> None:
+        nonlocal kappa
+        for j, (one, other) in enumerate(zip(exact, _coefficients(changed), strict=True)):
+            for k in range(3):
+                kappa[j, k] += abs(float((other[k] - one[k]) / step))
+        for i, handed in enumerate(found):
+            conditions[i] += abs(float(_change(base.motion, changed.motion, handed) / step))
+
+    for tie in ties:
+        varied: dict[Key, Any] = dict(numbers)
+        for key, change in tie.items():
+            varied[key] = arb(numbers[key]) + step * arb(change)
+        add(Reference(reference.mechanism, varied).solve(phi, alpha, precision))
+    turned = remainder(phi, 2 * pi)
+    add(reference.solve(arb(phi) + step * arb(turned), alpha, precision))
+    add(reference.solve(arb(phi) + step * arb(_opening(reference, phi)), alpha, precision))
+    add(reference.solve(phi, arb(alpha) * (1 + step), precision))
+    # By the rate ω, which a motion has as 1: y' is as ω, and y'' = g·ω² + h·α.
+    for j, y in enumerate(exact):
+        kappa[j, 1] += abs(float(y[1]))
+    still = _coefficients(reference.solve(phi, 0.0, precision))
+    for j, y in enumerate(still):
+        kappa[j, 2] += 2 * abs(float(y[2]))
+    # Half of the acceleration is what the rate makes of itself: as α is, it counts twice.
+    still_motion = reference.solve(phi, 0.0, precision).motion
+    for i, handed in enumerate(found):
+        if handed.what in {'turn', 'slide'} and handed.power:
+            of = base.motion if handed.power == 1 else still_motion
+            conditions[i] += handed.power * abs(_value(of, handed))
+    for i, handed in enumerate(found):
+        amount = step * arb(_size(base.motion, handed) + conditions[i])
+        changed = Reference(reference.mechanism, numbers, (handed, amount))
+        add(changed.solve(phi, alpha, precision))
+    kappa += _published(reference, [base.motion])[0]
+    if ties is reference.mechanism.ties:
+        # What hangs together may not move at all: κ would be 0, but terms as great as the
+        # crank's own rate and acceleration are rounded to come to that.
+        kappa[:, 1:] = np.maximum(kappa[:, 1:], (1.0, max(1.0, abs(alpha))))
+    return kappa * FACTORIALS
+
+
+def _coefficients(truth: Truth) -> list[list[Any]]:
+    return [[y[0], y[1], y[2]] for y in truth.joints]
+
+
+def _opening(reference: Reference, phi: float) -> float:
+    """Return the angle that the first dyad sees where it is a sum, and rounded; else 0."""
+    opening = reference.mechanism.opening()
+    return remainder(phi + opening, 2 * pi) if opening else 0.0
+
+
+def _published(reference: Reference, motions: list[Motion]) -> Array:
+    """Return the sizes of what published joints are differences of, [case, joint, power]."""
+    sizes = np.zeros((len(motions), len(reference.mechanism.joints), 3))
+    for j, joint in enumerate(reference.mechanism.joints.values()):
+        if isinstance(joint, Turn):
+            for link in {joint.child, joint.parent} - {GROUND}:
+                sizes[:, j] += turn_sizes(np.array([series(m.shown[link]) for m in motions]).T).T
+            sizes[:, j, 0] = pi
+        else:
+            sizes[:, j] = np.abs([series(m.slide[joint]) for m in motions])
+    return sizes
+
+
+def _place(motion: Motion, owner: str | Spot) -> Any:
+    return motion.at(owner) if isinstance(owner, Spot) else motion.held[owner]
+
+
+def _size(motion: Motion, handed: Handed) -> float:
+    """Return the size of what a dyad hands on."""
+    if handed.what == 'turn' and not handed.power:
+        return pi
+    return abs(_value(motion, handed))
+
+
+def _value(motion: Motion, handed: Handed) -> float:
+    owner, what, power = handed
+    if what == 'turn':
+        return float(turn_values(np.array([series(motion.shown[owner])]).T)[power, 0])
+    if what == 'slide':
+        return series(motion.slide[owner])[power].real
+    place = series(_place(motion, owner))[power]
+    return place.real if what == 'x' else place.imag
+
+
+def _change(motion: Motion, changed: Motion, handed: Handed) -> Any:
+    """Return by how much an angle or a slide is another one; of pins only their size counts."""
+    owner, what, power = handed
+    if what == 'turn':
+        return imag(changed.shown[owner] * conjugate(motion.shown[owner]))[power]
+    if what == 'slide':
+        return (changed.slide[owner] - motion.slide[owner])[power]
+    return 0
+
+
+UNIT_ROUNDOFF = 2.0**-53
+TOLERANCE = 16.0 * UNIT_ROUNDOFF
+"""As a part of all lengths, and of the condition number of what the links reach too far."""
+
+_LIMIT_PRECISION = 1024
+_LIMIT_STEP = 300
+
+
+def is_at_limit(reference: Reference, phi: float) -> bool:
+    """
+    Return whether a dyad is within the tolerance of a toggle, or of lines that are parallel.
+
+    What a dyad may reach farther is a length y(x) of the numbers x; the inputs' rounding changes
+    it by u·Σ|xᵢ ∂y/∂xᵢ|, which for a dyad at the end of a chain may be much more than u times all
+    lengths.
+    """
+    return any(abs(margin) <= tolerance for margin, tolerance in margins(reference, phi))
+
+
+def margins(reference: Reference, phi: float) -> list[tuple[float, float]]:
+    """Return for each dyad, up to the first that is open, its margin and the tolerance of it."""
+    base = _margins(reference, arb(phi))
+    step = arb(2) ** -_LIMIT_STEP
+    numbers = reference.numbers
+    conditions = [0.0] * len(base)
+
+    def add(changed: list[Any]) -> None:
+        for i in range(len(base)):
+            slope = float((changed[i] - base[i]) / step) if i < len(changed) else inf
+            conditions[i] += abs(slope)
+
+    for key, value in numbers.items():
+        if value:
+            varied: dict[Key, Any] = dict(numbers)
+            varied[key] = arb(value) * (1 + step)
+            add(_margins(Reference(reference.mechanism, varied), arb(phi)))
+    add(_margins(reference, arb(phi) + step * arb(remainder(phi, 2 * pi))))
+    size = reference.mechanism.size() * 2.0 ** -reference.constants().exponent
+    return [
+        (float(margin), TOLERANCE * (condition + size))
+        for margin, condition in zip(base, conditions, strict=True)
+    ]
+
+
+def _margins(reference: Reference, phi: Any) -> list[Any]:
+    ctx.prec = _LIMIT_PRECISION
+    motion: Motion = reference.motion(_LIMIT_PRECISION)
+    try:
+        motion.solve(phi, arb(0))
+        placed = len(reference.mechanism.dyads)
+    except (OpenError, UndecidedError):
+        placed = len(motion.inverse) + 1
+    return [dyad.margin(motion) for dyad in reference.mechanism.dyads[:placed]]

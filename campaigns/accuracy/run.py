@@ -12,6 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+
 """
 The campaign: what there is to be done, done in parts, by as many processes as are wanted.
 
@@ -27,16 +28,23 @@ import random
 from typing import NamedTuple
 
 from campaigns.accuracy.adversarial import ADVERSARIAL
-from campaigns.accuracy.judge import Findings, judge
+from campaigns.accuracy.judge import Findings, judge, QUANTITIES, Tally
 from campaigns.accuracy.mechanism import Mechanism
 from campaigns.accuracy.random_families import ANGLES, RANDOM
-from campaigns.accuracy.tally import Tally
-from campaigns.processes import results_of
+from campaigns.accuracy.reference import (
+    exact_condition_numbers,
+    FACTORIALS,
+    margins,
+    Outcome,
+    Reference,
+    UNIT_ROUNDOFF,
+)
+from campaigns.campaign import results_of
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.closure import Closure
 
 _PART = 20
 """Linkages that a process is given at a time: about a tenth of a second's work."""
-
-_FEWEST_ANGLES = 5
 
 
 class Part(NamedTuple):
@@ -87,7 +95,7 @@ def do(part: Part) -> tuple[Part, Tally]:
 
 
 def run(
-    work: list[Part], jobs: int, progress: Callable[[Part], None] | None = None
+    work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
 ) -> dict[str, Tally]:
     """
     Do all parts and return what was found by family.
@@ -99,12 +107,69 @@ def run(
     jobs
         How many processes; 1: this one.
     progress
-        Called with each part when it is done.
+        Called with the number of linkages of each part that is done.
 
     """
     tallies = {family: Tally() for family in (*RANDOM, *ADVERSARIAL)}
     for part, tally in results_of(do, work, jobs):
         tallies[part.family].merge(tally)
-        if progress is not None:
-            progress(part)
+        progress(part.size)
     return {family: tally for family, tally in tallies.items() if tally.counts}
+
+
+def show_case(seed: int, family: str, place: str) -> None:
+    """Print a linkage and, where the place is ``linkage:case``, all of a case."""
+    index, _, case = place.partition(':')
+    mechanism, phi, alpha = make(seed, family, int(index))
+    for link, points in mechanism.links.items():
+        print(f'{link}: {points}')
+    for name, slide in mechanism.sliders.items():
+        print(f'{name}: {slide}')
+    for dyad in mechanism.dyads:
+        print(dyad)
+    findings = examine(seed, family, int(index))
+    print(dict(findings.counts))
+    for number, note in findings.notes:
+        print(f'case {number}: {note}')
+    for quantity, errors in findings.errors.items():
+        number, joint, error = max(errors, key=lambda e: e[2])
+        print(f'worst {quantity}: {error:.3g} u·κ in case {number}, joint {joint}')
+    if case:
+        _show_angle(Reference(mechanism), phi[int(case)], alpha[int(case)])
+
+
+def _show_angle(reference: Reference, phi: float, alpha: float) -> None:
+    print(f'\nφ = {phi!r}, α = {alpha!r}')
+    for dyad, (margin, tolerance) in zip(
+        reference.mechanism.dyads, margins(reference, phi), strict=False
+    ):
+        print(
+            f'{type(dyad).__name__}: reaches {margin:.3g} farther than it must (± {tolerance:.1g})'
+        )
+    found: list[tuple[float, ...]] = []
+    try:
+        closure = Closure(reference.mechanism.linkage())
+        position = closure.position(phi)
+        print(f'package: {position.status.name}')
+        found.append(position.joints)
+        velocity = closure.velocity(position, 1.0)
+        found.append(velocity.joints)
+        found.append(closure.acceleration(position, velocity, alpha).joints)
+    except (DefinitionError, ArithmeticError, ValueError) as error:
+        print(f'package: {error!r}')
+    truth = reference.solve(phi, alpha)
+    print(f'truth: {truth.outcome.name} at {truth.precision} bits')
+    if truth.outcome is not Outcome.CLOSED:
+        return
+    kappa = exact_condition_numbers(reference, phi, alpha)
+    unit = 2.0 ** reference.constants().exponent
+    for j, (name, joint) in enumerate(reference.mechanism.joints.items()):
+        for k, quantity in enumerate(QUANTITIES):
+            size = unit if isinstance(joint, str) else 1.0
+            exact = float(truth.joints[j][k]) * FACTORIALS[k] * size
+            text = f'{name} {quantity}: truth {exact!r}'
+            if k < len(found) and found[k]:
+                text += f', package {found[k][j]!r}'
+            if kappa is not None:
+                text += f', u·κ {UNIT_ROUNDOFF * kappa[j, k] * size:.3g}'
+            print(text)

@@ -28,10 +28,8 @@ from pathlib import Path
 import sys
 import time
 
-from bench.report import say, show, Table
+from bench.report import machine_table, say, show, Table, write_page
 from campaigns.attacks import bags, files, graph, signals
-from campaigns.page import load, write_page
-from linkage_ros.accuracy.machine import describe_machine
 
 PAGE = Path('docs/recordings/attacks.md')
 
@@ -80,19 +78,12 @@ def main() -> int:
         all_found += findings
         for finding in findings:
             say(finding)
-    machine = Table('Machine', ('', ''), [*describe_machine()])
-    machine.rows.extend(
-        [
-            ('seed', str(given.seed)),
-            ('took', f'{time.monotonic() - began:.0f} s'),
-            ('begun', f'{begin:%F %T}'),
-            ('load in the end', load()),
-        ]
-    )
-    for table in (*tables, machine):
+    seconds = time.monotonic() - began
+    tables.append(machine_table(begin, ('seed', str(given.seed)), ('took', f'{seconds:.0f} s')))
+    for table in tables:
         show(table)
     if given.write:
-        write_page(PAGE, 'Attacks', INTRO, [*tables, machine])
+        write_page(PAGE, 'Attacks', INTRO, tables)
     return int(bool(all_found))
 
 

@@ -31,9 +31,9 @@ from pathlib import Path
 from random import Random
 from struct import Struct
 
-from campaigns.damage.subject import KINDS, make
+from campaigns.campaign import tried_in_parts
+from campaigns.damage.run import KINDS, make
 from campaigns.in_process import confined, Ended, in_process
-from campaigns.processes import tried_in_parts
 from linkage_ros.bag.metadata import METADATA_FILE
 from linkage_ros.bag.reading.reader import RUN_FILE
 from linkage_ros.bag.topic import Topic

@@ -25,16 +25,14 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
+from datetime import datetime
 from pathlib import Path
 import sys
 import time
 
-from bench.report import say, show, Table
-from campaigns.damage.judge import FAULT
-from campaigns.damage.run import JUDGES, parts, run, Tally
-from campaigns.damage.subject import KINDS
-from campaigns.page import write_page
-from linkage_ros.accuracy.machine import describe_machine
+from bench.report import machine_table, say, show, Table, write_page
+from campaigns.campaign import progress_lines
+from campaigns.damage.run import FAULT, JUDGES, KINDS, parts, run, Tally
 
 PAGE = Path('docs/recordings/damage.md')
 
@@ -64,21 +62,19 @@ def main() -> int:
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--write', action='store_true', help=f'keep the outcome in {PAGE}')
     arguments = parser.parse_args()
-    started = told = time.monotonic()
+    started, begin = time.monotonic(), datetime.now().astimezone()
     work = parts(['own'], arguments.seed, arguments.size, arguments.sample)
     others = [kind for kind in KINDS if kind != 'own']
     work += (
         parts(others, arguments.seed, arguments.size, arguments.others) if arguments.others else []
     )
     tally = Tally()
-    done, of = 0, sum(len(part.places) for part in work)
+    total = sum(len(part.places) for part in work)
+    progress = progress_lines(total, 'damages')
     try:
         for part, judged in run(work, arguments.jobs):
             tally.add(judged)
-            done += len(part.places)
-            if time.monotonic() - told > 10 or done == of:
-                told = time.monotonic()
-                say(f'{done:,} of {of:,} damages, {told - started:.0f} s')
+            progress(len(part.places))
     except KeyboardInterrupt:
         say('stopped')
         return 130
@@ -86,11 +82,14 @@ def main() -> int:
     tables = [table for table in tables if table.rows]
     for kind, damage, place, name, verdict in tally.faults:
         say(f'{name}, {kind}, {damage} {place}: {verdict}')
-    machine = Table('Machine', ('', ''), [*describe_machine()])
-    machine.rows.append(('seed', str(arguments.seed)))
     seconds = time.monotonic() - started
-    machine.rows.append(('damages', f'{of:,} in {seconds:.0f} s, {arguments.jobs} processes'))
-    tables.append(machine)
+    tables.append(
+        machine_table(
+            begin,
+            ('seed', str(arguments.seed)),
+            ('damages', f'{total:,} in {seconds:.0f} s, {arguments.jobs} processes'),
+        )
+    )
     for table in tables:
         show(table)
     if arguments.write:

@@ -13,21 +13,223 @@
 # limitations under the License.
 
 
-"""The campaign's parts: which damages, shared out among processes."""
+"""
+Bags are damaged, read and recovered; a verdict holds the outcome against what is true of them.
+
+The bags are a node's own, and others as other writers leave them. The damages are shared among
+processes.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+import os
 from pathlib import Path
 from random import Random
 import tempfile
 from typing import NamedTuple
 
-from campaigns.damage.judge import FAULT, judge_reading, judge_salvage
-from campaigns.damage.subject import make, Subject
-from campaigns.processes import results_of
+from campaigns.campaign import results_of
+from linkage_ros.bag.reading.reader import BagMessage, read_bag, topic_of
+from linkage_ros.bag.reading.records import Message, Source
+from linkage_ros.bag.recovering.salvage import Salvage
+from linkage_ros.bag.topic import QosProfile, Topic
+from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.errors import BagError
+from mcap.reader import make_reader
+from mcap.records import Attachment
+from mcap.writer import CompressionType, Writer
+
+START = 1_700_000_000_000_000_000
+KILLED = 'own, killed'
+TYPE = 'sensor_msgs/msg/JointState'
+DEFINITION = 'std_msgs/Header header\nstring[] name\nfloat64[] position\n' + '# text\n' * 100
+ATTACHMENTS = {
+    'scene.yaml': ('text/yaml', b'linkage: four_bar.yaml\nrate: 1000\n' * 10),
+    'linkage.yaml': ('text/yaml', b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n' * 10),
+    'empty': ('text/plain', b''),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """A bag's folder, its one file as it is undamaged, and what it holds."""
+
+    folder: Path
+    file: Path
+    content: bytes
+    messages: list[BagMessage]
+    topics: tuple[Topic, ...]
+    attachments: Mapping[str, bytes]
+
+
+def make(kind: str, folder: Path, seed: int, size: int) -> Subject:
+    """Make a bag of this kind with a file of about so many bytes."""
+    random = Random(f'{seed} {kind}')
+    count = max(size // 240, 20)
+    messages = []
+    for number in range(count):
+        stamp = START + number * 1_000_000
+        data = b'\x00\x01\x00\x00' + random.randbytes(random.randrange(60, 300))
+        messages.append((number % 2, stamp + random.randrange(-9999, 9999), stamp, data))
+    topics = (
+        Topic('/crank', TYPE, DEFINITION, 'RIHS01_' + '0a' * 32, QosProfile(depth=5)),
+        Topic('/arm/joint_states', TYPE, DEFINITION, 'RIHS01_' + '0a' * 32),
+    )
+    file = KINDS[kind](folder, topics, messages)
+    named = folder if (folder / 'metadata.yaml').exists() else file
+    bag = read_bag(named, allow_truncated=kind == KILLED)
+    expected = [BagMessage(topics[topic].name, *rest) for topic, *rest in messages]
+    assert list(bag.messages()) == expected, 'undamaged, it is not what was written'
+    return Subject(folder, file, file.read_bytes(), expected, bag.topics, bag.attachments)
+
+
+def _own(folder: Path, topics: tuple[Topic, ...], messages: list[tuple[int, int, int, bytes]]):
+    writer = BagWriter(folder, topics, ATTACHMENTS)
+    for number, message in enumerate(messages):
+        writer.write(*message)
+        if number % 50 == 49:
+            writer.flush()
+    writer.close({'seed': '7'})
+    return folder / f'{folder.name}_0.mcap'
+
+
+def _killed(folder: Path, topics: tuple[Topic, ...], messages: list[tuple[int, int, int, bytes]]):
+    """Write one that ends behind its last chunk, where a kill after a flush leaves it."""
+    file = _own(folder, topics, messages)
+    with file.open('rb') as stream:
+        last = make_reader(stream).get_summary().chunk_indexes[-1]
+    os.truncate(file, last.chunk_start_offset + last.chunk_length + last.message_index_length)
+    return file
+
+
+def _by_mcap(**options: object) -> Callable[..., Path]:
+    """Return what writes a file by mcap's writer with these options, and no metadata.yaml."""
+
+    def write(folder: Path, topics: tuple[Topic, ...], messages) -> Path:
+        folder.mkdir(parents=True)
+        file = folder / f'{folder.name}_0.mcap'
+        with file.open('wb') as stream:
+            writer = Writer(stream, chunk_size=12_000, **options)
+            writer.start(profile='ros2')
+            for name, (media_type, data) in ATTACHMENTS.items():
+                writer.add_attachment(0, START, name, media_type, data)
+            schema = writer.register_schema(TYPE, 'ros2msg', DEFINITION.encode())
+            channels = [writer.register_channel(t.name, 'cdr', schema) for t in topics]
+            for topic, log_time, publish_time, data in messages:
+                writer.add_message(channels[topic], log_time, data, publish_time)
+            writer.finish()
+        return file
+
+    return write
+
+
+KINDS: dict[str, Callable[..., Path]] = {
+    'own': _own,
+    KILLED: _killed,
+    'lz4': _by_mcap(compression=CompressionType.LZ4),
+    'zstd': _by_mcap(compression=CompressionType.ZSTD),
+    'no index': _by_mcap(
+        compression=CompressionType.NONE,
+        use_statistics=False,
+        use_summary_offsets=False,
+        repeat_channels=False,
+        repeat_schemas=False,
+    ),
+    'no chunks, all data under one checksum': _by_mcap(
+        use_chunking=False, enable_data_crcs=True, compression=CompressionType.NONE
+    ),
+}
+
+
+FAULT = 'FAULT: '
+"""What a verdict that must not be begins with."""
+
+
+def judge_reading(subject: Subject, *, allow_truncated: bool) -> str:
+    """Read the bag's file as it lies there now; return a verdict."""
+    given: list[BagMessage] = []
+    try:
+        bag = read_bag(subject.file, allow_truncated=allow_truncated)
+    except BagError:
+        return 'refused'
+    except Exception as error:  # noqa: BLE001
+        return f'{FAULT}{type(error).__name__}'
+    end = 'says nothing'
+    try:
+        given.extend(bag.messages())
+    except BagError:
+        end = 'says so'
+    except Exception as error:  # noqa: BLE001
+        return f'{FAULT}{type(error).__name__}'
+    if bag.truncated:
+        end = 'says so'
+    if not _is_subset(bag.topics, subject.topics):
+        return f'{FAULT}a false topic'
+    if not bag.attachments.items() <= subject.attachments.items():
+        return f'{FAULT}a false attachment'
+    complete = len(bag.attachments) == len(subject.attachments)
+    return _verdict(given, subject.messages, end, complete=complete)
+
+
+def judge_salvage(subject: Subject) -> str:
+    """Look for what is whole in the bag's file as it lies there now; return a verdict."""
+    given: list[BagMessage] = []
+    attachments: dict[str, bytes] = {}
+    channels = {}
+    try:
+        with subject.file.open('rb') as stream:
+            salvage = Salvage(Source(stream))
+            for found in salvage.found():
+                if isinstance(found, Message):
+                    channels[id(found.channel)] = found.channel
+                    given.append(
+                        BagMessage(
+                            found.channel.topic, found.log_time, found.publish_time, found.data
+                        )
+                    )
+                elif isinstance(found, Attachment):
+                    attachments[found.name] = found.data
+    except Exception as error:  # noqa: BLE001
+        return f'{FAULT}{type(error).__name__}'
+    known = salvage.data.definitions
+    topics = [topic_of(channel, known.schema_of(channel)) for channel in channels.values()]
+    if not _is_subset(topics, subject.topics):
+        return f'{FAULT}a false topic'
+    if not attachments.items() <= subject.attachments.items():
+        return f'{FAULT}a false attachment'
+    end = 'says so' if salvage.losses else 'says nothing'
+    complete = len(attachments) == len(subject.attachments)
+    return _verdict(given, subject.messages, end, complete=complete)
+
+
+def _verdict(
+    given: Sequence[BagMessage], true: Sequence[BagMessage], end: str, *, complete: bool
+) -> str:
+    if given == true:
+        amount = 'all' if complete else 'all messages'
+    elif _is_part(given, true):
+        amount = 'a part' if given else 'none'
+    else:
+        return f'{FAULT}a false message'
+    if amount != 'all' and end == 'says nothing':
+        return f'{FAULT}{amount}, and says nothing'
+    return f'{amount}, {end}'
+
+
+def _is_part(given: Sequence[BagMessage], true: Sequence[BagMessage]) -> bool:
+    """Say whether these are some of those, in their order."""
+    if given == true[: len(given)]:
+        return True
+    rest = iter(true)
+    return all(message in rest for message in given)
+
+
+def _is_subset(some: Iterable[object], those: Sequence[object]) -> bool:
+    return all(each in those for each in some)
+
 
 _PART = 4000
 """Damages that a process takes at a time."""

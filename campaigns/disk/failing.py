@@ -23,11 +23,17 @@ import shutil
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from campaigns.disk.faults import FAULTS
-from campaigns.disk.injection import can_befall, Injection, run, Seen
-from campaigns.disk.judge import Expectation, judge, Outcome
-from campaigns.disk.subject import expected_messages, MESSAGES, record, SETTINGS
-from campaigns.processes import results_of
+from campaigns.campaign import results_of
+from campaigns.disk.injection import can_befall, FAULTS, Injection, run, Seen
+from campaigns.disk.judge import (
+    Expectation,
+    expected_messages,
+    judge,
+    MESSAGES,
+    Outcome,
+    record,
+    SETTINGS,
+)
 
 _PART = 20
 

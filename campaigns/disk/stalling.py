@@ -29,12 +29,12 @@ from tempfile import TemporaryDirectory
 from time import monotonic, sleep, time_ns
 from typing import NamedTuple
 
-from bench.processes import BenchError, Graph
-from campaigns.disk.small_disks import Disk, mounted
-from campaigns.endurance.account import Account, account_of
+from campaigns.disk.filling import Disk, mounted
+from campaigns.endurance.memory import Account, account_of
 from linkage_ros.bag.metadata import METADATA_FILE
 from linkage_ros.bag.reading.reader import read_bag
 from linkage_ros.errors import BagError
+from linkage_ros.processes import Graph, MeasurementError
 
 _FREEZE, _THAW = 0xC0045877, 0xC0045878
 _DISK = Disk('ext4, 256 MiB', 'ext4', 256)
@@ -100,8 +100,6 @@ class Stalled:
     ----------
     plan
         What it was.
-    stalls_in
-        What stood still.
     account
         What the bag says of its messages.
     ticks, during
@@ -122,7 +120,6 @@ class Stalled:
     """
 
     plan: Plan
-    stalls_in: str
     account: Account = field(default_factory=dict)
     ticks: int = 0
     during: int = 0
@@ -165,7 +162,7 @@ def run(plan: Plan, *, frozen: bool) -> Stalled:
 
 
 def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
-    done = Stalled(plan, 'the process' if file else 'the kernel')
+    done = Stalled(plan)
     scene = work / 'scene.yaml'
     scene.write_text(
         _SCENE.format(linkage=_LINKAGE, rate=plan.rate, folder=folder, queue=plan.queue)
@@ -196,7 +193,7 @@ def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
         if plan.comes_back:
             # A run that lost messages is no success.
             node.check_end(*((1,) if _drops(plan) else ()))
-    except BenchError as error:
+    except MeasurementError as error:
         done.faults.append(str(error))
         return done
     _look(done, folder / 'bag', begin, end)

@@ -22,7 +22,7 @@ the disk has the time that is left out here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import cos, sin, tau
@@ -34,9 +34,8 @@ import time
 from typing import Any, NamedTuple
 
 from bench.report import say
-from campaigns.endurance.account import shortcomings
-from campaigns.endurance.memory import Usage, usage
-from campaigns.endurance.telling import telling
+from campaigns.campaign import progress_lines
+from campaigns.endurance.memory import shortcomings, Usage, usage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.recorder import Recorder, RecordingSummary
 from linkage_ros.bag.writing.storage import Storage
@@ -119,21 +118,17 @@ class Run:
 def run_all(plans: Sequence[Plan], jobs: int) -> list[Run]:
     """Run, some at once, each in a process of its own: what one leaves free hides growth."""
     with multiprocessing.get_context('spawn').Pool(jobs, maxtasksperchild=1) as pool:
-        return list(pool.imap(_run_and_tell, plans))
+        return list(pool.imap(run, plans))
 
 
-def _run_and_tell(plan: Plan) -> Run:
+def run(plan: Plan) -> Run:
+    """Run, and hold the bag against what was counted."""
     say(f'{plan.name}: {plan.hours:g} h at {plan.rate:g} Hz')
-    return run(plan, telling(f'of {plan.hours:g} h, {plan.name}'))
-
-
-def run(plan: Plan, told: Callable[[float], None] = lambda hours: None) -> Run:
-    """Run, and hold the bag against what was counted; ``told`` takes the hours done."""
     with TemporaryDirectory(prefix='linkage_ros_endurance_') as name:
-        return _run(plan, Path(name), told)
+        return _run(plan, Path(name))
 
 
-def _run(plan: Plan, folder: Path, told: Callable[[float], None]) -> Run:
+def _run(plan: Plan, folder: Path) -> Run:
     scene = _scene(plan, folder)
     pending: list[tuple[bytes, dict[str, Any]]] = []
     take = partial(_take, pending)
@@ -153,6 +148,7 @@ def _run(plan: Plan, folder: Path, told: Callable[[float], None]) -> Run:
     crank = JointStateWriter(scene.members[0].inputs).write
     period, ticks = round(NANOSECONDS / plan.rate), round(plan.hours * 3600.0 * plan.rate)
     between = max(ticks // 144, 1)  # of 24 h ten minutes
+    progress = progress_lines(ticks, f'ticks of {plan.name}')
     begin = time.monotonic()
     samples = [usage(0.0)]
     for tick in range(1, ticks + 1):
@@ -167,7 +163,7 @@ def _run(plan: Plan, folder: Path, told: Callable[[float], None]) -> Run:
         if tick % between == 0:
             _wait_for(recorder, 0)
             samples.append(usage(tick / plan.rate))
-            told(tick / plan.rate / 3600.0)
+            progress(between)
     seconds = time.monotonic() - begin
     summary = recorder.stop(timeout=60.0)
     done = Run(plan, samples, summary, loop.counts.published, seconds)

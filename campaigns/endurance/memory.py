@@ -13,16 +13,55 @@
 # limitations under the License.
 
 
-"""What a process holds: memory, open files, threads; and whether that is flat."""
+"""What a process holds: memory, open files, threads; is it flat? And what a bag counts."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from itertools import combinations
+import json
 from pathlib import Path
 import re
 from statistics import median
 from typing import NamedTuple
+
+from linkage_ros.bag.account import ACCOUNT
+from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.errors import BagError
+from mcap.reader import make_reader
+
+Account = dict[str, dict[str, int]]
+
+
+def account_of(folder: Path) -> Account:
+    """Return what the bag's last file says of each topic: received, recorded, dropped, let go."""
+    with read_bag(folder).files[-1].open('rb') as stream:
+        said = {record.name: record.metadata for record in make_reader(stream).iter_metadata()}
+    return {word: json.loads(text) for word, text in said.get(ACCOUNT, {}).items()}
+
+
+def shortcomings(folder: Path) -> list[str]:
+    """Return what does not add up in a bag, or is not there."""
+    try:
+        bag = read_bag(folder)
+        counts = Counter(message.topic for message in bag.messages())
+        account = account_of(folder)
+    except BagError as error:
+        return [str(error)]
+    if not account:
+        return ['the bag has no account']
+    found = []
+    for topic, received in account['received'].items():
+        kept = account['recorded'][topic]
+        if kept != counts[topic]:
+            found.append(f'{topic}: {kept} recorded by the account, {counts[topic]} in the bag')
+        if received != kept + account['dropped'][topic] + account['let_go'][topic]:
+            found.append(f'{topic}: the account does not close')
+        if account['dropped'][topic]:
+            found.append(f'{topic}: {account["dropped"][topic]} dropped')
+    return found
+
 
 WARM_UP = 0.25
 """The part of a run that is not judged: buffers, caches and pools fill."""

@@ -17,7 +17,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 import json
 import os
@@ -28,11 +27,11 @@ from tempfile import TemporaryDirectory
 import time
 from typing import Any
 
-from bench.processes import BenchError, Graph
+from campaigns.campaign import progress_lines
 from campaigns.endurance.accelerated import SCENES
-from campaigns.endurance.account import Account, account_of, shortcomings
-from campaigns.endurance.memory import Usage, usage
+from campaigns.endurance.memory import Account, account_of, shortcomings, Usage, usage
 from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.processes import Graph, MeasurementError
 from rosbags.typesys import get_typestore, Stores
 
 _CRANK_RATE = 500
@@ -73,9 +72,9 @@ class DdsRun:
     faults: list[str] = field(default_factory=list)
 
 
-def run(minutes: float, told: Callable[[float], None] = lambda minutes: None) -> DdsRun:
+def run(minutes: float) -> DdsRun:
     """
-    Run the demo over DDS, on a graph of its own; ``told`` takes the minutes done.
+    Run the demo over DDS, on a graph of its own.
 
     Its bag is split once a minute, since the index of a file stays in memory until its end.
     """
@@ -86,8 +85,8 @@ def run(minutes: float, told: Callable[[float], None] = lambda minutes: None) ->
         graph = Graph(2 + os.getpid() % 100, folder, longest=round(60.0 * minutes) + 120)
         done = DdsRun(minutes)
         try:
-            _record(graph, scene, folder / 'bag', done, told)
-        except BenchError as error:
+            _record(graph, scene, folder / 'bag', done)
+        except MeasurementError as error:
             done.faults.append(str(error))
             return done
         done.faults += shortcomings(folder / 'bag')
@@ -99,9 +98,7 @@ def run(minutes: float, told: Callable[[float], None] = lambda minutes: None) ->
         return done
 
 
-def _record(
-    graph: Graph, scene: Path, bag: Path, done: DdsRun, told: Callable[[float], None]
-) -> None:
+def _record(graph: Graph, scene: Path, bag: Path, done: DdsRun) -> None:
     """Run node and source, and look at the node; both are ended, the node with its bag closed."""
     node_arguments = ['--ros-args', '-p', f'scene:={scene}']
     with graph.run('linkage_ros.ros.linkage_node', node_arguments) as node:
@@ -114,11 +111,12 @@ def _record(
             begin = time.monotonic()
             seconds = 60.0 * done.minutes
             step = max(seconds / _LOOKS, min(1.0, seconds / 40))
+            progress = progress_lines(seconds, 's over DDS')
             while (now := time.monotonic() - begin) < seconds:
                 node.check()
                 source.check()
                 done.samples.append(usage(now, node.pid))
-                told(now / 60.0)
+                progress(step)
                 time.sleep(max(0.0, begin + step * len(done.samples) - time.monotonic()))
     node.check_end()
     source.check_end()
@@ -144,10 +142,10 @@ def _ticks(bag: Path) -> dict[str, str]:
             last = message.data
     if not last:
         return {}
-    told: Any = store.deserialize_cdr(last, 'diagnostic_msgs/msg/DiagnosticArray')
+    diagnostics: Any = store.deserialize_cdr(last, 'diagnostic_msgs/msg/DiagnosticArray')
     return {
         pair.key: pair.value
-        for status in told.status
+        for status in diagnostics.status
         if status.name.endswith((': tick', ': crank'))
         for pair in status.values
     }

@@ -25,8 +25,7 @@ from pathlib import Path
 import sys
 from time import monotonic_ns, sleep
 
-from campaigns.kills.marks import Marks
-from campaigns.kills.plan import ATTACHMENTS, message, PERIOD_NS, Phase, TOPICS
+from campaigns.kills.plan import ATTACHMENTS, Marks, message, PERIOD_NS, Phase, TOPICS
 from linkage_ros.bag.metadata import BagSummary
 from linkage_ros.bag.writing.recorder import Recorder
 from linkage_ros.bag.writing.storage import Storage

@@ -13,12 +13,14 @@
 # limitations under the License.
 
 
-"""Kill recordings, and judge what is left."""
+"""Kill recordings, and hold what is left against what was offered."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 import json
 import os
 from pathlib import Path
@@ -27,11 +29,253 @@ import subprocess
 import sys
 from tempfile import TemporaryDirectory
 from time import monotonic, monotonic_ns, sleep
+from typing import Any
 
-from campaigns.kills.judge import judge, Outcome
-from campaigns.kills.marks import Marks
-from campaigns.kills.plan import Phase, Plan
-from campaigns.processes import results_of
+from campaigns.campaign import results_of
+from campaigns.kills.plan import expected, Marks, PERIOD_NS, Phase, Plan, TOPICS
+from linkage_ros.bag.account import LET_GO, UNFINISHED
+from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
+from linkage_ros.bag.reading.reader import BagMessage, read_bag
+from linkage_ros.bag.recovering.recover import recover
+from linkage_ros.errors import BagError
+from rosbags.highlevel import AnyReader
+import yaml
+
+FAULT = 'FAULT: '
+"""What a verdict that must not be begins with."""
+
+NO_FOLDER = 'no folder yet'
+NO_FILE = 'nothing whole yet, and says so'
+NEXT_FILE = 'the next file there, not yet named'
+GONE_FILE = 'a file that made way there, no longer named'
+
+
+@dataclass(slots=True)
+class Outcome:
+    """
+    What became of one recording.
+
+    Attributes
+    ----------
+    plan
+        How it was killed.
+    phase
+        What it was doing then.
+    offered, found, let_go
+        Messages: that the recorder was given, that are in the bag, and that were in files which
+        made way for newer ones.
+    loss
+        Age at the kill of the oldest message that was lost [ns]; 0 for none.
+    power_loss
+        Age of the oldest that no returned flush had brought to the disk: what a power cut at this
+        instant may have cost [ns].
+    paused
+        For how long of `loss` the disk was worked for: flushes, splits, the close [ns].
+    tick
+        The longest tick in that time [ns].
+    verdicts
+        Of the bag as it lies there, of its metadata, and of what was recovered of it.
+    leftovers
+        What else lay in the folder.
+
+    """
+
+    plan: Plan
+    phase: Phase
+    offered: int = 0
+    found: int = 0
+    let_go: int = 0
+    loss: int = 0
+    power_loss: int = 0
+    paused: int = 0
+    tick: int = PERIOD_NS
+    verdicts: dict[str, str] = field(default_factory=dict)
+    leftovers: list[str] = field(default_factory=list)
+
+    @property
+    def strict_excess(self) -> int:
+        """Return by how much the loss is more than the flush period and one tick [ns]."""
+        return self.loss - round(self.plan.storage.flush_period * 1e9) - PERIOD_NS
+
+    @property
+    def excess(self) -> int:
+        """Return the same, with the tick and the disk taken as they were [ns]."""
+        period = round(self.plan.storage.flush_period * 1e9)
+        return self.loss - period - self.tick - self.paused
+
+    @property
+    def faults(self) -> list[str]:
+        """Return the verdicts that must not be."""
+        return [
+            f'{what}: {said}' for what, said in self.verdicts.items() if said.startswith(FAULT)
+        ]
+
+
+def judge(plan: Plan, folder: Path, marks: Marks, killed: int) -> Outcome:
+    """
+    Judge what a kill has left.
+
+    Parameters
+    ----------
+    plan
+        How it was killed.
+    folder
+        The bag's.
+    marks
+        What the process had done by then.
+    killed
+        When, in [ns] of the steady clock.
+
+    """
+    outcome = Outcome(plan, marks.phase, offered=marks.offered)
+    begun = marks.phase > Phase.MAKING
+    if not folder.exists():
+        outcome.verdicts['bag'] = f'{FAULT}no folder' if begun else NO_FOLDER
+        return outcome
+    messages = _read(outcome, folder, marks)
+    if messages is not None:
+        _measure(outcome, marks, killed)
+    elif begun and not outcome.faults:
+        outcome.verdicts['bag'] = f'{FAULT}nothing whole, although it had begun'
+    outcome.verdicts['metadata'] = _metadata(outcome, folder)
+    outcome.verdicts['recovered'] = _recovered(outcome, folder, messages, marks)
+    return outcome
+
+
+def _read(outcome: Outcome, folder: Path, marks: Marks) -> list[BagMessage] | None:
+    """Read the bag as it lies there; return its messages, or nothing where none are whole."""
+    try:
+        bag = read_bag(folder, allow_truncated=True)
+        messages = list(bag.messages())
+    except BagError:
+        outcome.verdicts['bag'] = NO_FILE
+        return None
+    except Exception as error:  # noqa: BLE001
+        outcome.verdicts['bag'] = f'{FAULT}{type(error).__name__}: {error}'
+        return None
+    outcome.found = len(messages)
+    counts = json.loads(bag.custom.get(LET_GO, '{}'))
+    outcome.let_go = sum(counts.values())
+    end = outcome.let_go + len(messages)
+    if not _is_run(messages, outcome.let_go, marks):
+        verdict = f'{FAULT}a false message'
+    elif end < marks.safe:
+        verdict = f'{FAULT}{marks.safe - end} messages lost that had been flushed'
+    elif marks.phase is Phase.CLOSED and (bag.truncated or UNFINISHED in bag.custom):
+        verdict = f'{FAULT}closed, but not finished'
+    elif bag.truncated:
+        verdict = 'the beginning, and says that it has no end'
+    elif UNFINISHED in bag.custom:
+        verdict = 'whole files, and says that it is not finished'
+    else:
+        verdict = 'finished'
+        if end < marks.offered:
+            verdict = f'{FAULT}finished, but not all'
+    outcome.verdicts['bag'] = verdict
+    return messages
+
+
+def _is_run(messages: Sequence[BagMessage], first: int, marks: Marks) -> bool:
+    """Say whether these are what was offered, byte for byte, from one number on without a gap."""
+    return first + len(messages) <= marks.offered and all(
+        message == expected(number, marks.times[number // len(TOPICS)])
+        for number, message in enumerate(messages, first)
+    )
+
+
+def _measure(outcome: Outcome, marks: Marks, killed: int) -> None:
+    """Say how much was lost, and how much a power cut could have cost."""
+    # A tick may have begun between the look at the clock and the kill.
+    killed = max(killed, marks.times[marks.ticks - 1] if marks.ticks else 0)
+
+    def age(number: int) -> int:
+        return killed - marks.times[number // len(TOPICS)] if number < marks.offered else 0
+
+    first = outcome.let_go + outcome.found
+    outcome.loss, outcome.power_loss = age(first), age(marks.safe)
+    if outcome.loss:
+        begin = killed - outcome.loss
+        outcome.paused = marks.paused(begin, killed)
+        tick, end = first // len(TOPICS), marks.ticks
+        times = [*marks.times[tick:end], killed]
+        outcome.tick = max(PERIOD_NS, *(after - before for before, after in pairwise(times)))
+
+
+def _metadata(outcome: Outcome, folder: Path) -> str:
+    """Judge ``metadata.yaml``: whole, and no name or count in it without a file or message."""
+    files = {file.name for file in folder.glob('*.mcap')}
+    others = {file.name for file in folder.iterdir()} - files
+    outcome.leftovers += sorted(others - {METADATA_FILE})
+    if METADATA_FILE not in others:
+        begun = outcome.phase > Phase.MAKING
+        return f'{FAULT}none' if begun else 'none yet'
+    try:
+        said: dict[str, Any] = yaml.safe_load((folder / METADATA_FILE).read_text())[ROOT_KEY]
+        named = said['relative_file_paths']
+        count = said['message_count']
+        parts = [(part['path'], part['message_count']) for part in said['files']]
+    except Exception as error:  # noqa: BLE001
+        return f'{FAULT}{type(error).__name__}'
+    if not files.issuperset(named) or [path for path, _ in parts] != named:
+        return f'{FAULT}names a file that is not there'
+    if count > outcome.found or count != sum(number for _, number in parts):
+        return f'{FAULT}counts {count}, of which {outcome.found} are there'
+    newest = max(map(_number, named))
+    outcome.leftovers += [
+        NEXT_FILE if _number(name) > newest else GONE_FILE
+        for name in sorted(files.difference(named))
+    ]
+    return 'whole, names what is there'
+
+
+def _number(name: str) -> int:
+    """Return which of a bag's files has this name."""
+    return int(Path(name).stem.rpartition('_')[2])
+
+
+def _recovered(
+    outcome: Outcome, folder: Path, messages: list[BagMessage] | None, marks: Marks
+) -> str:
+    """Recover the bag, and read that by rosbags and by ourselves."""
+    target = folder.with_name(f'{folder.name}_recovered')
+    try:
+        recover(folder, target)
+    except BagError:
+        nothing = not messages and not marks.safe
+        return 'nothing to save, and says so' if nothing else f'{FAULT}nothing saved'
+    except Exception as error:  # noqa: BLE001
+        return f'{FAULT}{type(error).__name__}: {error}'
+    try:
+        ours = list(read_bag(target).messages())
+        with AnyReader([target]) as reader:
+            theirs = sorted(
+                (time, connection.topic, bytes(data))
+                for connection, time, data in reader.messages()
+            )
+    except Exception as error:  # noqa: BLE001
+        return f'{FAULT}cannot be read: {type(error).__name__}: {error}'
+    if theirs != sorted((each.log_time, each.topic, each.data) for each in ours):
+        return f'{FAULT}rosbags reads other messages'
+    if ours == (messages or []):
+        return 'the same messages'
+    # A file that made way was still there, or the next one was not yet named.
+    first = _first(ours, marks)
+    end = first + len(ours)
+    holds_all = first <= outcome.let_go and end >= outcome.let_go + outcome.found
+    if holds_all and _is_run(ours, first, marks):
+        return 'the same and older ones, from a file that made way'
+    return f'{FAULT}other messages'
+
+
+def _first(messages: Sequence[BagMessage], marks: Marks) -> int:
+    """Return the number of the first message."""
+    if not messages:
+        return 0
+    ticks = marks.times[: marks.ticks]
+    tick = bisect_left(ticks, messages[0].log_time)
+    names = [topic.name for topic in TOPICS]
+    return tick * len(TOPICS) + names.index(messages[0].topic)
+
 
 _PATIENCE = 30.0
 """How long a process may take to come to what is waited for [s]."""

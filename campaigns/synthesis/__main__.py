@@ -24,14 +24,14 @@ those that it was. Errors in units of what rounding the angles may cause.
 from __future__ import annotations
 
 import argparse
+from datetime import datetime
 from importlib import metadata
 import sys
 import time
 
-from bench.report import say, show, Table
-from campaigns.synthesis.families import FAMILIES
-from campaigns.synthesis.run import make, Part, parts, run, Tally
-from linkage_ros.accuracy.machine import describe_machine
+from bench.report import machine_table, say, show, Table
+from campaigns.campaign import progress_lines
+from campaigns.synthesis.run import FAMILIES, make, parts, run, Tally
 from linkage_ros.synthesis.pairs.freudenstein import links, three_pairs, TRUSTED
 import numpy as np
 
@@ -51,10 +51,11 @@ def main() -> int:
     if arguments.show:
         _show_case(arguments.seed, arguments.show[0], int(arguments.show[1]))
         return 0
-    started = time.monotonic()
+    started, begin = time.monotonic(), datetime.now().astimezone()
     work = parts(arguments.cases, arguments.seed, arguments.only or [*FAMILIES])
     try:
-        tallies = run(work, arguments.jobs, _say_progress)
+        progress = progress_lines(sum(part.size for part in work), 'linkages')
+        tallies = run(work, arguments.jobs, progress)
     except KeyboardInterrupt:
         say('stopped')
         return 130
@@ -62,11 +63,13 @@ def main() -> int:
     show(_errors(tallies))
     show(Table('Families', ('family', 'what it is'), [(n, f.why) for n, f in FAMILIES.items()]))
     show(_speed())
-    machine = Table('Machine', ('', ''), [*describe_machine()])
-    machine.rows.append(('python-flint', metadata.version('python-flint')))
-    machine.rows.append(('seed', str(arguments.seed)))
     cases = sum(tally.cases for tally in tallies.values())
-    machine.rows.append(('cases', f'{cases:,} in {seconds:.0f} s, {arguments.jobs} processes'))
+    machine = machine_table(
+        begin,
+        ('python-flint', metadata.version('python-flint')),
+        ('seed', str(arguments.seed)),
+        ('cases', f'{cases:,} in {seconds:.0f} s, {arguments.jobs} processes'),
+    )
     show(machine)
     return int(any(t.worst.error > TRUSTED or t.worst_lost.error > 1.0 for t in tallies.values()))
 
@@ -134,11 +137,6 @@ def _show_case(seed: int, family: str, index: int) -> None:
     say(f'crank {case.crank}')
     say(f'rocker {case.truth.rocker}')
     say(f'assemblies {case.sides}; condition {found.condition:.3g}, doubt {found.doubt}')
-
-
-def _say_progress(part: Part) -> None:
-    if part.first % 50_000 == 0:
-        say(f'{part.family} {part.first:,}')
 
 
 if __name__ == '__main__':

@@ -13,17 +13,347 @@
 # limitations under the License.
 
 
-"""The families: every dyad on every kind of link, chains, inputs of all kinds, and class III."""
+"""
+The families: every dyad on every kind of link, chains, inputs of all kinds, and class III.
+
+Some families have exact change points: with every dyad, in both orientations, on a crank and in
+chains. All their lengths are whole multiples of 1/64, so that sums and differences of them are
+exact and the dyad lies flat to the last bit. Frames are those of textbooks; the ground's may stand
+elsewhere.
+"""
 
 from __future__ import annotations
 
+from cmath import phase
 from collections.abc import Callable
+from dataclasses import replace
+from math import pi
 import random
 from typing import NamedTuple
 
-from campaigns.topologies.change_points import CHANGE_POINTS
+from campaigns.accuracy.dyads import RPR, RRP, RRR
+from campaigns.accuracy.mechanism import Spot
+from campaigns.topologies.constraints import Real
+from campaigns.topologies.geometry import DrivenLink, Geometry, Group, Passing
 from campaigns.topologies.topology import KINDS, Topology, TopologyBuilder
-from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.linkage import (
+    GROUND,
+    Input,
+    Linkage,
+    RevoluteJoint,
+    Side,
+    SlideJoint,
+    Slider,
+)
+import numpy as np
+
+Links = dict[str, dict[str, tuple[float, float]]]
+
+IN_A_CHAIN, REVERSED = ' in a chain', ', input reversed'
+PLACES = {
+    '': 'on a crank',
+    REVERSED: 'on a crank whose input is the angle of the ground to it',
+    IN_A_CHAIN: 'on a rocker',
+}
+
+_UNIT = 1 / 64
+_LEAST_SPARE = 0.01
+_NEARLY_FLAT = 1e-3
+
+
+def _length(rng: random.Random) -> float:
+    return rng.randint(16, 192) * _UNIT
+
+
+def _other(rng: random.Random, *not_these: float) -> float:
+    while (length := _length(rng)) in not_these:
+        pass
+    return length
+
+
+class _Parts:
+    """The parts of a linkage whose crank turns at O; ``crank`` may be the rocker of a chain."""
+
+    def __init__(self, rng: random.Random, place: str) -> None:
+        self.rng = rng
+        self.origin = (0.0, 0.0) if rng.random() < 0.5 else (_length(rng), -_length(rng))
+        self.links: Links = {GROUND: {'O': self.origin}, 'crank': {'O': (0.0, 0.0)}}
+        self.sliders: dict[str, Slider] = {}
+        self.groups: list[Group] = []
+        self.assembly: dict[str, Side] = {}
+        self.sides: dict[str, int | Passing] = {}
+        self.chained = place == IN_A_CHAIN
+        # The input may be said as the angle of the ground to the crank.
+        self.child = place != REVERSED
+        self.input = 'motor' if self.chained else 'crank'
+        pivot = 'O'
+        if self.chained:
+            # A crank-rocker before it, whose rocker stands in the crank's place.
+            pivot = 'M'
+            self._base()
+        ends = (GROUND, self.input) if self.child else (self.input, GROUND)
+        self.driven = Input('in', *ends)
+        self.groups.insert(0, DrivenLink(self.input, GROUND, 0))
+        assert pivot in self.links[self.input]
+
+    def _base(self) -> None:
+        rng = self.rng
+        a, c, d = 0.25 * _length(rng), _length(rng), 2.0 + _length(rng)
+        while not (abs(d - c) + a < (b := _length(rng) + 1.0) < d + c - a):
+            c, d = _length(rng), 2.0 + _length(rng)
+        direction = rng.uniform(-pi, pi)
+        motor = (
+            self.origin[0] + d * float(np.cos(direction)),
+            self.origin[1] + d * float(np.sin(direction)),
+        )
+        self.links[GROUND]['M'] = motor
+        self.links['crank']['N'] = (0.0, c)
+        crank = self.links.pop('crank')
+        self.links |= {
+            'motor': {'M': (0.0, 0.0), 'K': (a, 0.0)},
+            'bar': {'K': (0.0, 0.0), 'N': (b, 0.0)},
+            'crank': crank,
+        }
+        side = rng.choice((1, -1))
+        self.groups.append(RRR('bar', 'crank', Spot('motor', 'K'), Spot(GROUND, 'O'), 'N', side))
+        self.sides['N'] = side
+        self.assembly['N'] = 'left' if side > 0 else 'right'
+
+    def on_ground(self, distance: float, name: str) -> complex:
+        """Add a point of the ground at an exact distance from O; return its direction."""
+        # Straight against the input's 0 it would be a tie which turn of two comes first.
+        direction = self.rng.choice((1 + 0j, 1j, -1j))
+        step = distance * direction
+        self.links[GROUND][name] = (self.origin[0] + step.real, self.origin[1] + step.imag)
+        return direction
+
+    def passing(
+        self, side: int, line: complex, at: tuple[bool, bool], zero: float | None = None
+    ) -> int | Passing:
+        """
+        Return a side that changes at crank directions 0 and π from a line, or stays.
+
+        The line's direction is ``zero``, if given: that of ``line`` but for turns.
+        """
+        if self.chained and at != (True, True):
+            return side
+        sign = 1 if self.child else -1
+        turns = None if self.chained else (sign, -phase(line) if zero is None else -zero)
+        return Passing(side, 'crank', (GROUND, line), at, turns)
+
+    def topology(self, line: complex, at: tuple[bool, bool]) -> Topology | None:
+        """Return what has been built; ``at`` says whether it lies flat at 0 and at π from it."""
+        moving = [link for link in self.links if link != GROUND]
+        joints: dict[str, RevoluteJoint | SlideJoint] = {
+            f'a_{link}': RevoluteJoint(GROUND, link) for link in moving
+        }
+        joints |= {f's_{name}': SlideJoint(name) for name in self.sliders}
+        linkage = Linkage(self.links, (self.driven,), self.assembly, joints, dict(self.sliders))
+        sign = 1 if self.child else -1
+        flat: tuple[float, ...] = ()
+        if not self.chained:
+            flat = tuple(
+                sign * (phase(line) + angle)
+                for angle, passed in zip((0.0, pi), at, strict=True)
+                if passed
+            )
+        topology = Topology(
+            linkage, tuple(self.groups), dict(self.sides), (0.0,), {}, (0.3,), flat
+        )
+        return _started(topology, self.rng, (line, at) if self.chained else None)
+
+
+def _started(
+    topology: Topology,
+    rng: random.Random,
+    chained_line: tuple[complex, tuple[bool, bool]] | None,
+) -> Topology | None:
+    """Return a topology that starts where it is farthest from its limits, if it closes."""
+    geometry = Geometry(topology.linkage, topology.groups or (), topology.sides)
+    inputs = np.array([[rng.uniform(-pi, pi) for _ in range(400)]], Real)
+    places = geometry.place(inputs)
+    spare = np.min([margin.spare / margin.grain for margin in places.margins], axis=0)
+    best = int(np.nanargmax(spare))
+    if spare[best] < _LEAST_SPARE:
+        return None
+    if chained_line is not None:
+        # The rocker has to come by where the dyad lies flat.
+        line, at = chained_line
+        phi = np.angle(places.units['crank'] * np.conj(line))[spare > -_NEARLY_FLAT]
+        away = [np.abs(np.sin(0.5 * (phi - angle))).min() for angle in (0.0, pi)]
+        if not any(passed and off < 0.01 for off, passed in zip(away, at, strict=True)):
+            return None
+    pose = {
+        link: (
+            float(np.angle(places.units[link][best])),
+            float(places.origins[link][best].real),
+            float(places.origins[link][best].imag),
+        )
+        for link in topology.linkage.links
+        if link != GROUND
+    }
+    return replace(topology, start=(float(inputs[0, best]),), pose=pose)
+
+
+def _rrr(fold: bool, stretch: bool, place: str) -> Callable[[random.Random], Topology | None]:
+    def make(rng: random.Random) -> Topology | None:
+        parts = _Parts(rng, place)
+        a = _length(rng)
+        d = _other(rng, a)
+        if fold and stretch:
+            b, c = (d, a) if rng.random() < 0.6 else (a, d)
+        elif fold:
+            b = _other(rng, a, d)
+            while (c := b + rng.choice((1, -1)) * (d - a)) <= 0.0 or {b, c} == {a, d}:
+                b = _other(rng, a, d)
+        else:
+            while (b := _other(rng, a, d)) >= a + d:
+                pass
+            c = a + d - b
+        parts.links['crank']['A'] = (a, 0.0)
+        line = parts.on_ground(d, 'D')
+        parts.links['one'] = {'A': (0.0, 0.0), 'B': (b, 0.0)}
+        parts.links['two'] = {'D': (0.0, 0.0), 'B': (c, 0.0)}
+        side = rng.choice((1, -1))
+        parts.groups.append(RRR('one', 'two', Spot('crank', 'A'), Spot(GROUND, 'D'), 'B', side))
+        parts.assembly['B'] = 'left' if side > 0 else 'right'
+        parts.sides['B'] = parts.passing(side, line, (fold, stretch))
+        return parts.topology(line, (fold, stretch))
+
+    return make
+
+
+def _rpr(
+    bent: bool, rail_on_crank: bool, place: str
+) -> Callable[[random.Random], Topology | None]:
+    def make(rng: random.Random) -> Topology | None:
+        parts = _Parts(rng, place)
+        a = _length(rng)
+        d = _other(rng, a) if bent else a
+        parts.links['crank']['A'] = (a, 0.0)
+        line = parts.on_ground(d, 'D')
+        pins = (Spot('crank', 'A'), Spot(GROUND, 'D'))
+        if not rail_on_crank:
+            pins = pins[::-1]
+        offset = rng.choice((1, -1)) * (d - a)
+        parts.links['rail'] = {pins[0].point: (0.0, 0.0)}
+        through, direction = pins[0].point, rng.choice((1.0, -1.0))
+        if bent:
+            through = 'Q'
+            parts.links['rail']['Q'] = (rng.choice((0.0, _length(rng))), offset)
+        block = ''
+        if rng.random() < 0.5:
+            block = 'block'
+            parts.links[block] = {pins[1].point: (0.0, 0.0)}
+        parts.sliders['S'] = Slider(pins[1].point, 'rail', through, (direction, 0.0), block, 0.0)
+        side = rng.choice((1, -1))
+        parts.groups.append(RPR('rail', pins[0], pins[1], 'S', side))
+        parts.assembly['S'] = 'ahead' if side > 0 else 'behind'
+        parts.sides['S'] = parts.passing(side, line, (True, False))
+        return parts.topology(line, (True, False))
+
+    return make
+
+
+def _rrp(
+    below: bool, above: bool, pin_on_crank: bool, place: str
+) -> Callable[[random.Random], Topology | None]:
+    def make(rng: random.Random) -> Topology | None:
+        parts = _Parts(rng, place)
+        a = _length(rng)
+        # The pivot lies by e left of the line's direction: the rod lies flat where b = |e ± a|.
+        e = 0.0 if below and above else rng.choice((1, -1)) * _other(rng, a)
+        b = a
+        if not (below and above):
+            # y of the pin goes from e − a to e + a; the rod is across at y = b and y = −b.
+            b = a + e if below else a - e
+            while b <= 0.0 or b == a:
+                e = rng.choice((1, -1)) * _other(rng, a)
+                b = a + e if below else a - e
+        # The crank is at 0 from this line where its pin lies at the line's far side: ψ = −π/2.
+        side = rng.choice((1, -1))
+        if pin_on_crank:
+            parts.links['crank']['A'] = (a, 0.0)
+            pin, along = Spot('crank', 'A'), GROUND
+            unit = rng.choice((1 + 0j, 1j, -1j))
+            foot = -1j * unit * e
+            parts.links[GROUND]['Q'] = (
+                parts.origin[0] + foot.real,
+                parts.origin[1] + foot.imag,
+            )
+            line, zero = -1j * unit, phase(unit) - 0.5 * pi
+            # ψ = φ − π/2: above (y = −b) at φ = 0, below (y = b) at φ = π.
+            at = (above, below)
+        else:
+            direction = parts.on_ground(a, 'A')
+            pin, along = Spot(GROUND, 'A'), 'crank'
+            unit = direction if direction.real else 1 + 0j
+            parts.links['crank']['Q'] = (0.0, -unit.real * e)
+            # The ground's pin seen from the crank's rail: ψ = dir(OA) − crank − dir(û).
+            line = -1j * direction * unit.conjugate()
+            zero = phase(direction * unit.conjugate()) - 0.5 * pi
+            # crank = dir(line) + φ: ψ = π/2 − φ: below at φ = 0, above at φ = π.
+            at = (below, above)
+        parts.links['rod'] = {pin.point: (0.0, 0.0), 'B': (b, 0.0)}
+        block = ''
+        if rng.random() < 0.5:
+            block = 'block'
+            parts.links[block] = {'B': (0.0, 0.0)}
+        parts.sliders['S'] = Slider('B', along, 'Q', (unit.real, unit.imag), block, 0.0)
+        parts.groups.append(RRP('rod', pin, 'B', 'S', side))
+        parts.assembly['S'] = 'ahead' if side > 0 else 'behind'
+        parts.sides['S'] = parts.passing(side, line, at, zero)
+        return parts.topology(line, at)
+
+    return make
+
+
+def _until_it_closes(
+    make: Callable[[random.Random], Topology | None],
+) -> Callable[[random.Random], Topology]:
+    def made(rng: random.Random) -> Topology:
+        while (topology := make(rng)) is None:
+            pass
+        return topology
+
+    return made
+
+
+def _families() -> dict[str, tuple[str, Callable[[random.Random], Topology]]]:
+    found: dict[str, tuple[str, Callable[[random.Random], Topology]]] = {}
+    for place, where in PLACES.items():
+        for name, fold, stretch in (
+            ('fold', True, False),
+            ('stretch', False, True),
+            ('fold and stretch', True, True),
+        ):
+            found[f'RRR {name}{place}'] = (
+                f'an RRR dyad {where} that lies flat exactly: {name}',
+                _until_it_closes(_rrr(fold, stretch, place)),
+            )
+        for name, bent in (('bent', True), ('straight', False)):
+            for crank in (True, False):
+                carrier = 'the crank' if crank else 'the ground'
+                found[f'RPR {name}, rail on {carrier}{place}'] = (
+                    f'an RPR dyad {where}, its rail {name} and pinned to {carrier}, flat exactly',
+                    _until_it_closes(_rpr(bent, crank, place)),
+                )
+        for name, below, above in (
+            ('below', True, False),
+            ('above', False, True),
+            ('below and above', True, True),
+        ):
+            for crank in (True, False):
+                carrier = 'the crank' if crank else 'the ground'
+                found[f'RRP {name}, pin on {carrier}{place}'] = (
+                    f'an RRP dyad {where}, its pin on {carrier}, the rod just as long: {name}',
+                    _until_it_closes(_rrp(below, above, crank, place)),
+                )
+    return found
+
+
+CHANGE_POINTS = _families()
+"""For each family what it is, and how one linkage is made."""
 
 
 class Family(NamedTuple):

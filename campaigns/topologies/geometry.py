@@ -28,10 +28,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from campaigns.accuracy.dyads.rpr import RPR
-from campaigns.accuracy.dyads.rrp import RRP
-from campaigns.accuracy.dyads.rrr import RRR
-from campaigns.accuracy.dyads.two_slides import PRP, RPP
+from campaigns.accuracy.dyads import PRP, RPP, RPR, RRP, RRR
 from campaigns.accuracy.mechanism import Spot
 from campaigns.topologies.constraints import Array, Real, TURN
 from linkage_ros.kinematics.linkage import GROUND, Linkage

@@ -33,8 +33,7 @@ from campaigns.topologies.constraints import (
     UNIT_ROUNDOFF,
 )
 from campaigns.topologies.geometry import Geometry, Places
-from campaigns.topologies.topology import Topology
-from campaigns.topologies.walk import follow, Walks
+from campaigns.topologies.topology import follow, Topology, Walks
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND

@@ -20,12 +20,11 @@ from __future__ import annotations
 from math import inf, remainder, tau
 from typing import NamedTuple
 
-from campaigns.accuracy.dyads.rpr import RPR
+from campaigns.accuracy.dyads import RPR
 from campaigns.topologies.constraints import Array, Real
 from campaigns.topologies.geometry import Geometry, Margin, Passing
 from campaigns.topologies.judge import Findings
-from campaigns.topologies.topology import Topology
-from campaigns.topologies.walk import Walks
+from campaigns.topologies.topology import Topology, Walks
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.nearness import SingularInput

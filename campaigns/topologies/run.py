@@ -18,25 +18,99 @@ The campaign: what there is to be done, done in parts, by as many processes as a
 
 Each linkage has a generator of its own, seeded by the campaign's seed, its family and its number:
 what comes out does not depend on how the work was shared, and any linkage can be made again.
+
+The commands of ``linkage`` are tried on the file of any linkage: they do their work, or print one
+line that says why not.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 import random
+import tempfile
 import traceback
 from typing import NamedTuple
 
-from campaigns.processes import results_of
-from campaigns.topologies.commands import FILES, judge_command, spoilt
+from campaigns.campaign import results_of
+from campaigns.in_process import in_process
 from campaigns.topologies.families import FAMILIES
 from campaigns.topologies.judge import closure_of, Findings, judge_states
 from campaigns.topologies.judge_ranges import judge_ranges
-from campaigns.topologies.topology import Topology
-from campaigns.topologies.walk import both_ways
+from campaigns.topologies.topology import both_ways, Topology
 from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.scene.linkage_text import linkage_text
+
+FILES = ('draw', 'urdf', 'mjcf')
+"""Commands that write a file; beside these there are `check`, and `accuracy`, which is slow."""
+
+_SECONDS = 600
+"""A command that takes longer has not ended; on a free machine the slowest takes some 15 s."""
+
+
+def judge_command(command: str, linkage: Linkage, findings: Findings, closes: bool = True) -> None:
+    """
+    Run a command on a linkage.
+
+    Parameters
+    ----------
+    command
+        `check`, `accuracy`, or one of `FILES`.
+    linkage
+        The linkage.
+    findings
+        Where what is found goes.
+    closes
+        Whether it is a linkage that closes somewhere: the command has no reason to refuse it.
+
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / 'linkage.yaml'
+        file.write_text(linkage_text(linkage), encoding='utf-8')
+        output = {'draw': 'png', 'urdf': 'urdf', 'mjcf': 'xml'}.get(command)
+        arguments = [command, str(file)]
+        if command == 'accuracy':
+            arguments.append('--quick')
+            arguments += ['-o', str(Path(folder) / 'page')]
+        if output:
+            arguments += ['-o', str(Path(folder) / f'out.{output}')]
+        code, said, _ = in_process(arguments, _SECONDS)
+    said = said.replace(folder, '')
+    if code == 0:
+        findings.counts[f'{command}: done'] += 1
+    elif code == 2 and len(said.strip().splitlines()) == 1:
+        findings.counts[f'{command}: refused'] += 1
+        if closes:
+            findings.find(f'{command} refuses', said.strip())
+    else:
+        last = said.strip().splitlines()[-1:] or ['']
+        findings.find(f'{command}: {code}', last[0])
+
+
+def spoilt(linkage: Linkage, rng: random.Random) -> Linkage:
+    """Return a linkage with one or two numbers changed, as a typing error would, or worse."""
+    for _ in range(rng.choice((1, 1, 2))):
+        link = rng.choice(list(linkage.links))
+        point = rng.choice(list(linkage.links[link]))
+        place = list(linkage.links[link][point])
+        k = rng.choice((0, 1))
+        others = [part for points in linkage.links.values() for p in points.values() for part in p]
+        place[k] = rng.choice(
+            (
+                0.0,
+                -place[k],
+                place[k] * 10.0 ** rng.choice((-9, -3, -1, 1, 3, 9)),
+                rng.choice(others),
+                place[k] + rng.gauss(0.0, 1.0),
+            )
+        )
+        links = {name: dict(points) for name, points in linkage.links.items()}
+        links[link][point] = (place[0], place[1])
+        linkage = replace(linkage, links=links)
+    return linkage
+
 
 _PART = 5
 _KEPT = 3
@@ -195,7 +269,7 @@ def do(part: Part) -> tuple[Part, Tally]:
 
 
 def run(
-    work: list[Part], jobs: int, progress: Callable[[Part], None] | None = None
+    work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
 ) -> dict[str, dict[str, Tally]]:
     """
     Do all parts and return what was found, by what was tried and by family.
@@ -207,7 +281,7 @@ def run(
     jobs
         How many processes; 1: this one.
     progress
-        Called with each part when it is done.
+        Called with the number of linkages of each part that is done.
 
     """
     tallies: dict[str, dict[str, Tally]] = {}
@@ -215,6 +289,5 @@ def run(
         tallies.setdefault(part.what, {}).setdefault(part.family, Tally())
     for part, tally in results_of(do, work, jobs):
         tallies[part.what][part.family].merge(tally)
-        if progress is not None:
-            progress(part)
+        progress(part.size)
     return tallies

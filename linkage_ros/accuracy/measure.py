@@ -14,14 +14,14 @@
 
 
 """
-All that is measured of a scene, part by part.
+Measure a scene, part by part.
 
-Each part is a room, whose module `measure` is imported only where it is asked for, with a function
+Each part is a module, which is imported only if the part is asked for. It has a function
 
-``measure_PART(scene, quick, told) -> Part | None``
-    Measure; nothing where the scene has no such part. ``quick``: a few seconds are to do.
-    ``told`` takes what is done and how much of it, 0 to 1, now and then; what it raises ends the
-    measurement, and nothing is left behind. Recording takes a folder too, behind the scene.
+``measure_PART(scene, quick, progress) -> Part | None``
+    Measure; None if the scene has no such part. ``quick``: take a few seconds only. ``progress``
+    is called now and then with the share that is done, 0 to 1; an exception that it raises ends
+    the measurement, and no file is left behind. Recording also takes a folder, after the scene.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 
-from linkage_ros.accuracy.machine import describe_machine
 from linkage_ros.accuracy.results import Part, Results
+from linkage_ros.measuring import describe_machine
 from linkage_ros.scene.scene import Scene
 
 PARTS = ('solving', 'ticking', 'effects', 'dynamics', 'recording')
 """In the order of the page."""
 
-Told = Callable[[str, float], None]
+ProgressCallback = Callable[[str, float], None]
 """Takes the name of a part, and how much of it is done, 0 to 1."""
 
 
 def measure_accuracy(
-    scene: Scene, parts: Sequence[str], quick: bool, folder: Path, told: Told
+    scene: Scene, parts: Sequence[str], quick: bool, folder: Path, progress: ProgressCallback
 ) -> Results:
     """
     Measure a scene.
@@ -57,8 +57,8 @@ def measure_accuracy(
         Whether a few seconds are to do for each.
     folder
         On the disk whose recording is measured.
-    told
-        Takes how it goes.
+    progress
+        Called with how far each part is.
 
     Raises
     ------
@@ -70,11 +70,11 @@ def measure_accuracy(
     for name in PARTS:
         if name not in parts:
             continue
-        told(name, 0.0)
-        measure = getattr(import_module(f'linkage_ros.accuracy.{name}.measure'), f'measure_{name}')
+        progress(name, 0.0)
+        measure = getattr(import_module(f'linkage_ros.accuracy.{name}'), f'measure_{name}')
         where = (folder,) if name == 'recording' else ()
-        part = measure(scene, *where, quick, lambda _, share, name=name: told(name, share))
+        part = measure(scene, *where, quick, lambda share, name=name: progress(name, share))
         if part is not None:
             found.append(part)
-        told(name, 1.0)
+        progress(name, 1.0)
     return Results(scene.name, describe_machine(), found)

@@ -14,9 +14,9 @@
 
 
 """
-What was measured: parts, diagrams and tables, as data that page, pictures and tables are made of.
+The results of measurements as data: parts, diagrams and tables.
 
-Whoever measures knows nothing of how it is shown, and whoever shows nothing of what was measured.
+Measuring and presenting know nothing of each other; both know these types.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from linkage_ros.accuracy.spread import Spread
+from linkage_ros.measuring import Spread
 
 
 class Axis(NamedTuple):
@@ -34,7 +34,7 @@ class Axis(NamedTuple):
     Attributes
     ----------
     name
-        What is along it, in words: 'error'.
+        The quantity, in words: 'error'.
     unit
         In which unit: 'rad'; '' for a number.
     logarithmic
@@ -49,6 +49,11 @@ class Axis(NamedTuple):
     logarithmic: bool = True
     least: float = 0.0
 
+    @property
+    def title(self) -> str:
+        """Return its name with its unit."""
+        return f'{self.name} [{self.unit}]' if self.unit else self.name
+
 
 class Point(NamedTuple):
     """
@@ -61,7 +66,7 @@ class Point(NamedTuple):
     x_spread, y_spread
         The quartiles, where it was measured several times.
     setting
-        What the method was told, in words: 'tolerance 1e-6', '256 knots'.
+        The setting of the method, in words: 'tolerance 1e-6', '256 knots'.
 
     """
 
@@ -74,7 +79,7 @@ class Point(NamedTuple):
 
 class Curve(NamedTuple):
     """
-    What a method comes to, over its settings.
+    The results of a method, over its settings.
 
     Attributes
     ----------
@@ -129,7 +134,7 @@ class Table(NamedTuple):
     columns
         Names.
     rows
-        Numbers as numbers and texts as texts; None where there is nothing.
+        Numbers as numbers and texts as texts; None for an empty cell.
 
     """
 
@@ -148,13 +153,13 @@ class Part(NamedTuple):
     key
         'solving', 'ticking', 'effects', 'dynamics' or 'recording'.
     title
-        What it answers.
+        The question that it answers.
     text
         How it was measured, and what it says, in paragraphs without markup.
     diagrams, tables
-        What was found.
+        The results.
     advice
-        For some wanted accuracies the cheapest way, a sentence each, worked out of the data.
+        The cheapest method for some accuracies, a sentence each, derived from the data.
 
     """
 
@@ -168,7 +173,7 @@ class Part(NamedTuple):
 
 class Results(NamedTuple):
     """
-    All that was measured of a scene.
+    All measurements of a scene.
 
     Attributes
     ----------

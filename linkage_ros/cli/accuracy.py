@@ -29,7 +29,7 @@ from pathlib import Path
 from threading import Event
 
 from linkage_ros.accuracy.measure import measure_accuracy, PARTS
-from linkage_ros.accuracy.page.folder import check_folder, PAGE, write_page
+from linkage_ros.accuracy.page.files import check_folder, PAGE, write_page
 from linkage_ros.cli.accuracy_tables import print_results
 from linkage_ros.cli.progress import progress, Told
 from linkage_ros.errors import did_you_mean, LinkageError, listed

@@ -27,7 +27,7 @@ from threading import Event
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cli.tables import show, Table
-from linkage_ros.cost.measure import compare, EffectCost, measure, SceneCost, Times
+from linkage_ros.cost import compare, EffectCost, measure, SceneCost, Times
 from linkage_ros.effects.stage import NEEDS
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter

@@ -41,11 +41,10 @@ from linkage_ros.cli.info import tables
 from linkage_ros.cli.progress import progress
 from linkage_ros.errors import LinkageError
 from linkage_ros.report.blocks import Progress
-from linkage_ros.report.html import run_html, Told
+from linkage_ros.report.html import ReportHeader, run_html, TableOf
+from linkage_ros.report.labels import seconds_text
 from linkage_ros.report.reading import read_run
 from linkage_ros.report.run import Run, Window
-from linkage_ros.report.tables import TableOf
-from linkage_ros.report.words import seconds_text
 from linkage_ros.scene.scene import Scene
 from linkage_ros.stop import StoppedError
 from linkage_ros.whole_file import replace_whole
@@ -125,7 +124,7 @@ def report(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool =
     name = scene.name if scene is not None else bag_path.resolve().name
     page = run_html(
         found,
-        Told(
+        ReportHeader(
             title=f'Run of {name}',
             facts=list(_facts(account, found, scene)),
             warnings=list(_warnings(bag, account, found, scene, missing)),

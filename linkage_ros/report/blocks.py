@@ -13,32 +13,124 @@
 # limitations under the License.
 
 
-"""The messages of a bag, some thousands at a time, each topic's together; and their counts."""
+"""
+The messages of a bag, some thousands at a time, with the time of the run for each.
+
+The time of a run begins at 0 and never goes back. Where the clock of the recorder jumps back, no
+time passes, and the time of the run goes on from there. Messages on several topics may be a little
+out of order in a bag that other programs have written; that is no jump.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from linkage_ros.bag.reading.contents import Contents, TopicContents
 from linkage_ros.bag.reading.reader import Bag, BagMessage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError
+from linkage_ros.report.decimation import Times
+import numpy as np
+
+_LATEST = 2**62
+"""In [ns]: what is said to be later is so by damage."""
+
+
+def times_of(logged: Sequence[int]) -> Times:
+    """Return log times as an array; they may be anything that fits into 64 bits."""
+    return np.minimum(np.array(logged, np.uint64), np.uint64(_LATEST)).astype(np.int64)
+
+
+class RunClock:
+    """
+    Makes of log times the time of a run.
+
+    Parameters
+    ----------
+    disorder
+        By how much a message may stand too late, in [ns], and the clock not have jumped.
+
+    Attributes
+    ----------
+    begin
+        The log time at which the run begins, in [ns]; nothing before there is a message.
+    end
+        The time of the run at the last message, by whatever hand, in [ns].
+
+    """
+
+    def __init__(self, disorder: int = 0) -> None:
+        self.begin: int | None = None
+        self.end = 0
+        self._disorder = disorder
+        self._last = self._added = self._now = 0
+        self._jumps: list[tuple[int, int]] = []
+        # The log times that were looked at last and the times of the run, and what was before.
+        self._logged = self._times = np.zeros(1, np.int64)
+
+    def start(self, logged: int) -> None:
+        """Begin the run, unless it has begun, at a log time in [ns]."""
+        if self.begin is None:
+            self.begin = self._last = logged
+
+    def passed(self, logged: Times) -> Times:
+        """Return the times of the run at messages in their order, by their log times, in [ns]."""
+        before = self._last, self._now
+        times = logged
+        if len(logged):
+            self.start(int(logged[0]))
+            before = self._last, self._now
+            back = -np.diff(logged, prepend=self._last)
+            jumps = np.where(back > self._disorder, back, 0)
+            added = self._added + np.cumsum(jumps)
+            since = logged - (self.begin or 0) + added
+            times = np.maximum.accumulate(np.maximum(since, self._now))
+            self._jumps += [(int(times[i]), int(jumps[i])) for i in np.flatnonzero(jumps)]
+            self._last, self._added, self._now = int(logged[-1]), int(added[-1]), int(times[-1])
+            self.end = max(self.end, self._now)
+        self._logged = np.concatenate([[before[0]], logged])
+        self._times = np.concatenate([[before[1]], times])
+        return times
+
+    def beside(self, logged: Times, behind: Times) -> Times:
+        """
+        Return the times of the run at messages that another hand has recorded, in [ns].
+
+        Parameters
+        ----------
+        logged
+            Their log times, in [ns]; they may deviate a little from those of the others.
+        behind
+            How many of the messages that `passed` was given last stand before each.
+
+        """
+        since = np.maximum(logged - self._logged[behind], 0)
+        next_ones = np.append(self._times[1:], _LATEST)
+        times: Times = np.minimum(self._times[behind] + since, next_ones[behind])
+        self.end = max(self.end, int(times.max(initial=0)))
+        return times
+
+    def jumps(self) -> Iterator[tuple[int, int]]:
+        """Yield when the clock has jumped since this was asked last, and by how much, in [ns]."""
+        found, self._jumps = self._jumps, []
+        yield from found
+
 
 _MOST_MESSAGES = 8192
 _MOST_BYTES = 32 * 2**20
 _FARTHEST = 4
 """By how many times a block may be larger, for the sake of one log time."""
 
-_BESIDE = 31
-"""What a message takes in an MCAP file beside its own bytes."""
+_RECORD_BYTES = 31
+"""Size of a record of a message in an MCAP file without the message itself, in [bytes]."""
 
 Entry = tuple[int, int, int, bytes]
 """Number of the message, log time, publish time, bytes; none of a topic that is only counted."""
 
 
 class Progress(NamedTuple):
-    """What is told how many bytes were read, now and then; and whether to stop."""
+    """Called with the bytes read, now and then; and whether to stop."""
 
     told: Callable[[int], None] = lambda _read: None
     stopped: Callable[[], bool] = lambda: False
@@ -58,7 +150,7 @@ class Blocks:
     wanted
         Topics whose messages are wanted, not their counts alone.
     progress
-        Whom to tell, and whether to stop.
+        Receives the progress, and says whether to stop.
 
     """
 
@@ -139,4 +231,80 @@ class Blocks:
         tally[1] += sum(sizes)
         tally[2] = min(tally[2], *logs)
         tally[3] = max(tally[3], *logs)
-        self._read += sum(sizes) + _BESIDE * len(entries)
+        self._read += sum(sizes) + _RECORD_BYTES * len(entries)
+
+
+KINDS = ('samples', 'faults', 'withheld', 'resets', 'states', 'health')
+_OTHER_RECORDER = 'health'
+"""Topics that another thread records; the clock of the run does not follow them."""
+
+
+class Rows(NamedTuple):
+    """
+    Messages of a kind in a block.
+
+    Attributes
+    ----------
+    numbers
+        Theirs, in the block.
+    logged, published, passed
+        Their times, in [ns], and that of the run.
+    data
+        Their bytes.
+
+    """
+
+    numbers: Times
+    logged: Times
+    published: Times
+    passed: Times
+    data: Sequence[bytes]
+
+
+def rows_of(
+    block: Mapping[str, list[Entry]],
+    topics: Mapping[str, str],
+    own: Callable[[bytes], bool] | None,
+    clock: RunClock,
+) -> dict[str, Rows]:
+    """
+    Return the messages of a block by kind.
+
+    Parameters
+    ----------
+    block
+        The messages of each topic.
+    topics
+        The kind of each; others are left out.
+    own
+        Tells the run's own joint states from the samples, where these share their topic.
+    clock
+        The run's.
+
+    """
+    kinds: dict[str, list[Entry]] = {kind: [] for kind in KINDS}
+    for topic, entries in block.items():
+        kind = topics.get(topic)
+        if kind == 'states' and own is not None:
+            for entry in entries:
+                kinds['states' if own(entry[3]) else 'samples'].append(entry)
+        elif kind is not None:
+            kinds[kind] = entries
+    numbers = np.array([entry[0] for found in kinds.values() for entry in found], np.int64)
+    logged = times_of([entry[1] for found in kinds.values() for entry in found])
+    if len(numbers):
+        clock.start(int(logged[numbers.argmin()]))
+    in_turn = len(numbers) - len(kinds[_OTHER_RECORDER])
+    order = np.argsort(numbers[:in_turn])
+    passed = np.empty_like(logged)
+    passed[order] = clock.passed(logged[order])
+    behind = np.searchsorted(numbers[order], numbers[in_turn:])
+    passed[in_turn:] = clock.beside(logged[in_turn:], behind)
+    rows, at = {}, 0
+    for kind, entries in kinds.items():
+        part = slice(at, at + len(entries))
+        at += len(entries)
+        published = times_of([entry[2] for entry in entries])
+        data = [entry[3] for entry in entries]
+        rows[kind] = Rows(numbers[part], logged[part], published, passed[part], data)
+    return rows

@@ -16,29 +16,183 @@
 """
 A run as the data of its page: numbers as base64 of their bytes, least significant first.
 
-Everything has a bound, whatever the length of the run: see `linkage_ros.report.room`.
+All data are bounded, whatever the length of the run (see `linkage_ros.report.decimation`).
+
+Links are positioned by the recorded joints, for many instants at once. They hang on each other by
+the published joints, like those of a robot model (`linkage_ros.models.tree`), and each is turned
+by its own recorded value. The loops are not solved: where a sensor is wrong, or late against
+another, links that share a pin come apart there, and the page shows by how much. Where the
+published joints do not determine the position of a link, the loops are closed at the recorded
+inputs instead.
 """
 
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from linkage_ros.drawing.figure import view
-from linkage_ros.drawing.link_frames import drawn_in_frames
+from linkage_ros.drawing.link_frames import blocks, drawn_in_frames, link_frames
 from linkage_ros.drawing.painting import COLOURS, FACES, INK
-from linkage_ros.errors import LinkageError
+from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.survey import usual_inputs
-from linkage_ros.report.histogram import EDGES, Histogram
-from linkage_ros.report.poses import poses
-from linkage_ros.report.room import DRAWN
-from linkage_ros.report.run import Curves, Frames, LinkageRun, Run
-from linkage_ros.report.spans import APART, Lane
-from linkage_ros.report.words import LANES, QUANTITIES, short, size_in_json
+from linkage_ros.models.names import prefixed
+from linkage_ros.models.tree import grow, Tree
+from linkage_ros.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
+from linkage_ros.report.labels import LANES, QUANTITIES, short, size_in_json
+from linkage_ros.report.run import APART, Curves, Frames, Lane, LinkageRun, Run
 import numpy as np
 from numpy.typing import ArrayLike
+
+_FARTHEST = 1e30
+"""In [m] or [rad]: what is beyond it is none of a machine, and no number of the page's."""
+
+Places = Any
+"""Array of complex numbers: places in [m], or directions."""
+
+
+class Poses(NamedTuple):
+    """
+    Where the links stand.
+
+    Attributes
+    ----------
+    links
+        Those that move, and the blocks of sliders that are none.
+    frames
+        Of shape (instants, links, 3): where the frame of a link is, in [m], and its angle, in
+        [rad], in (−π, π]; NaN where it is unknown.
+    apart
+        The farthest that two links miss a pin, or a point its line, in [m]; NaN likewise.
+    untold
+        Why the loops were closed instead; '' where every link stands by recorded joints.
+
+    """
+
+    links: tuple[str, ...]
+    frames: Numbers
+    apart: Numbers
+    untold: str
+
+
+_Found = dict[str, tuple[Places, Places]]
+"""Of each link the place of its frame, and its direction."""
+
+
+def poses(
+    closure: Closure, prefix: str, values: Mapping[str, Numbers], inputs: Sequence[str]
+) -> Poses:
+    """
+    Return where the links stand.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    prefix
+        What its joints have before their own names in messages.
+    values
+        By the names in messages what the joints are at, in [rad] or [m]; NaN where unknown. All
+        of one length; the inputs are among them.
+    inputs
+        Names of the driven joints in messages.
+
+    """
+    told = {
+        name: np.where(np.abs(given) < _FARTHEST, given, np.nan) for name, given in values.items()
+    }
+    linkage = closure.linkage
+    _, (names,) = prefixed([(prefix, linkage)])
+    try:
+        found, untold = _by_joints(grow(linkage, names), prefix, told), ''
+    except DefinitionError as error:
+        found, untold = _by_closing(closure, [told[name] for name in inputs]), error.reason
+    for block, along, point in blocks(closure):
+        link = next(link for link, named in linkage.links.items() if point in named)
+        found.setdefault(block, (_at(found, link, linkage.links[link][point]), found[along][1]))
+    links = tuple(link for link in found if link != GROUND)
+    count = len(next(iter(values.values()), np.empty(0)))
+    frames = np.full((count, len(links), 3), np.nan)
+    for number, link in enumerate(links):
+        place, way = found[link]
+        frames[:, number, 0] = place.real
+        frames[:, number, 1] = place.imag
+        frames[:, number, 2] = np.angle(way)
+    # A link is drawn with the others of its linkage, or not at all.
+    frames[np.isnan(frames).any(axis=(1, 2))] = np.nan
+    apart = _apart(closure, found, count)
+    apart[np.isnan(frames).any(axis=(1, 2))] = np.nan
+    return Poses(links, frames, apart, untold)
+
+
+def _by_joints(tree: Tree, prefix: str, values: Mapping[str, Numbers]) -> _Found:
+    count = len(next(iter(values.values()), np.empty(0)))
+    frames: _Found = {prefix + GROUND: (np.zeros(count, complex), np.ones(count, complex))}
+    for joint in tree.joints:
+        place, way = frames[joint.parent]
+        place = place + joint.place * way
+        turned = np.exp(1j * joint.turn) * way
+        moved = values.get(joint.mimics or joint.name)
+        if joint.kind == 'fixed':
+            frames[joint.child] = place, turned
+            continue
+        if moved is None:
+            moved = np.full(count, np.nan)
+        if joint.kind == 'revolute':
+            frames[joint.child] = place, turned * np.exp(1j * joint.axis.real * moved)
+        else:
+            frames[joint.child] = place + joint.axis * moved * turned, turned
+    found = {}
+    for link in tree.linkage.links:
+        place, way = frames[prefix + link]
+        found[link] = place - tree.origins[link] * way, way
+    return found
+
+
+def _by_closing(closure: Closure, inputs: Sequence[Numbers]) -> _Found:
+    links = (*closure.linkage.links, *(block for block, _, _ in blocks(closure)))
+    count = len(inputs[0])
+    found = {link: (np.full(count, np.nan + 0j), np.full(count, np.nan + 0j)) for link in links}
+    for i, given in enumerate(zip(*(values.tolist() for values in inputs), strict=True)):
+        if not all(np.isfinite(given)):
+            continue
+        position = closure.position(*given)
+        if not position.joints:
+            continue
+        for link, frame in link_frames(closure, position).items():
+            place, way = found[link]
+            place[i], way[i] = frame.place, np.exp(1j * frame.angle)
+    return found
+
+
+def _at(found: _Found, link: str, point: tuple[float, float]) -> Places:
+    place, way = found[link]
+    return place + complex(*point) * way
+
+
+def _apart(closure: Closure, found: _Found, count: int) -> Numbers:
+    linkage = closure.linkage
+    worst = np.zeros(count)
+    carriers: dict[str, list[str]] = {}
+    for link, named in linkage.links.items():
+        for point in named:
+            carriers.setdefault(point, []).append(link)
+    for point, (first, *others) in carriers.items():
+        place = _at(found, first, linkage.links[first][point])
+        for link in others:
+            worst = np.maximum(worst, np.abs(_at(found, link, linkage.links[link][point]) - place))
+    for slider in linkage.sliders.values():
+        unit = complex(*slider.direction) / abs(complex(*slider.direction))
+        through = _at(found, slider.along, linkage.links[slider.along][slider.through])
+        carrier = carriers[slider.point][0]
+        between = _at(found, carrier, linkage.links[carrier][slider.point]) - through
+        across = between / (unit * found[slider.along][1])
+        worst = np.maximum(worst, np.abs(across.imag))
+    return worst
+
 
 Plot = dict[str, Any]
 
@@ -151,15 +305,15 @@ def _frames(frames: Frames) -> dict[str, Any]:
 
 
 def _linkages(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[str, Any]]:
-    found, room = [], DRAWN
+    found, space = [], SHAPE_BYTES
     for linkage in linkages:
-        drawn, size, undrawn = _drawn(linkage.closure, room)
-        room -= size
+        drawn, size, undrawn = _drawn(linkage.closure, space)
+        space -= size
         found.append({**_linkage(linkage, frames), 'drawn': drawn, 'undrawn': undrawn})
     return found
 
 
-def _drawn(closure: Closure, room: int) -> tuple[dict[str, Any] | None, int, str]:
+def _drawn(closure: Closure, space: int) -> tuple[dict[str, Any] | None, int, str]:
     """Return how a linkage is drawn and what that takes, in [bytes], or why it is not."""
     try:
         drawn = drawn_in_frames(view(closure, usual_inputs(closure)))
@@ -168,7 +322,7 @@ def _drawn(closure: Closure, room: int) -> tuple[dict[str, Any] | None, int, str
         return None, 0, short(str(error), 200)
     except (ValueError, OverflowError, ZeroDivisionError):
         return None, 0, 'too large or too small for a picture'
-    return (drawn, size, '') if size <= room else (None, 0, 'no room on the page')
+    return (drawn, size, '') if size <= space else (None, 0, 'no room on the page')
 
 
 def _linkage(linkage: LinkageRun, frames: Frames) -> dict[str, Any]:

@@ -13,7 +13,11 @@
 # limitations under the License.
 
 
-"""The page of a run: what it shows, in HTML; `linkage_ros/report/*.js` moves and draws it."""
+"""
+The page of a run as HTML, with its tables; the scripts beside this file draw and move it.
+
+Whatever the bag holds, the page has a size limit.
+"""
 
 from __future__ import annotations
 
@@ -22,22 +26,136 @@ from html import escape
 from typing import NamedTuple
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.page.document import document
-from linkage_ros.page.parts import facts_html
+from linkage_ros.pages.document import document, facts_html, table_html
 from linkage_ros.report.data import facts_of_thinning, lanes, page_data, plots
-from linkage_ros.report.histogram import Histogram
-from linkage_ros.report.room import BOUND
-from linkage_ros.report.run import LinkageRun, Run
-from linkage_ros.report.tables import run_tables, TableOf, tables_html
-from linkage_ros.report.words import (
+from linkage_ros.report.decimation import Histogram, PAGE_BYTES, TABLE_BYTES
+from linkage_ros.report.labels import (
     AGE_NOTE,
     CLOSED_NOTE,
     duration_text,
     LANES,
     LATENESS_NOTE,
     POSE_NOTE,
+    seconds_text,
     short,
 )
+from linkage_ros.report.run import Curves, LinkageRun, Run
+import numpy as np
+
+_LONGEST = 200
+"""Letters of a cell."""
+
+_BESIDE_CELL, _BESIDE_ROW, _BESIDE_TABLE = 25, 10, 250
+"""What a page writes about each, or more, in [bytes]."""
+
+
+class TableOf(NamedTuple):
+    """
+    A table.
+
+    Attributes
+    ----------
+    title
+        What stands above it.
+    columns
+        Headings; a leading ``>`` is for numbers.
+    rows
+        The cells.
+    folded
+        Whether the reader has to open it.
+
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    folded: bool = False
+
+
+def tables_html(tables: Sequence[TableOf]) -> Iterator[str]:
+    """Yield tables as HTML, as far as there is room for them; and how much there is not."""
+    space = TABLE_BYTES
+    for number, table in enumerate(tables):
+        if not table.rows:
+            continue
+        space -= _BESIDE_TABLE + _size([short(table.title), *table.columns])
+        if space < 0:
+            yield f'<p class="note">No room for {len(tables) - number} more tables.</p>'
+            return
+        rows = []
+        for row in table.rows:
+            cells = [short(cell, _LONGEST) for cell in row]
+            space -= _size(cells)
+            if space < 0:
+                break
+            rows.append(cells)
+        yield from _table(table._replace(title=short(table.title), rows=rows))
+        if len(rows) < len(table.rows):
+            yield f'<p class="note">No room for {len(table.rows) - len(rows)} more rows.</p>'
+
+
+def _size(cells: Sequence[str]) -> int:
+    written = (escape(cell).encode('utf-8', 'backslashreplace') for cell in cells)
+    return _BESIDE_ROW + sum(_BESIDE_CELL + len(each) for each in written)
+
+
+def _table(table: TableOf) -> Iterator[str]:
+    columns = [column.lstrip('>') for column in table.columns]
+    numbers = [column.startswith('>') for column in table.columns]
+    if table.folded:
+        yield f'<details><summary>{escape(table.title)}</summary>'
+        yield from table_html('', columns, table.rows, numbers)
+        yield '</figure></details>'
+    else:
+        yield from table_html(table.title, columns, table.rows, numbers)
+        yield '</figure>'
+
+
+def run_tables(run: Run) -> Iterator[TableOf]:
+    """Yield what there is to tell of a run in numbers."""
+    yield TableOf(
+        'Curves',
+        ('joint', 'quantity', '>least', '>greatest', 'unit', 'on'),
+        [row for curves in run.curves for row in _ranges(curves)],
+    )
+    yield TableOf(
+        'Events',
+        ('kind', '>count', '>first at [s]', 'what it is'),
+        [
+            (
+                LANES[key][0],
+                f'{lane.count:,}',
+                seconds_text(lane.in_order[0].begin),
+                LANES[key][1],
+            )
+            for key, lane in lanes(run).items()
+        ],
+    )
+    yield TableOf(
+        'Samples rejected',
+        ('reason', '>count'),
+        [(reason, f'{count:,}') for reason, count in run.rejected.items()],
+    )
+    yield TableOf(
+        'Left out of the curves',
+        ('of', 'reason', '>count'),
+        [(of, reason, f'{count:,}') for (of, reason), count in run.left_out.items()],
+    )
+    yield TableOf(
+        'What the diagnostics said last',
+        ('of', 'key', 'value'),
+        [(task, key, value) for (task, key), value in run.said.items()],
+        folded=True,
+    )
+
+
+def _ranges(curves: Curves) -> Iterator[tuple[str, ...]]:
+    found = curves.intervals
+    for number, (name, quantity, unit) in enumerate(curves.columns):
+        least = np.nanmin(np.fmin(found.first[:, number], found.second[:, number]))
+        greatest = np.nanmax(np.fmax(found.first[:, number], found.second[:, number]))
+        yield name, quantity, f'{least:.9g}', f'{greatest:.9g}', unit, curves.title
+
 
 _HERE = 'linkage_ros.report'
 _STYLES = [(_HERE, 'report.css')]
@@ -46,26 +164,26 @@ _SCRIPTS = [
     for name in ('curves', 'looks', 'picture', 'over_time', 'over_others', 'plots', 'report')
 ]
 
-_LONGEST = 400
+_LONGEST_FACT = 400
 """Letters of a fact, or of a warning."""
 
 _SPEEDS = ('0.01', '0.1', '0.25', '0.5', '1', '2', '5', '10', '60')
 
 
-class Told(NamedTuple):
+class ReportHeader(NamedTuple):
     """
-    What a page tells of a bag beside its run.
+    The facts of a bag that a page shows beside its run.
 
     Attributes
     ----------
     title
         Of the page.
     facts
-        What stands at its head.
+        The facts at its head.
     warnings
-        What is missing or damaged, a line each.
+        Missing or damaged parts, a line each.
     tables
-        What stands at its end.
+        The tables at its end.
     wrapped
         Whether published angles jump from π to −π.
 
@@ -78,32 +196,34 @@ class Told(NamedTuple):
     wrapped: bool = False
 
 
-def run_html(run: Run, told: Told) -> str:
+def run_html(run: Run, header: ReportHeader) -> str:
     """
     Return the page of a run.
 
     Raises
     ------
     LinkageError
-        Where plotly is not installed, or the page would be larger than `BOUND`.
+        Where plotly is not installed, or the page would be larger than `PAGE_BYTES`.
 
     """
-    data = page_data(run, told.wrapped)
-    title = short(told.title)
-    page = document(title, _body(run, told, data), data, _STYLES, _SCRIPTS)
-    # The rooms of its parts come to less, but for names in a scene, which have no bound.
-    if len(page.encode('utf-8', 'backslashreplace')) > BOUND:
-        bound = f'{BOUND // 1_000_000} MB'
+    data = page_data(run, header.wrapped)
+    title = short(header.title)
+    page = document(title, _body(run, header, data), data, _STYLES, _SCRIPTS)
+    # The limits of the parts add up to less, but names in a scene have no limit.
+    if len(page.encode('utf-8', 'backslashreplace')) > PAGE_BYTES:
+        bound = f'{PAGE_BYTES // 1_000_000} MB'
         raise LinkageError(title, f'its page would be larger than {bound}', 'shorten its names')
     return page
 
 
-def _body(run: Run, told: Told, data: dict[str, object]) -> Iterator[str]:
-    yield f'<header><h1>{escape(short(told.title))}</h1>'
-    yield from facts_html([(name, short(value, _LONGEST)) for name, value in told.facts])
-    if told.warnings:
+def _body(run: Run, header: ReportHeader, data: dict[str, object]) -> Iterator[str]:
+    yield f'<header><h1>{escape(short(header.title))}</h1>'
+    yield from facts_html([(name, short(value, _LONGEST_FACT)) for name, value in header.facts])
+    if header.warnings:
         yield '<ul class="warnings" role="alert">'
-        yield from (f'<li>{escape(short(warning, _LONGEST))}</li>' for warning in told.warnings)
+        yield from (
+            f'<li>{escape(short(warning, _LONGEST_FACT))}</li>' for warning in header.warnings
+        )
         yield '</ul>'
     yield '<noscript><p class="warnings">Pictures and plots need JavaScript.</p></noscript>'
     yield '</header>'
@@ -117,7 +237,7 @@ def _body(run: Run, told: Told, data: dict[str, object]) -> Iterator[str]:
     yield from _histograms(run)
     yield '</div>'
     yield '<section class="tables"><h2>In numbers</h2>'
-    yield from tables_html([*told.tables, *run_tables(run)])
+    yield from tables_html([*header.tables, *run_tables(run)])
     yield '</section></main>'
 
 
@@ -181,7 +301,7 @@ def _plots(run: Run) -> Iterator[str]:
         f'again. On this page: {escape("; ".join(facts_of_thinning(run)))}. A zoom shows what is '
         'here; of a longer run <code>linkage report --since S --until S</code> shows a part in '
         'full. '
-        f'The page is no larger than {BOUND // 1_000_000} MB, however long the run.</p>'
+        f'The page is no larger than {PAGE_BYTES // 1_000_000} MB, however long the run.</p>'
     )
     notes = {'lateness': LATENESS_NOTE, 'age': AGE_NOTE}
     for plot in found:

@@ -28,7 +28,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from linkage_ros.joint_state import arrays_of, NANOSECONDS, Rejection
-from linkage_ros.report.arrays import Flags, Numbers, Times
+from linkage_ros.report.decimation import Flags, Numbers, Times
 import numpy as np
 from numpy.typing import NDArray
 

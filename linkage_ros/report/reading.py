@@ -13,22 +13,131 @@
 # limitations under the License.
 
 
-"""A bag, read once from end to end for its page; memory does not grow with it."""
+"""
+Read a bag once, from beginning to end, for its page; memory does not grow with the bag.
+
+A bag without a scene of ours is shown by all its topics of joint states, as they are.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from linkage_ros.bag.reading.contents import Contents
 from linkage_ros.bag.reading.reader import Bag
 from linkage_ros.bag.reading.run_events import run_account
 from linkage_ros.errors import LinkageError
 from linkage_ros.replay import recorded_scene
-from linkage_ros.report.blocks import Blocks, Progress
-from linkage_ros.report.foreign_run import ForeignRun
-from linkage_ros.report.own_run import OwnRun
-from linkage_ros.report.run import Run, Window
+from linkage_ros.report.blocks import Blocks, Entry, Progress, RunClock, times_of
+from linkage_ros.report.curves import Kept, NO_ROOM, UNITS
+from linkage_ros.report.decimation import STATE_BYTES
+from linkage_ros.report.joint_states import JointStates
+from linkage_ros.report.labels import short
+from linkage_ros.report.run import APART, Column, Lane, Run, Silences, Window
+from linkage_ros.report.scene_run import SceneRun
 from linkage_ros.scene.scene import Scene
+import numpy as np
+
+_TYPE = 'sensor_msgs/msg/JointState'
+_MOST_TOPICS = 6
+_DISORDER = 1_000_000_000
+"""How late a message may stand in a bag that others have written, in [ns]."""
+
+_MORE_TOPICS = f'topics of joint states beyond the first {_MOST_TOPICS}'
+_LATER_JOINTS = 'messages with joints that turn up later'
+
+
+class ForeignRun:
+    """
+    Reads a bag block by block.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+    window
+        The part of the run that is shown.
+
+    """
+
+    def __init__(self, bag: Bag, window: Window) -> None:
+        found = [topic.name for topic in bag.topics if topic.type == _TYPE]
+        self._window, self._clock = window, RunClock(_DISORDER)
+        self.topics = set(found[:_MOST_TOPICS])
+        self._more = found[_MOST_TOPICS:]
+        self._readers = {topic: JointStates() for topic in found[:_MOST_TOPICS]}
+        self._kept: dict[str, Kept] = {}
+        self._widths: dict[str, int] = {}
+        self._lanes = {'jump': Lane(window=window)}
+        # Of several topics none is the one that must not be silent.
+        if len(self._readers) == 1:
+            self._lanes['silent'] = Lane(APART, window=window)
+            self._silences = Silences(self._lanes['silent'], 0)
+        self._later: dict[str, int] = {}
+
+    def take(self, block: Mapping[str, list[Entry]]) -> None:
+        """Take the messages of a block."""
+        entries = sorted(
+            (*entry, topic) for topic in self.topics for entry in block.get(topic, ())
+        )
+        passed = self._clock.passed(times_of([entry[1] for entry in entries]))
+        for time, by in self._clock.jumps():
+            self._lanes['jump'].add(time, time, f'by {by / 1e9:.6g} s')
+        for topic, reader in self._readers.items():
+            own = [i for i, entry in enumerate(entries) if entry[4] == topic]
+            if not own:
+                continue
+            read = reader.read([entries[i][3] for i in own])
+            times, numbers = passed[own][read.good], read.numbers[read.good]
+            if not len(times):
+                continue
+            if topic not in self._kept:
+                # The unit is not said: it is that of what turns, or of what slides.
+                columns = [
+                    Column(short(name), quantity, ' or '.join(units))
+                    for quantity, units in UNITS.items()
+                    for name in reader.joints
+                ]
+                space = STATE_BYTES // len(self._readers)
+                self._kept[topic] = Kept(topic, columns, space, self._window)
+                self._widths[topic] = len(reader.joints)
+            width = self._widths[topic]
+            if numbers.shape[2] > width:
+                later = ~np.isnan(numbers[:, :, width:]).all(axis=(1, 2))
+                self._later[topic] = self._later.get(topic, 0) + int(later.sum())
+            self._kept[topic].add(times, numbers[:, :, :width].reshape(len(times), 3 * width))
+            if len(self._readers) == 1:
+                self._silences.add(times)
+
+    def end(self, contents: Contents) -> Run:
+        """Return what there is to tell; with the counts of all messages."""
+        if len(self._readers) == 1:
+            self._silences.end(self._clock.end)
+        found = [curves for kept in self._kept.values() if (curves := kept.curves()) is not None]
+        left_out = {
+            (topic, reason): count
+            for topic, reader in self._readers.items()
+            for reason, count in reader.left_out.items()
+            if count
+        }
+        left_out |= {
+            (topic, _LATER_JOINTS): count for topic, count in self._later.items() if count
+        }
+        left_out |= {
+            (topic, NO_ROOM): kept.left_out for topic, kept in self._kept.items() if kept.left_out
+        }
+        counts = {topic.topic.name: topic.messages for topic in contents.topics}
+        left_out |= {(topic, _MORE_TOPICS): counts.get(topic, 0) for topic in self._more}
+        return Run(
+            begin=self._clock.begin,
+            end=self._clock.end,
+            window=self._window,
+            contents=contents,
+            curves=found,
+            lanes=self._lanes,
+            left_out=left_out,
+        )
 
 
 def read_run(
@@ -43,18 +152,18 @@ def read_run(
     Parameters
     ----------
     bag
-        The bag. Where it is damaged, what lies before the damage is told.
+        The bag. If it is damaged, the part before the damage is shown.
     window
-        Which part of the run is told.
+        The part of the run that is shown.
     progress
-        Whom to tell how far it is, and whether to stop.
+        Receives the progress, and says whether to stop.
     scene_of
         Gives the scene that a bag carries.
 
     Returns
     -------
     run
-        What it holds.
+        Its contents.
     scene
         Its scene, if it carries one.
     missing
@@ -62,10 +171,10 @@ def read_run(
 
     """
     scene, missing = None, ''
-    reader: OwnRun | ForeignRun
+    reader: SceneRun | ForeignRun
     try:
         scene = scene_of(bag)
-        reader = OwnRun(bag, run_account(bag), scene, window)
+        reader = SceneRun(bag, run_account(bag), scene, window)
     except LinkageError as error:
         # A page is handed on, and does not say where its bag lay.
         missing = f'{Path(error.where).name}: {error.reason}'

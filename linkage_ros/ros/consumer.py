@@ -35,7 +35,7 @@ from threading import Event
 from time import monotonic_ns, sleep, time_ns
 from typing import Any, NamedTuple
 
-from linkage_ros.accuracy.ticking.crank_motions import CrankAt, motions_of
+from linkage_ros.accuracy.ticking import CrankAt, motions_of
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateReader, JointStateWriter, NANOSECONDS, Rejection
 from linkage_ros.kinematics.closure import Closure

@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import inf, nan
 
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Results, Table
-from linkage_ros.accuracy.spread import Spread
+from linkage_ros.measuring import Spread
 
 TIME, ERROR = Axis('time per state', 'µs'), Axis('greatest error', 'rad')
 

@@ -20,15 +20,21 @@ from __future__ import annotations
 from dataclasses import replace
 from math import pi, sqrt
 
-from linkage_ros.accuracy.dynamics.energy_integral import (
+from linkage_ros.accuracy.dynamics import (
+    free_motion,
+    integrate,
+    measure_dynamics,
+    SECONDS,
+    slope,
+    STEPS,
+)
+from linkage_ros.accuracy.energy_integral import (
     ExactEnergy,
     NoReferenceError,
     State,
     swung,
     turned,
 )
-from linkage_ros.accuracy.dynamics.free_motion import free_motion, integrate, SECONDS
-from linkage_ros.accuracy.dynamics.measure import measure_dynamics, slope, STEPS
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.kinematics.closure import Closure

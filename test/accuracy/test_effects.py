@@ -20,11 +20,9 @@ from __future__ import annotations
 from itertools import islice
 from math import isclose, pi, radians, sin, sqrt, tau
 
-from linkage_ros.accuracy.effects.departure import departure
-from linkage_ros.accuracy.effects.measure import measure_effects, WHOLE
-from linkage_ros.accuracy.spread import Spread
-from linkage_ros.cost.feed import feed
-from linkage_ros.cost.variants import Names, Variants
+from linkage_ros.accuracy.effects import departure, measure_effects, WHOLE
+from linkage_ros.cost import feed, Names, Variants
+from linkage_ros.measuring import Spread
 from linkage_ros.scene.load import load_scene
 from linkage_ros.shipped import shipped
 import pytest
@@ -100,7 +98,7 @@ def test_the_part_has_a_row_for_each_effect_and_for_all(scene_with):
         FOUR_BAR, 'velocity: {}, encoder: {joints: {rocker_joint: {counts: 4096}}}', 'seed: 1'
     )
     told = []
-    part = measure_effects(scene, True, lambda *said: told.append(said))
+    part = measure_effects(scene, True, told.append)
     (table,) = part.tables
     assert [row[0] for row in table.rows] == [
         'a tick without effects',
@@ -115,7 +113,7 @@ def test_the_part_has_a_row_for_each_effect_and_for_all(scene_with):
     assert 0.0 < table.rows[2][angles] <= radians(360 / 4096)
     (diagram,) = part.diagrams
     assert [curve.name for curve in diagram.curves] == ['encoder', WHOLE]
-    shares = [share for _, share in told]
+    shares = told
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
 

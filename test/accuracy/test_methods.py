@@ -22,17 +22,13 @@ from itertools import pairwise
 from math import cos, log2, pi, radians
 from typing import Any
 
-from linkage_ros.accuracy.reference.reference import Reference, Truth
-from linkage_ros.accuracy.solving.loop_errors import off
-from linkage_ros.accuracy.solving.methods.closed_form import closed_form, ITERATED, NAME
-from linkage_ros.accuracy.solving.methods.extended import extended
-from linkage_ros.accuracy.solving.methods.four_bar import plain_four_bar
-from linkage_ros.accuracy.solving.methods.integration import integration
-from linkage_ros.accuracy.solving.methods.ladder import PEERS
-from linkage_ros.accuracy.solving.methods.method import ACCELERATION, Method, RATE
-from linkage_ros.accuracy.solving.methods.single_precision import single_precision
-from linkage_ros.accuracy.solving.methods.textbook import textbook
-from linkage_ros.accuracy.solving.poses import easy, path, Poses, shipped_linkage
+from linkage_ros.accuracy.methods import ACCELERATION, Method, RATE
+from linkage_ros.accuracy.methods.equations import extended, integration
+from linkage_ros.accuracy.methods.formulas import plain_four_bar, single_precision, textbook
+from linkage_ros.accuracy.methods.node import CLOSED_FORM, closed_form, ITERATED
+from linkage_ros.accuracy.poses import easy, off, path, Poses, shipped_linkage
+from linkage_ros.accuracy.reference import Reference, Truth
+from linkage_ros.accuracy.solving import PEERS
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
 import numpy as np
@@ -146,7 +142,7 @@ def test_what_is_no_four_bar_is_not_taken_for_one(
 
 def test_what_is_iterated_is_not_called_a_closed_form() -> None:
     assert closed_form(shipped_linkage('class_3')).name == ITERATED
-    assert closed_form(shipped_linkage('jansen_leg')).name == NAME
+    assert closed_form(shipped_linkage('jansen_leg')).name == CLOSED_FORM
 
 
 @pytest.mark.parametrize('name', ['four_bar', 'crank too', 'jansen_leg', 'slider_crank'])

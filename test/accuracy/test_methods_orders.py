@@ -20,12 +20,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import log, tau
 
-from linkage_ros.accuracy.reference.reference import Reference, Truth
-from linkage_ros.accuracy.solving.loop_errors import off
-from linkage_ros.accuracy.solving.methods.method import ACCELERATION, Method, RATE
-from linkage_ros.accuracy.solving.methods.newton import COLD, FROM_KNOTS, newton, STARTS, WARM
-from linkage_ros.accuracy.solving.methods.table import table
-from linkage_ros.accuracy.solving.poses import easy, five_dyads, shipped_linkage
+from linkage_ros.accuracy.methods import ACCELERATION, Method, RATE
+from linkage_ros.accuracy.methods.node import COLD, FROM_KNOTS, newton, STARTS, table, WARM
+from linkage_ros.accuracy.poses import easy, five_dyads, off, shipped_linkage
+from linkage_ros.accuracy.reference import Reference, Truth
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.survey import Way

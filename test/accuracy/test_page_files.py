@@ -24,12 +24,12 @@ from math import isnan
 import re
 import xml.etree.ElementTree as ET
 
-from linkage_ros.accuracy.page.csv_text import diagram_csv, table_csv
-from linkage_ros.accuracy.page.folder import page_files, write_page
+from linkage_ros.accuracy.page.files import page_files, write_page
+from linkage_ros.accuracy.page.numbers import diagram_csv, table_csv
 from linkage_ros.accuracy.results import Diagram, Part, Results, Table
-from linkage_ros.accuracy.spread import Spread
 from linkage_ros.errors import LinkageError
-from linkage_ros.page.document import POLICY
+from linkage_ros.measuring import Spread
+from linkage_ros.pages.document import POLICY
 import numpy as np
 import pytest
 
@@ -180,7 +180,7 @@ def test_what_draws_is_missed_before_anything_is_written(tmp_path, monkeypatch, 
     def find_spec(name):
         return None if name == missing else object()
 
-    monkeypatch.setattr('linkage_ros.accuracy.page.folder.find_spec', find_spec)
+    monkeypatch.setattr('linkage_ros.accuracy.page.files.find_spec', find_spec)
     with pytest.raises(LinkageError, match=rf'{missing}: is not installed; pip install'):
         write_page(RESULTS, tmp_path / 'page')
 

@@ -19,8 +19,8 @@ from __future__ import annotations
 import json
 import re
 
-from linkage_ros.accuracy.page.folder import PAGE, write_page
-from linkage_ros.accuracy.page.places import places
+from linkage_ros.accuracy.page.diagrams import places
+from linkage_ros.accuracy.page.files import PAGE, write_page
 import pytest
 
 from .shown import DIAGRAMS, EMPTY, FAILED, LONG, MANY, METHODS, POSITION, RESULTS

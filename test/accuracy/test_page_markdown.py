@@ -19,11 +19,14 @@ from __future__ import annotations
 
 import re
 
-from linkage_ros.accuracy.page.markdown import BEGIN, END, write_markdown
+from linkage_ros.accuracy.page.files import write_markdown
+from linkage_ros.pages.markdown import marks
 from markdown_it import MarkdownIt
 import pytest
 
 from .shown import CLOSING, DIAGRAMS, FOREIGN, METHODS, RESULTS
+
+BEGIN, END = marks('measured')
 
 pytest.importorskip('matplotlib', reason='draws the pictures')
 

@@ -20,11 +20,11 @@ from __future__ import annotations
 from math import inf, nan
 
 from hypothesis import given, strategies
+from linkage_ros.accuracy.page.diagrams import Range
 from linkage_ros.accuracy.page.numbers import cell_text, number_text, spread_text
-from linkage_ros.accuracy.page.places import Range
-from linkage_ros.accuracy.page.ticks import ticks
+from linkage_ros.accuracy.page.svg import ticks
 from linkage_ros.accuracy.results import Axis
-from linkage_ros.accuracy.spread import Spread
+from linkage_ros.measuring import Spread
 import numpy as np
 import pytest
 

@@ -21,10 +21,9 @@ from itertools import combinations
 from math import inf, nan
 
 from hypothesis import given, strategies
-from linkage_ros.accuracy.page.places import places
-from linkage_ros.accuracy.page.styles import styles_of
+from linkage_ros.accuracy.page.diagrams import places, styles_of
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Results
-from linkage_ros.accuracy.spread import Spread
+from linkage_ros.measuring import Spread
 import pytest
 
 from .shown import DIAGRAMS, EMPTY, FAILED, POSITION, RESULTS

@@ -19,14 +19,12 @@ from __future__ import annotations
 
 from collections import Counter
 
-from linkage_ros.accuracy.recording import cost as recording_cost
-from linkage_ros.accuracy.recording import measure as recording
-from linkage_ros.accuracy.recording.cost import Cost, cost_of, measure_costs
-from linkage_ros.accuracy.recording.measure import measure_recording, part_of
-from linkage_ros.accuracy.recording.recorded_run import Flush, record_run, Recorded
-from linkage_ros.accuracy.spread import Spread
+from linkage_ros.accuracy import recording
+from linkage_ros.accuracy.recorded_run import Flush, record_run, Recorded
+from linkage_ros.accuracy.recording import Cost, cost_of, measure_costs, measure_recording, part_of
 from linkage_ros.bag.writing.storage import Storage
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.measuring import Spread
 from linkage_ros.scene.load import load_scene
 from linkage_ros.shipped import shipped
 from mcap.reader import make_reader
@@ -198,7 +196,7 @@ def test_settings_take_turns_and_nothing_is_left_behind(scene_at, tmp_path, monk
         made.append((folder and folder.parent.parent, storage.flush_period, seconds))
         return Recorded(0.3, (0,), 1, 1, 0, 1, (Flush(0, 1, 1, 1),), None, 1)
 
-    monkeypatch.setattr(recording_cost, 'record_run', recorded)
+    monkeypatch.setattr(recording, 'record_run', recorded)
     compared = [None, FLUSHED_OFTEN, Storage(flush_period=2.0)]
     here = sorted(tmp_path.iterdir())
     measure_costs(scene_at(500), tmp_path, compared, 0.3, 2)
@@ -211,7 +209,7 @@ def test_a_part_of_the_page(scene_at, tmp_path, monkeypatch):
     monkeypatch.setattr(recording, 'QUICK_PERIODS', (0.05, 0.2))
     monkeypatch.setattr(recording, 'QUICK_PACKED_AT', 0.2)
     told = []
-    part = measure_recording(scene_at(500), tmp_path, True, lambda *said: told.append(said))
+    part = measure_recording(scene_at(500), tmp_path, True, told.append)
     (table,) = part.tables
     assert [row[0] for row in table.rows] == [
         'no bag',
@@ -234,7 +232,7 @@ def test_a_part_of_the_page(scene_at, tmp_path, monkeypatch):
             ('zstd', 1),
         ]
     assert part.key == 'recording'
-    assert told[0] == ('recording', 0.0)
-    assert told[-1] == ('recording', 1.0)
-    assert [share for _, share in told] == sorted(share for _, share in told)
+    assert told[0] == 0.0
+    assert told[-1] == 1.0
+    assert told == sorted(told)
     assert [path.name for path in tmp_path.iterdir()] == ['scene.yaml']

@@ -20,22 +20,21 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
-from campaigns.accuracy.loops import four_bar
+from campaigns.accuracy.adversarial import four_bar
 from campaigns.accuracy.reference import Outcome
 from campaigns.accuracy.reference import Reference as Elsewhere
 from campaigns.accuracy.run import make
 from flint import arb, ctx
-from linkage_ros.accuracy.reference.confirmation import confirmed
-from linkage_ros.accuracy.reference.enclosure import prove
-from linkage_ros.accuracy.reference.reference import Reference, SingularError
-from linkage_ros.accuracy.solving.measure import true_states
-from linkage_ros.accuracy.solving.poses import (
+from linkage_ros.accuracy.enclosure import prove
+from linkage_ros.accuracy.poses import (
     five_dyads,
     near_change_point,
     near_toggle,
     Poses,
     shipped_linkage,
 )
+from linkage_ros.accuracy.reference import Reference, SingularError
+from linkage_ros.accuracy.solving import confirmed, true_states
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.survey import usual_inputs

@@ -18,27 +18,26 @@ from __future__ import annotations
 
 from math import inf, nan, pi
 
-from linkage_ros.accuracy.reference.reference import Reference
-from linkage_ros.accuracy.solving.advice import advice
-from linkage_ros.accuracy.solving.loop_errors import Errors, off, position_errors
-from linkage_ros.accuracy.solving.measure import judge, true_states
-from linkage_ros.accuracy.solving.measured import Measured
-from linkage_ros.accuracy.solving.methods.ladder import KNOTS
-from linkage_ros.accuracy.solving.methods.method import Method
-from linkage_ros.accuracy.solving.poses import (
+from linkage_ros.accuracy.methods import Method
+from linkage_ros.accuracy.poses import (
     DISTANCES,
     easy,
+    Errors,
     five_dyads,
     near_change_point,
     near_toggle,
+    off,
     pose_sets,
     Poses,
+    position_errors,
     shipped_linkage,
 )
-from linkage_ros.accuracy.solving.shown import part_of
-from linkage_ros.accuracy.spread import Spread
+from linkage_ros.accuracy.reference import Reference
+from linkage_ros.accuracy.solving import judge, KNOTS, Measured, true_states
+from linkage_ros.accuracy.solving_results import advice, part_of
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.structure import Dyad
+from linkage_ros.measuring import Spread
 from mpmath import mp, mpf
 import pytest
 

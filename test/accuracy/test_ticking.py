@@ -20,9 +20,15 @@ from __future__ import annotations
 from itertools import pairwise
 from statistics import median
 
-from linkage_ros.accuracy.ticking.crank_motions import ACCELERATION, CHIRP, motions_of
-from linkage_ros.accuracy.ticking.measure import measure_ticking
-from linkage_ros.accuracy.ticking.use_of_states import CARRIED, HELD, use_states
+from linkage_ros.accuracy.ticking import (
+    ACCELERATION,
+    CARRIED,
+    CHIRP,
+    HELD,
+    measure_ticking,
+    motions_of,
+    use_states,
+)
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.scene.load import load_scene
@@ -104,7 +110,7 @@ def test_several_inputs_have_no_such_part():
 
 @pytest.mark.ros
 def test_the_part_says_what_a_rate_buys(monkeypatch):
-    monkeypatch.setattr('linkage_ros.accuracy.ticking.measure.QUICK_RATES', (25, 250))
+    monkeypatch.setattr('linkage_ros.accuracy.ticking.QUICK_RATES', (25, 250))
     part = measure_ticking(load_scene(shipped('scenes/demo.yaml')), True, lambda *said: None)
     (table,) = part.tables
     assert [row[:2] for row in table.rows] == [

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import gc
 
-from linkage_ros.accuracy.solving.timing import BLOCK, Contender, FEWEST, in_turn, MOST
+from linkage_ros.measuring import BLOCK, Contender, FEWEST, in_turn, MOST
 import pytest
 
 

@@ -24,9 +24,10 @@ from shutil import which
 import subprocess
 import sys
 
-from bench.kinematics_pylinkage import AVAILABLE
-from bench.report import Table
-from bench.spread import percentile, ratios, spread
+from bench.kinematics_speed import AVAILABLE
+from bench.report import ratios, spread, Table
+from linkage_ros.cli.tables import text
+from linkage_ros.measuring import percentile
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -47,7 +48,7 @@ def test_ratios_are_taken_turn_by_turn():
 
 def test_table_is_the_same_as_text_and_as_markdown():
     table = Table('t', ('', 'µs'), [('a', '1.0')])
-    assert table.plain() == 't\n   µs\n------\na  1.0\n'
+    assert text(table.for_terminal()) == 't\n    µs\na  1.0'
     assert table.markdown() == '## t\n\n|  | µs |\n| --- | ---: |\n| a | 1.0 |\n'
 
 
@@ -172,7 +173,7 @@ def _bench(runs: Path, *arguments: str) -> str:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert 'machine' in done.stdout
+    assert 'Machine' in done.stdout
     (file,) = runs.iterdir()
     return file.read_text(encoding='utf-8')
 

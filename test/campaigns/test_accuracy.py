@@ -17,11 +17,9 @@
 from __future__ import annotations
 
 from campaigns.accuracy.adversarial import ADVERSARIAL
-from campaigns.accuracy.judge import AT_TOGGLE, judge, QUANTITIES
+from campaigns.accuracy.judge import AT_TOGGLE, FAULTS, judge, QUANTITIES, Tally
 from campaigns.accuracy.random_families import RANDOM
-from campaigns.accuracy.report import FAULTS
 from campaigns.accuracy.run import make, parts, run
-from campaigns.accuracy.tally import Tally
 import pytest
 
 RANDOM_CASES, HARD_CASES = 100_000, 20_000

@@ -19,7 +19,7 @@ from __future__ import annotations
 import random
 
 from campaigns.attacks import files, signals
-from campaigns.attacks.mutations import mutated
+from campaigns.attacks.files import mutated
 from linkage_ros.cli.main import COMMANDS
 import pytest
 

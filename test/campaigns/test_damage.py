@@ -20,10 +20,19 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from campaigns.damage import judge as judge_module
-from campaigns.damage.judge import FAULT, judge_reading, judge_salvage
-from campaigns.damage.run import JUDGES, parts, run, Tally
-from campaigns.damage.subject import KILLED, KINDS, make
+from campaigns.damage import run as judge_module
+from campaigns.damage.run import (
+    FAULT,
+    judge_reading,
+    judge_salvage,
+    JUDGES,
+    KILLED,
+    KINDS,
+    make,
+    parts,
+    run,
+    Tally,
+)
 from linkage_ros.bag.reading.reader import Bag, BagMessage
 import pytest
 

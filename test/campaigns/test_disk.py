@@ -20,14 +20,23 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from campaigns.campaign import results_of
 from campaigns.disk import filling, stalling
 from campaigns.disk.failing import attempt, injections, Part, Tried
-from campaigns.disk.faults import FAULTS
-from campaigns.disk.judge import EARLY, Expectation, judge, REFUSED, WHOLE
-from campaigns.disk.notifications import why_not
-from campaigns.disk.small_disks import Disk, NotPermittedError
-from campaigns.disk.subject import expected_messages, MESSAGES, record, Recorded, SETTINGS
-from campaigns.processes import results_of
+from campaigns.disk.filling import Disk, NotPermittedError
+from campaigns.disk.injection import FAULTS, why_not
+from campaigns.disk.judge import (
+    EARLY,
+    Expectation,
+    expected_messages,
+    judge,
+    MESSAGES,
+    record,
+    Recorded,
+    REFUSED,
+    SETTINGS,
+    WHOLE,
+)
 from linkage_ros.bag.metadata import METADATA_FILE
 import pytest
 

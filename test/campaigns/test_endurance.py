@@ -25,8 +25,7 @@ import sys
 
 from campaigns.endurance import over_dds
 from campaigns.endurance.accelerated import Plan, run_all
-from campaigns.endurance.account import shortcomings
-from campaigns.endurance.memory import flatness, MOST_GROWTH, Usage, usage
+from campaigns.endurance.memory import flatness, MOST_GROWTH, shortcomings, Usage, usage
 from linkage_ros.bag.account import Account
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.writer import BagWriter

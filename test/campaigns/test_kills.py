@@ -21,11 +21,9 @@ from collections.abc import Callable
 from pathlib import Path
 import shutil
 
-from campaigns.kills import judge as judge_module
-from campaigns.kills.judge import FAULT, judge, NO_FILE, NO_FOLDER, Outcome
-from campaigns.kills.marks import Marks
-from campaigns.kills.plan import message, PERIOD_NS, Phase, Plan, plans, TOPICS
-from campaigns.kills.run import run
+from campaigns.kills import run as judge_module
+from campaigns.kills.plan import Marks, message, PERIOD_NS, Phase, Plan, plans, TOPICS
+from campaigns.kills.run import FAULT, judge, NO_FILE, NO_FOLDER, Outcome, run
 from linkage_ros.bag.metadata import METADATA_FILE
 from linkage_ros.bag.reading.reader import Bag, BagMessage
 from linkage_ros.bag.writing.storage import Storage

@@ -19,15 +19,16 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
-from campaigns.accuracy.adversarial import ADVERSARIAL
-from campaigns.accuracy.condition import (
-    condition_numbers,
-    exact_condition_numbers,
-)
-from campaigns.accuracy.loops import four_bar, inverted_slider_crank
+from campaigns.accuracy.adversarial import ADVERSARIAL, four_bar, inverted_slider_crank
 from campaigns.accuracy.mechanism import GROUND, Turn
 from campaigns.accuracy.random_families import RANDOM
-from campaigns.accuracy.reference import Outcome, Reference, Truth
+from campaigns.accuracy.reference import (
+    condition_numbers,
+    exact_condition_numbers,
+    Outcome,
+    Reference,
+    Truth,
+)
 from campaigns.accuracy.run import make
 from mpmath import mp, mpf
 import pytest

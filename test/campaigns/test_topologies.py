@@ -37,8 +37,7 @@ from campaigns.topologies.run import (
     run,
     Tally,
 )
-from campaigns.topologies.topology import Topology
-from campaigns.topologies.walk import start_of
+from campaigns.topologies.topology import start_of, Topology
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.nearness import SingularInput
 from linkage_ros.kinematics.ranges import InputRange

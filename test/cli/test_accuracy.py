@@ -82,7 +82,7 @@ def test_what_is_not_installed_is_said_before_anything_is_measured(tmp_path, mon
         return None if name == missing else find(name)
 
     monkeypatch.setattr(command, 'find_spec', hidden)
-    monkeypatch.setattr('linkage_ros.accuracy.page.folder.find_spec', hidden)
+    monkeypatch.setattr('linkage_ros.accuracy.page.files.find_spec', hidden)
     monkeypatch.chdir(tmp_path)
     with pytest.raises(LinkageError) as caught:
         run(DEMO)

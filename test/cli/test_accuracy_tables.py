@@ -18,8 +18,8 @@
 from __future__ import annotations
 
 from linkage_ros.accuracy.results import Part, Results, Table
-from linkage_ros.accuracy.spread import Spread
 from linkage_ros.cli.accuracy_tables import print_results
+from linkage_ros.measuring import Spread
 
 RESULTS = Results(
     'four_bar',

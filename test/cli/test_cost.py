@@ -25,13 +25,22 @@ from threading import Event
 
 from linkage_ros.cli import cost as command
 from linkage_ros.cli.tables import Table
-from linkage_ros.cost.feed import feed
-from linkage_ros.cost.measure import _difference, _times, EffectCost, measure, SceneCost, Times
-from linkage_ros.cost.variants import Variant, Variants
+from linkage_ros.cost import (
+    _difference,
+    _times,
+    EffectCost,
+    feed,
+    measure,
+    SceneCost,
+    Times,
+    Variant,
+    Variants,
+)
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import LinkageError
 from linkage_ros.faults.fault import FAULTS
+from linkage_ros.pages.markdown import filled, marks
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest
@@ -49,7 +58,7 @@ FEW = 120
 SPEC = spec_from_file_location('make_cost', ROOT / 'docs' / 'make_cost.py')
 make_cost = module_from_spec(SPEC)
 SPEC.loader.exec_module(make_cost)
-BEGIN, END = make_cost.BEGIN, make_cost.END
+BEGIN, END = marks('measured')
 EVERYTHING = [
     'a tick without effects',
     *EFFECTS,
@@ -295,7 +304,7 @@ def test_the_page_has_every_effect():
 
 def test_only_what_lies_between_the_marks_is_written():
     page = f'before\n{BEGIN}\nold\n{END}\nbehind\n'
-    assert make_cost.filled(page, 'new') == f'before\n{BEGIN}\nnew\n{END}\nbehind\n'
+    assert filled(page, 'measured', 'new') == f'before\n{BEGIN}\nnew\n{END}\nbehind\n'
     table = Table('title', ('', '>a [µs]'), [('x', '1')])
     text = make_cost.measured(table, [('cores', '2'), ('kernel', '6'), ('python', '3.12')])
     head, _, *lines = text.splitlines()

@@ -28,8 +28,8 @@ PACKAGE = 'linkage_ros'
 # as no two import each other.
 HEIGHTS = (
     ('errors', 'stop', 'regular_file', 'written', 'files', 'bounded_yaml'),
-    ('whole_file', 'parameters'),
-    ('kinematics', 'shipped', 'cdr', 'bag', 'page'),
+    ('whole_file', 'parameters', 'measuring', 'processes'),
+    ('kinematics', 'shipped', 'cdr', 'bag', 'pages'),
     ('joint_state', 'synthesis', 'dynamics', 'drawing', 'solvers', 'models'),
     ('joint_trajectory', 'multi_dof_joint_state', 'joint_effort', 'marker_array'),
     ('drives',),

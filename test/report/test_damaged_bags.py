@@ -26,7 +26,7 @@ from linkage_ros.bag.reading.reader import read_bag
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
-from linkage_ros.report.diagnostics import statuses
+from linkage_ros.report.diagnostics_summary import statuses
 from linkage_ros.report.joint_states import JointStates
 from linkage_ros.report.run import Window
 import numpy as np
@@ -64,7 +64,7 @@ def told(file: Path) -> str:
 @pytest.mark.parametrize('seed', range(3))
 def test_flipped_and_cut_bytes(bag, tmp_path, seed, monkeypatch):
     # The library makes pages long, and nothing else.
-    monkeypatch.setattr('linkage_ros.page.document.plotting_library', lambda: '')
+    monkeypatch.setattr('linkage_ros.pages.document.plotting_library', lambda: '')
     random = np.random.default_rng(seed)
     whole = bag.read_bytes()
     file = tmp_path / 'odd.mcap'
@@ -86,7 +86,7 @@ def test_flipped_and_cut_bytes(bag, tmp_path, seed, monkeypatch):
 
 @pytest.mark.parametrize('seed', range(2))
 def test_what_fits_its_checksums_may_still_be_anything(bag, tmp_path, seed, monkeypatch):
-    monkeypatch.setattr('linkage_ros.page.document.plotting_library', lambda: '')
+    monkeypatch.setattr('linkage_ros.pages.document.plotting_library', lambda: '')
     random = np.random.default_rng(seed)
     whole = read_bag(bag)
     messages = [*whole.messages()]

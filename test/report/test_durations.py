@@ -21,11 +21,10 @@ from fractions import Fraction
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.report.clock import RunClock, times_of
-from linkage_ros.report.histogram import Histogram
-from linkage_ros.report.lateness import Lateness
-from linkage_ros.report.silences import Silences
-from linkage_ros.report.spans import Lane
+from linkage_ros.report.blocks import RunClock, times_of
+from linkage_ros.report.curves import Lateness
+from linkage_ros.report.decimation import Histogram
+from linkage_ros.report.run import Lane, Silences
 import numpy as np
 import pytest
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Thinned curves keep what is least and greatest, in a bounded number of intervals."""
+"""Decimation curves keep what is least and greatest, in a bounded number of intervals."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ import json
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.report.extremes import capacity, Extremes, most_columns
-from linkage_ros.report.spans import Lane
-from linkage_ros.report.thinned import Thinned
-from linkage_ros.report.words import size_in_json
+from linkage_ros.report.decimation import capacity, Decimation, MinMaxCurve, most_columns
+from linkage_ros.report.labels import size_in_json
+from linkage_ros.report.run import Lane
 import numpy as np
 import pytest
 
@@ -38,7 +37,7 @@ def kept(rows, cuts, most):
     """Give rows in pieces; return the intervals."""
     values = np.array(rows, float).reshape(-1, 2)
     times = 7 * np.arange(len(values))
-    curves = Extremes(2, most)
+    curves = MinMaxCurve(2, most)
     edges = [0, *sorted(min(cut, len(values)) for cut in cuts), len(values)]
     for start, end in pairwise(edges):
         curves.add(times[start:end], values[start:end])
@@ -107,7 +106,7 @@ def held(curves):
 
 
 def test_what_is_held_does_not_grow_with_the_rows():
-    curves = Extremes(6, 256)
+    curves = MinMaxCurve(6, 256)
     rows = np.random.default_rng(3).normal(size=(8192, 6))
     sizes = []
     for block in range(200):
@@ -122,7 +121,7 @@ def test_what_is_held_does_not_grow_with_the_rows():
 
 @given(st.integers(0, 400), CUTS, st.sampled_from([2, 6, 40]))
 def test_rows_at_equal_steps(count, cuts, most):
-    rows = Thinned(1, most)
+    rows = Decimation(1, most)
     edges = [0, *sorted(min(cut, count) for cut in cuts), count]
     for start, end in pairwise(edges):
         times = np.arange(start, end)

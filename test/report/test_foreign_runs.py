@@ -21,7 +21,7 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.report.blocks import Progress
-from linkage_ros.report.html import run_html, Told
+from linkage_ros.report.html import ReportHeader, run_html
 from linkage_ros.report.reading import read_run
 from linkage_ros.report.run import Window
 import pytest
@@ -70,7 +70,7 @@ def test_joints_of_several_topics_are_told_apart(tmp_path):
     # Nobody knows which of them ought not to be silent.
     assert 'silent' not in found.lanes
     pytest.importorskip('plotly')
-    page = run_html(found, Told('t', [], [], []))
+    page = run_html(found, ReportHeader('t', [], [], []))
     assert '"name":"a on /arm"' in page
     assert '"name":"a on /hand"' in page
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.report.diagnostics import statuses
+from linkage_ros.report.diagnostics_summary import statuses
 from linkage_ros.report.joint_states import JointStates, MOST_JOINTS
 import numpy as np
 import pytest

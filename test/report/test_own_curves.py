@@ -20,7 +20,7 @@ import json
 from math import inf, nan
 
 from linkage_ros.joint_state import JointStateWriter
-from linkage_ros.report.html import run_html, Told
+from linkage_ros.report.html import ReportHeader, run_html
 import numpy as np
 import pytest
 
@@ -88,7 +88,7 @@ masses:
 
 
 def page(found):
-    return run_html(found, Told('t', [], [], []))
+    return run_html(found, ReportHeader('t', [], [], []))
 
 
 @pytest.mark.parametrize('value', [nan, inf, -inf, 1e308])

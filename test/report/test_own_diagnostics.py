@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.report.health import _COUNTED
+from linkage_ros.report.diagnostics_summary import _COUNTED
 import pytest
 
 from .runs import but, MS, on_lanes, read, recorded, Said

@@ -29,27 +29,34 @@ from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.page.document import plotting_library
+from linkage_ros.pages.document import plotting_library
 from linkage_ros.replay import recorded_scene
 from linkage_ros.report.blocks import Blocks, Progress
+from linkage_ros.report.curves import Kept, MOST_LINKAGES
 from linkage_ros.report.data import page_data
-from linkage_ros.report.histogram import Histogram
-from linkage_ros.report.html import run_html, Told
-from linkage_ros.report.own_curves import Kept, MOST_LINKAGES
-from linkage_ros.report.own_run import LANES, OwnRun
-from linkage_ros.report.room import (
-    BOUND,
-    DRAWN,
-    DURATIONS,
-    FRAMES,
+from linkage_ros.report.decimation import (  # fmt: skip
+    DURATION_BYTES,
+    FRAME_BYTES,
+    Histogram,
     MOST_FRAMES,
-    SAMPLES,
-    STATES,
-    TABLES,
-)  # fmt: skip
-from linkage_ros.report.run import Column, Frames, LinkageRun, Run, Window
-from linkage_ros.report.spans import Lane, MOST_SPANS, MOST_TEXT
-from linkage_ros.report.tables import TableOf
+    PAGE_BYTES,
+    SAMPLE_BYTES,
+    SHAPE_BYTES,
+    STATE_BYTES,
+    TABLE_BYTES,
+)
+from linkage_ros.report.html import ReportHeader, run_html, TableOf
+from linkage_ros.report.run import (
+    Column,
+    Frames,
+    Lane,
+    LinkageRun,
+    MOST_SPANS,
+    MOST_TEXT,
+    Run,
+    Window,
+)
+from linkage_ros.report.scene_run import LANES, SceneRun
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 from linkage_ros.shipped import shipped
@@ -108,7 +115,7 @@ def long(tmp_path_factory):
     """Return a run of two minutes, and what was held block by block."""
     scene = 'effects: {velocity: {}}\n'
     bag = Long(recorded(tmp_path_factory.mktemp('long'), scene), 120_000)
-    reader = OwnRun(bag, run_account(bag), recorded_scene(bag), Window())
+    reader = SceneRun(bag, run_account(bag), recorded_scene(bag), Window())
     blocks, sizes = Blocks(bag, reader.topics, Progress()), []
     for block in blocks:
         reader.take(block)
@@ -141,8 +148,8 @@ def test_a_long_run_is_thinned_and_its_extremes_are_kept(long):
 
 
 def test_its_page_is_below_the_bound_and_says_how_much_it_holds(long):
-    page = run_html(long[0], Told('t', [], [], []))
-    assert size_of(page) < BOUND
+    page = run_html(long[0], ReportHeader('t', [], [], []))
+    assert size_of(page) < PAGE_BYTES
     assert 'of the moving picture one joint state of every' in page
     assert len(data_of(page)['curves']) == 4
 
@@ -197,7 +204,7 @@ def worst_run():
             )
         )  # fmt: skip
     bodies = sum(len(each.closure.structure.links) for each in linkages)
-    most = FRAMES // (8 * (1 + len(values)) + 12 * bodies + 4 * len(linkages))
+    most = FRAME_BYTES // (8 * (1 + len(values)) + 12 * bodies + 4 * len(linkages))
     durations = Histogram()
     durations.add(10 ** np.arange(16))
     return Run(
@@ -206,12 +213,14 @@ def worst_run():
         window=Window(),
         contents=Contents((), 0, 0, '', False),
         curves=[
-            filled(STATES, values),
-            filled(SAMPLES, [*values][:60]),
-            filled(DURATIONS, ['tick'], 'lateness')._replace(
+            filled(STATE_BYTES, values),
+            filled(SAMPLE_BYTES, [*values][:60]),
+            filled(DURATION_BYTES, ['tick'], 'lateness')._replace(
                 columns=[Column('tick', 'lateness', 'ms')]
             ),
-            filled(DURATIONS, ['input'], 'age')._replace(columns=[Column('input', 'age', 'ms')]),
+            filled(DURATION_BYTES, ['input'], 'age')._replace(
+                columns=[Column('input', 'age', 'ms')]
+            ),
         ],
         frames=Frames(1, np.arange(most), {name: np.linspace(0, 9, most) for name in values}),
         linkages=linkages,
@@ -228,12 +237,12 @@ def test_the_page_of_the_worst_run_is_below_the_bound():
         TableOf(WORST, ('a', '>b'), [(WORST, WORST)] * 5000),
         *(TableOf('t', ('a',), [('b',)]) for _ in range(5000)),
     ]
-    told = Told(WORST, [(f'fact {n}', WORST) for n in range(8)], [WORST] * 10, tables)
+    told = ReportHeader(WORST, [(f'fact {n}', WORST) for n in range(8)], [WORST] * 10, tables)
     page = run_html(run, told)
     size = size_of(page)
-    assert size < BOUND
+    assert size < PAGE_BYTES
     # It is the worst indeed; intervals are a power of two, so half of a room may be left.
-    assert size > 0.7 * BOUND
+    assert size > 0.7 * PAGE_BYTES
     data = data_of(page)
     assert len(data['lanes']) == len(LANES)
     assert 'more rows.' in page
@@ -244,9 +253,9 @@ def test_the_page_of_the_worst_run_is_below_the_bound():
 def test_the_rooms_come_to_less_than_the_bound():
     library = len(plotting_library()) + 100_000  # with what is ours of script and style
     texts = len(LANES) * (MOST_TEXT + 60 * MOST_SPANS) + MOST_LINKAGES * 400 * 45
-    numbers = (STATES + SAMPLES + 2 * DURATIONS + FRAMES) * 4 / 3
-    assert library + numbers + texts + DRAWN + TABLES < 0.98 * BOUND
-    assert MOST_FRAMES * 16 < FRAMES
+    numbers = (STATE_BYTES + SAMPLE_BYTES + 2 * DURATION_BYTES + FRAME_BYTES) * 4 / 3
+    assert library + numbers + texts + SHAPE_BYTES + TABLE_BYTES < 0.98 * PAGE_BYTES
+    assert MOST_FRAMES * 16 < FRAME_BYTES
 
 
 def test_names_beyond_all_measure_are_refused_in_a_line():
@@ -254,7 +263,7 @@ def test_names_beyond_all_measure_are_refused_in_a_line():
     name = 'x' * 15_000_000
     first = run.linkages[0]._replace(name=name)
     with pytest.raises(LinkageError, match='its page would be larger than 20 MB; shorten'):
-        run_html(replace(run, linkages=[first]), Told('t', [], [], []))
+        run_html(replace(run, linkages=[first]), ReportHeader('t', [], [], []))
 
 
 def test_a_bag_of_hundreds_of_topics_and_joints_with_endless_names(tmp_path):
@@ -277,11 +286,11 @@ def test_the_same_bag_makes_the_same_page(tmp_path):
     bag = recorded(tmp_path, 'effects: {velocity: {}}\n')
 
     def made():
-        reader = OwnRun(bag, run_account(bag), recorded_scene(bag), Window())
+        reader = SceneRun(bag, run_account(bag), recorded_scene(bag), Window())
         blocks = Blocks(bag, reader.topics, Progress())
         for block in blocks:
             reader.take(block)
-        return run_html(reader.end(blocks.contents()), Told('t', [], [], []))
+        return run_html(reader.end(blocks.contents()), ReportHeader('t', [], [], []))
 
     assert made() == made()
 

@@ -25,7 +25,7 @@ from linkage_ros.drawing.link_frames import drawn_in_frames, link_frames
 from linkage_ros.drawing.shapes import carried_shapes, Circle, shapes
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import samples, usual_inputs, Way
-from linkage_ros.report.poses import poses
+from linkage_ros.report.data import poses
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 from linkage_ros.shipped import shipped

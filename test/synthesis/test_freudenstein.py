@@ -25,8 +25,7 @@ from __future__ import annotations
 
 from math import nan, pi, radians
 
-from campaigns.synthesis.families import FAMILIES
-from campaigns.synthesis.run import parts, run, Tally
+from campaigns.synthesis.run import FAMILIES, parts, run, Tally
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import SynthesisError

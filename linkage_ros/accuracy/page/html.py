@@ -13,20 +13,20 @@
 # limitations under the License.
 
 
-"""Results as the page that a browser shows."""
+"""Results as a page for the browser: its HTML, and its diagrams as data for Plotly."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
+from math import log10
+from textwrap import wrap
+from typing import Any
 
+from linkage_ros.accuracy.page.diagrams import Placed, places, Range, Style, Styles
 from linkage_ros.accuracy.page.numbers import cell_text, numeric_columns
-from linkage_ros.accuracy.page.places import places
-from linkage_ros.accuracy.page.plots import plot
-from linkage_ros.accuracy.page.styles import Styles
 from linkage_ros.accuracy.results import Diagram, Part, Results, Table
-from linkage_ros.page.document import document, picture
-from linkage_ros.page.parts import facts_html, table_html
+from linkage_ros.pages.document import document, facts_html, picture, table_html
 
 _ADVICE = 'What to take'
 _HERE = 'linkage_ros.accuracy.page'
@@ -115,3 +115,94 @@ def _table(table: Table) -> Iterator[str]:
     rows = (list(map(cell_text, row)) for row in table.rows)
     yield from table_html(table.title, table.columns, rows, numeric_columns(table))
     yield f'<div class="files"><a href="{escape(table.key)}.csv">CSV</a></div></figure>'
+
+
+_NAME_LETTERS, _HOVER_LETTERS = 28, 48
+
+_ENTITIES = str.maketrans({letter: f'&#{ord(letter)};' for letter in '&<>$'})
+
+_SLACK = 1e-6
+"""By so much of its length an axis is longer: Plotly leaves out what rounding puts beyond it."""
+
+
+def plot(diagram: Diagram, styles: Styles) -> dict[str, Any]:
+    """Return a diagram as page.js takes it."""
+    placed = places(diagram)
+    traces = []
+    for curve in placed.curves:
+        style = styles[curve.curve.name]
+        name = _lines([curve.curve.name], _NAME_LETTERS)
+        joined = curve.curve.joined and len(curve.points) > 1
+        within = any(curve.within) or not curve.on_edge
+        if within:
+            traces.append(_trace(name, curve.within, style, joined=joined))
+        if curve.on_edge:
+            traces.append(_on_edge(_trace(name, curve.on_edge, style, joined=False), within))
+    return {
+        'title': diagram.title,
+        'x': _axis(placed.x),
+        'y': _axis(placed.y),
+        'empty': placed.empty,
+        'traces': traces,
+    }
+
+
+def _axis(shown: Range) -> dict[str, Any]:
+    logarithmic = shown.axis.logarithmic
+    low, high = (log10(end) if logarithmic else end for end in (shown.low, shown.high))
+    slack = _SLACK * (high - low)
+    return {
+        'title': _escaped(shown.axis.title),
+        'logarithmic': logarithmic,
+        'range': [low - slack, high + slack],
+    }
+
+
+def _trace(
+    name: str,
+    points: Sequence[Placed | None],
+    style: Style,
+    *,
+    joined: bool,
+) -> dict[str, Any]:
+    return {
+        'name': name,
+        'in_legend': True,
+        'x': [point and point.x for point in points],
+        'y': [point and point.y for point in points],
+        'x_arms': _arms([point and point.x_arms for point in points]),
+        'y_arms': _arms([point and point.y_arms for point in points]),
+        'text': ['' if point is None else _hover(point) for point in points],
+        'colour': style.colour,
+        'symbol': style.mark.plotly,
+        'dash': style.dash,
+        'joined': joined,
+        'on_edge': False,
+    }
+
+
+def _on_edge(trace: dict[str, Any], named: bool) -> dict[str, Any]:
+    """Return the hollow marks of a curve, which may have other marks that name it."""
+    symbol = f'{trace["symbol"]}-open'
+    return {**trace, 'symbol': symbol, 'in_legend': not named, 'on_edge': True}
+
+
+def _arms(arms: Sequence[tuple[float, float] | None]) -> list[list[float]]:
+    """Return the lengths below and above the points; an empty list if no point has arms."""
+    if not any(each and any(each) for each in arms):
+        return []
+    return [[each[side] if each else 0.0 for each in arms] for side in (0, 1)]
+
+
+def _hover(point: Placed) -> str:
+    name, *others = point.text
+    return f'<b>{_lines([name], _HOVER_LETTERS)}</b><br>{_lines(others, _HOVER_LETTERS)}'
+
+
+def _lines(texts: Sequence[str], letters: int) -> str:
+    return '<br>'.join(_escaped(line) for text in texts for line in wrap(text, letters) or [''])
+
+
+def _escaped(text: str) -> str:
+    """Return a text in which Plotly finds neither markup nor a formula."""
+    return text.translate(_ENTITIES)

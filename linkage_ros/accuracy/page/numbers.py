@@ -13,16 +13,24 @@
 # limitations under the License.
 
 
-"""Numbers as texts: as many digits as tell something."""
+"""
+Numbers as text: rounded for tables and plots, and with every bit as CSV.
+
+In CSV each number has the shortest text that reads back as the same number. A missing value is an
+empty cell. A column of spreads becomes three columns.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+import csv
 from decimal import Decimal
+import io
 from math import ceil, floor, inf, isfinite, log10
 from numbers import Integral, Real
 
-from linkage_ros.accuracy.results import Table
-from linkage_ros.accuracy.spread import Spread
+from linkage_ros.accuracy.results import Diagram, Table
+from linkage_ros.measuring import Spread
 
 Cell = float | int | str | Spread | None
 """What a table holds."""
@@ -36,7 +44,7 @@ _MOST_DIGITS = 4
 
 
 def cell_text(cell: Cell) -> str:
-    """Return what stands in a table: '' for nothing, '0.70 (0.68–0.75)' for a spread."""
+    """Return the text of a cell: '' for None, '0.70 (0.68–0.75)' for a spread."""
     if cell is None:
         return ''
     if isinstance(cell, str):
@@ -47,7 +55,7 @@ def cell_text(cell: Cell) -> str:
 
 
 def number_text(value: float | Integral) -> str:
-    """Return a number with three digits that count; a whole number as it is."""
+    """Return a number with three significant digits; an integer with all."""
     if isinstance(value, Integral):
         return str(int(value))
     value = float(value)
@@ -87,7 +95,7 @@ def spread_text(spread: Spread) -> str:
 
 
 def numeric_columns(table: Table) -> list[bool]:
-    """Say which columns of a table hold numbers, if only in some rows; they are set right."""
+    """Return which columns hold numbers, if only in some rows; they are aligned to the right."""
     return [
         any(isinstance(row[place], Real | Spread) for row in table.rows)
         for place in range(len(table.columns))
@@ -99,7 +107,7 @@ def _range(low: str, high: str) -> str:
 
 
 def _decimals(low: float, middle: float, high: float) -> int:
-    """Return how many decimals tell the quartiles apart, and the median from 0 if these let it."""
+    """Return the number of decimals that distinguish the quartiles, and the median from 0."""
     power = _power(middle or high or low)
     apart = ceil(-log10(high - low))
     wanted = min(max(1 - power, apart), apart + 1, _MOST_DIGITS - 1 - power)
@@ -112,3 +120,65 @@ def _power(value: float) -> int:
 
 def _short(digits: str) -> str:
     return digits.rstrip('0').rstrip('.') if '.' in digits else digits
+
+
+_QUARTILES = ('low', 'middle', 'high')
+
+
+def table_csv(table: Table) -> str:
+    """Return a table as CSV; a number in a column of spreads stands in the middle one."""
+    spreads = [
+        any(isinstance(row[number], Spread) for row in table.rows)
+        for number in range(len(table.columns))
+    ]
+    return _text(table.columns, spreads, table.rows)
+
+
+def diagram_csv(diagram: Diagram) -> str:
+    """Return the points of a diagram as CSV."""
+    columns = ('curve', 'setting', diagram.x.title, diagram.y.title)
+    rows = [
+        (curve.name, point.setting, point.x_spread or point.x, point.y_spread or point.y)
+        for curve in diagram.curves
+        for point in curve.points
+    ]
+    spreads = [any(isinstance(row[number], Spread) for row in rows) for number in range(4)]
+    return _text(columns, spreads, rows)
+
+
+def _text(columns: Sequence[str], spreads: Sequence[bool], rows: Iterable[Sequence[Cell]]) -> str:
+    written = io.StringIO()
+    writer = csv.writer(written, lineterminator='\n')
+    writer.writerow(
+        name
+        for column, spread in zip(columns, spreads, strict=True)
+        for name in (_names(column) if spread else [column])
+    )
+    for row in rows:
+        writer.writerow(
+            value
+            for cell, spread in zip(row, spreads, strict=True)
+            for value in (_three(cell) if spread else [_one(cell)])
+        )
+    return written.getvalue()
+
+
+def _names(column: str) -> list[str]:
+    """Return a column's three names, the unit behind: 'time, low [µs]'."""
+    name, bracket, unit = column.rpartition(' [')
+    if not bracket or not unit.endswith(']'):
+        return [f'{column}, {which}' for which in _QUARTILES]
+    return [f'{name}, {which} [{unit}' for which in _QUARTILES]
+
+
+def _three(cell: Cell) -> list[str]:
+    if isinstance(cell, Spread):
+        return [_one(value) for value in cell]
+    return ['', _one(cell), '']
+
+
+def _one(cell: Cell | Integral) -> str:
+    if isinstance(cell, Integral):
+        return str(int(cell))
+    # Of a numpy number, repr would name its type.
+    return repr(float(cell)) if isinstance(cell, Real) else str(cell or '')

@@ -13,21 +13,82 @@
 # limitations under the License.
 
 
-"""A diagram as SVG, by matplotlib: for print, and for where no script runs."""
+"""A diagram as SVG, drawn by matplotlib: for print, and where no script runs."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from io import BytesIO
-from math import nan
+from math import ceil, floor, log10, nan
 from textwrap import wrap
 from typing import Any
 from warnings import catch_warnings, filterwarnings
 
-from linkage_ros.accuracy.page.places import axis_title, Placed, Places, places, Range
-from linkage_ros.accuracy.page.styles import DASHES, Style, Styles
-from linkage_ros.accuracy.page.ticks import ticks
+from linkage_ros.accuracy.page.diagrams import (
+    DASHES,
+    Placed,
+    Places,
+    places,
+    Range,
+    Style,
+    Styles,
+)
 from linkage_ros.accuracy.results import Diagram
 from linkage_ros.drawing.painting import INK, settings
+
+_MOST = 8
+_SLACK = 1e-9
+"""Of a step: what rounding may take from an end of the axis."""
+
+_SUPERSCRIPT = str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹')
+_PLAIN = (-2, 4)
+"""Powers of ten that are written out."""
+
+
+def ticks(shown: Range) -> list[tuple[float, str]]:
+    """Return the ticks of an axis: where, and the text."""
+    if not shown.axis.logarithmic:
+        return list(_even(shown.low, shown.high))
+    first, last = ceil(log10(shown.low) - _SLACK), floor(log10(shown.high) + _SLACK)
+    if last - first >= 3:
+        step = ceil((last - first) / _MOST)
+        # Multiples of the step, so that 1 is among them where it is in the range.
+        return [(10.0**n, _power(n)) for n in range(ceil(first / step) * step, last + 1, step)]
+    digits = ((1, 2, 5), (1, 2, 3, 5, 7))[last - first < 1]
+    values = [digit * 10.0**n for n in range(first - 1, last + 1) for digit in digits]
+    within = [value for value in values if shown.low <= value <= shown.high]
+    if len(within) >= 2:
+        return [(value, _text(value)) for value in within]
+    return list(_even(shown.low, shown.high))
+
+
+def _even(low: float, high: float) -> Iterator[tuple[float, str]]:
+    """Yield ticks at equal distances, each one of 1, 2 or 5 times a power of ten."""
+    rough = (high - low) / _MOST
+    scale = 10.0 ** floor(log10(rough))
+    step = next(factor * scale for factor in (1, 2, 5, 10) if factor * scale >= rough)
+    decimals = max(0, -floor(log10(step)))
+    for number in range(ceil(low / step - _SLACK), floor(high / step + _SLACK) + 1):
+        value = number * step
+        plain = decimals <= 6 and abs(value) < 1e6
+        yield value, f'{value + 0.0:.{decimals}f}' if plain else f'{value:.4g}'
+
+
+def _power(exponent: int) -> str:
+    low, high = _PLAIN
+    if low <= exponent <= high:
+        return f'{10.0**exponent:g}'
+    return f'10{str(exponent).translate(_SUPERSCRIPT)}'
+
+
+def _text(value: float) -> str:
+    exponent = floor(log10(value) + _SLACK)
+    low, high = _PLAIN
+    if low <= exponent <= high:
+        return f'{value:g}'
+    digit = round(value / 10.0**exponent)
+    return _power(exponent) if digit == 1 else f'{digit}·{_power(exponent)}'
+
 
 _WIDTH = 7.2
 _LEAST_HEIGHT, _FRAME = 4.0, 0.9
@@ -100,7 +161,7 @@ def _set_axes(axes: Any, placed: Places) -> None:
         # The scale first: it brings locators of its own.
         getattr(axes, f'set_{which}scale')('log' if shown.axis.logarithmic else 'linear')
         _set_axis(getattr(axes, f'{which}axis'), shown)
-        getattr(axes, f'set_{which}label')(_plain(axis_title(shown.axis)), color=INK, fontsize=9.0)
+        getattr(axes, f'set_{which}label')(_plain(shown.axis.title), color=INK, fontsize=9.0)
         getattr(axes, f'set_{which}lim')(shown.low, shown.high)
     axes.set_axisbelow(True)
     axes.grid(alpha=0.3, linewidth=0.5)

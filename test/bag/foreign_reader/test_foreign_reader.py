@@ -36,7 +36,7 @@ from linkage_ros.bag.writing.storage import Storage
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cdr import text_message
 from linkage_ros.cli.main import main
-from linkage_ros.cost.feed import feed
+from linkage_ros.cost import feed
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import change_text
 from linkage_ros.ros.bag_topics import bag_topic, message_type

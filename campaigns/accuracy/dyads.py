@@ -1,0 +1,498 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The dyads in closed form, in power series of balls.
+
+RRR: two links pinned together, each pinned to a link that is placed: a circle meets a circle.
+RRP: a link pinned to a placed one, its other pin on a placed line: a circle meets a line.
+RPR: a rod pinned to a placed link slides through a block that is pinned to another link.
+PRP and RPP: two sliders, where a line meets a line, once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from campaigns.accuracy.mechanism import Mechanism, Spot
+from campaigns.accuracy.motion import conjugate, imag, inverse, Motion, real, root, Tangent, times
+from flint import acb
+from linkage_ros.kinematics.linkage import Side
+
+
+@dataclass(frozen=True, slots=True)
+class RPR:
+    """
+    Link ``rail`` from pin A, with a line that a block pinned at D slides on.
+
+    Attributes
+    ----------
+    rail
+        The link with the line.
+    a, d
+        The outer pins on the links that carry them.
+    slider
+        Name of the slider.
+    side
+        +1: D lies ahead of A along the line, -1: behind.
+    fold
+        Whether the pins meet as the crank passes along the ground, and the rod goes through.
+
+    """
+
+    rail: str
+    a: Spot
+    d: Spot
+    slider: str
+    side: int
+    fold: bool = False
+
+    @property
+    def assembly(self) -> tuple[str, Side]:
+        return self.slider, 'ahead' if self.side > 0 else 'behind'
+
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return (self.rail,)
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.d
+
+    def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, self.d
+
+    def close(self, motion: Motion) -> None:
+        start, end = motion.at(self.a), motion.at(self.d)
+        diagonal = end - start
+        base = self._base(motion) * motion.constants.directions[self.slider].conjugate()
+        height = base.imag
+        reach = root(real(diagonal * conjugate(diagonal)) - height * height)
+        if (self.side < 0) != (self.fold and bool((motion.phi / 2).sin() < 0)):
+            reach = -reach
+        motion.inverse.append(inverse(reach))
+        motion.slide[self.slider] = reach - base.real
+        unit = diagonal / ((reach + acb(0, height)) * motion.constants.directions[self.slider])
+        motion.place(self.rail, unit, self.a.point, start)
+        block = motion.mechanism.sliders[self.slider].block
+        if block is not None:
+            twist = motion.constants.twists[self.slider]
+            # It turns as the rail does, and that angle is handed on once.
+            motion.place(block, motion.unit[self.rail] * twist, self.d.point, end)
+
+    def _base(self, motion: Motion) -> Any:
+        """Return, in the rail's frame, where the block's pin is at slide 0, from the rail's."""
+        slide = motion.mechanism.sliders[self.slider]
+        base = motion.vector(self.rail, self.a.point, slide.through)
+        if slide.block is None or slide.point == self.d.point:
+            return base
+        arm = motion.vector(slide.block, slide.point, self.d.point)
+        return base + arm * motion.constants.twists[self.slider]
+
+    def margin(self, motion: Motion) -> Any:
+        """Return what the pins are farther apart than they must, in the constants' unit."""
+        diagonal = motion.at(self.d) - motion.at(self.a)
+        base = self._base(motion) * motion.constants.directions[self.slider].conjugate()
+        return abs(diagonal[0]) - abs(base.imag)
+
+    def vary(self, tangent: Tangent) -> None:
+        # E = (g + r·n)·u
+        slide = tangent.mechanism.sliders[self.slider]
+        base, base_change = tangent.vector(self.rail, self.a.point, slide.through)
+        if slide.block is not None and slide.point != self.d.point:
+            arm, arm_change = tangent.vector(slide.block, slide.point, self.d.point)
+            twist, twist_change = tangent.twist[self.slider], tangent.twist_change[self.slider]
+            base = base + arm * twist
+            base_change = base_change + twist * (arm_change + 1j * arm * twist_change)
+        unit = tangent.unit[self.rail]
+        direction = tangent.direction[self.slider]
+        direction_change = tangent.direction_change[self.slider]
+        value = tangent.slide_value[self.slider]
+        start, end = tangent.at(self.a), tangent.at(self.d)
+        rest = end - start - unit * base_change - times(value, unit) * direction_change
+        along = times((unit * direction).conj(), rest)
+        turn = times(tangent.next_inverse(), along.imag)
+        tangent.place(self.rail, turn, self.a.point, start)
+        tangent.slide[self.slider] = along.real + (base * direction.conjugate()).imag * turn
+        if slide.block is not None:
+            turn_block = tangent.turn[self.rail].copy()
+            turn_block[0] += tangent.twist_change[self.slider]
+            tangent.place(slide.block, turn_block, self.d.point, end)
+
+
+@dataclass(frozen=True, slots=True)
+class RRP:
+    """
+    Link ``one`` from pin A to pin B, which a slider keeps on a line of a placed link.
+
+    Attributes
+    ----------
+    one
+        The link.
+    a
+        Its outer pin on the link that carries it.
+    pin
+        B; on the slider's block too where it has one.
+    slider
+        Name of the slider.
+    side
+        +1: B lies ahead of A along the line, -1: behind.
+
+    """
+
+    one: str
+    a: Spot
+    pin: str
+    slider: str
+    side: int
+
+    @property
+    def assembly(self) -> tuple[str, Side]:
+        return self.slider, 'ahead' if self.side > 0 else 'behind'
+
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return (self.one,)
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return (self.slider,)
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.slider
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, mechanism.start(self.slider)
+
+    def close(self, motion: Motion) -> None:
+        start = motion.at(self.a)
+        b = motion.vector(self.one, self.a.point, self.pin)
+        base, line, block = motion.line(self.slider, self.pin)
+        across = (base - start) * conjugate(line)
+        height = imag(across)
+        reach = root((b * b.conjugate()).real - height * height)
+        if self.side < 0:
+            reach = -reach
+        motion.inverse.append(inverse(reach))
+        slide = reach - real(across)
+        motion.slide[self.slider] = slide
+        arm = line * (reach + height * 1j)
+        motion.place(self.one, arm / b, self.a.point, start)
+        if block is not None:
+            motion.ride(self.slider, block, self.pin, start + arm)
+
+    def margin(self, motion: Motion) -> object:
+        """Return what the link reaches farther than it must, in the unit of the constants."""
+        base, line, _ = motion.line(self.slider, self.pin)
+        across = ((base - motion.at(self.a)) * conjugate(line))[0].imag
+        return abs(motion.vector(self.one, self.a.point, self.pin)) - abs(across)
+
+    def vary(self, tangent: Tangent) -> None:
+        # A + b·u − Q − r·N = 0
+        b, b_change = tangent.vector(self.one, self.a.point, self.pin)
+        unit = tangent.unit[self.one]
+        start = tangent.at(self.a)
+        line, line_change, base_change, block_turn = tangent.line(self.slider, self.pin)
+        slide = tangent.slide_value[self.slider]
+        rest = base_change + times(slide, line_change) - start - unit * b_change
+        along = times(line.conj(), rest)
+        turn = times(tangent.next_inverse(), along.imag)
+        where = start + unit * b_change + 1j * times(unit * b, turn)
+        tangent.place(self.one, turn, self.a.point, start)
+        tangent.slide[self.slider] = -times(times(unit * b, line.conj()).imag, turn) - along.real
+        if block_turn is not None:
+            tangent.ride(self.slider, self.pin, block_turn, where)
+
+
+@dataclass(frozen=True, slots=True)
+class RRR:
+    """
+    Links ``one`` (from pin A) and ``two`` (from pin D), pinned together at B.
+
+    Attributes
+    ----------
+    one, two
+        Links that are placed by it.
+    a, d
+        The outer pins on the links that carry them.
+    pin
+        B, on both links.
+    side
+        +1: B lies left of A→D, -1: right.
+    fold, stretch
+        Whether the linkage folds or stretches with its crank along the ground only, and goes
+        through: the side is then that for 0 < φ < π and changes there.
+
+    """
+
+    one: str
+    two: str
+    a: Spot
+    d: Spot
+    pin: str
+    side: int
+    fold: bool = False
+    stretch: bool = False
+
+    @property
+    def assembly(self) -> tuple[str, Side]:
+        return self.pin, 'left' if self.side > 0 else 'right'
+
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return self.one, self.two
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.d
+
+    def given(self, _mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, self.d
+
+    def close(self, motion: Motion) -> None:
+        start = motion.at(self.a)
+        diagonal = motion.at(self.d) - start
+        b, c, square, foot, area = self._triangle(motion, diagonal)
+        height = root(area)
+        if self.side_at(motion.phi) < 0:
+            height = -height
+        one = diagonal * (foot + height * 1j) / square
+        two = one - diagonal
+        # two × one, which both rates are divided by.
+        motion.inverse.append(inverse(height))
+        motion.place(self.one, one / b, self.a.point, start)
+        motion.place(self.two, two / c, self.d.point, motion.at(self.d))
+
+    def _triangle(self, motion: Motion, diagonal: Any) -> tuple[Any, ...]:
+        b = motion.vector(self.one, self.a.point, self.pin)
+        c = motion.vector(self.two, self.d.point, self.pin)
+        square = real(diagonal * conjugate(diagonal))
+        b_square, c_square = (b * b.conjugate()).real, (c * c.conjugate()).real
+        foot = (square + (b_square - c_square)) * 0.5
+        return b, c, square, foot, square * b_square - foot * foot
+
+    def side_at(self, phi: Any) -> int:
+        """Return the side at a crank angle."""
+        side = self.side
+        if self.fold and (phi / 2).sin() < 0:
+            side = -side
+        if self.stretch and (phi / 2).cos() < 0:
+            side = -side
+        return side
+
+    def margin(self, motion: Motion) -> Any:
+        """Return what the links reach farther than they must, in the unit of the constants."""
+        diagonal = motion.at(self.d) - motion.at(self.a)
+        s = abs(diagonal[0])
+        b = abs(motion.vector(self.one, self.a.point, self.pin))
+        c = abs(motion.vector(self.two, self.d.point, self.pin))
+        return (s - abs(b - c)).min(b + c - s)
+
+    def vary(self, tangent: Tangent) -> None:
+        # A + b·u1 − c·u2 − D = 0
+        b, b_change = tangent.vector(self.one, self.a.point, self.pin)
+        c, c_change = tangent.vector(self.two, self.d.point, self.pin)
+        unit_one, unit_two = tangent.unit[self.one], tangent.unit[self.two]
+        start = tangent.at(self.a)
+        rest = tangent.at(self.d) - start - unit_one * b_change + unit_two * c_change
+        by = tangent.next_inverse()
+        turn_one = times(by, times((unit_two * c).conj(), rest).real)
+        turn_two = times(by, times((unit_one * b).conj(), rest).real)
+        tangent.place(self.one, turn_one, self.a.point, start)
+        tangent.place(self.two, turn_two, self.d.point, tangent.at(self.d))
+
+
+@dataclass(frozen=True, slots=True)
+class PRP:
+    """
+    Two blocks pinned together, each on a line of a placed link; the second may be virtual.
+
+    Attributes
+    ----------
+    one, two
+        Names of the sliders.
+    pin
+        What the blocks share; the point of slider ``two`` where its block is virtual.
+
+    """
+
+    one: str
+    two: str
+    pin: str
+
+    @property
+    def assembly(self) -> None:
+        return None
+
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return self.one, self.two
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.one, self.two
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return mechanism.start(self.one), mechanism.start(self.two)
+
+    def close(self, motion: Motion) -> None:
+        base_one, line_one, block_one = motion.line(self.one, self.pin)
+        base_two, line_two, block_two = motion.line(self.two, self.pin)
+        over = _meet(motion, base_two - base_one, line_one, line_two)
+        motion.slide[self.one], motion.slide[self.two] = over[0], -over[1]
+        where = base_one + line_one * over[0]
+        for name, block in ((self.one, block_one), (self.two, block_two)):
+            if block is not None:
+                motion.ride(name, block, self.pin, where)
+
+    def margin(self, motion: Motion) -> Any:
+        """Return how far the lines are from parallel, as a sine."""
+        lines = [motion.line(name, self.pin)[1] for name in (self.one, self.two)]
+        return abs((lines[0] * conjugate(lines[1]))[0].imag)
+
+    def vary(self, tangent: Tangent) -> None:
+        line_one, change_one, base_one, turn_one = tangent.line(self.one, self.pin)
+        line_two, change_two, base_two, turn_two = tangent.line(self.two, self.pin)
+        value_one = tangent.slide_value[self.one]
+        rest = base_two - base_one - times(value_one, change_one)
+        rest = rest + times(tangent.slide_value[self.two], change_two)
+        slide_one, minus_two = _vary_meeting(tangent, rest, line_one, line_two)
+        tangent.slide[self.one], tangent.slide[self.two] = slide_one, -minus_two
+        where = base_one + times(value_one, change_one) + times(line_one, slide_one)
+        for name, turn in ((self.one, turn_one), (self.two, turn_two)):
+            if turn is not None:
+                tangent.ride(name, self.pin, turn, where)
+
+
+@dataclass(frozen=True, slots=True)
+class RPP:
+    """
+    A yoke that slides on a placed link's line, and in its own line a block pinned to a link.
+
+    Attributes
+    ----------
+    a
+        The block's outer pin on the link that carries it.
+    inner
+        Slider between the block, which may be virtual, and the yoke, which carries its line.
+    outer
+        Slider of the yoke on the placed link.
+
+    """
+
+    a: Spot
+    inner: str
+    outer: str
+
+    @property
+    def assembly(self) -> None:
+        return None
+
+    @property
+    def turned(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def slid(self) -> tuple[str, ...]:
+        return (self.outer,)
+
+    @property
+    def seen(self) -> tuple[Spot | str, Spot | str]:
+        return self.a, self.outer
+
+    def given(self, mechanism: Mechanism) -> tuple[Spot, ...]:
+        return self.a, mechanism.start(self.outer)
+
+    def close(self, motion: Motion) -> None:
+        inner, outer = (motion.mechanism.sliders[name] for name in (self.inner, self.outer))
+        base, line, unit = motion.line(self.outer, outer.point)
+        slot = unit * motion.constants.directions[self.inner]
+        start = motion.at(self.a)
+        rest = start - base - unit * self._offset(motion)
+        over = _meet(motion, rest, slot, line)
+        motion.slide[self.inner], motion.slide[self.outer] = over
+        motion.ride(self.outer, unit, outer.point, base + line * over[1])
+        if inner.block is not None:
+            turned = unit * motion.constants.twists[self.inner]
+            motion.place(inner.block, turned, self.a.point, start)
+
+    def _offset(self, motion: Motion) -> Any:
+        """Return, in the yoke's frame, the block's pin at slide 0 from the yoke's point."""
+        inner, outer = (motion.mechanism.sliders[name] for name in (self.inner, self.outer))
+        offset = motion.vector(inner.along, outer.point, inner.through)
+        if inner.block is None or inner.point == self.a.point:
+            return offset
+        arm = motion.vector(inner.block, inner.point, self.a.point)
+        return offset + arm * motion.constants.twists[self.inner]
+
+    def margin(self, motion: Motion) -> Any:
+        """Return how far the lines are from parallel, as a sine."""
+        outer = motion.mechanism.sliders[self.outer]
+        _, line, unit = motion.line(self.outer, outer.point)
+        return abs((unit * motion.constants.directions[self.inner] * conjugate(line))[0].imag)
+
+    def vary(self, tangent: Tangent) -> None:
+        inner, outer = (tangent.mechanism.sliders[name] for name in (self.inner, self.outer))
+        line, line_change, base, turn = tangent.line(self.outer, outer.point)
+        assert turn is not None, 'a yoke is a block: it keeps its angle'
+        offset, offset_change = tangent.vector(inner.along, outer.point, inner.through)
+        if inner.block is not None and inner.point != self.a.point:
+            arm, arm_change = tangent.vector(inner.block, inner.point, self.a.point)
+            twist, twist_change = tangent.twist[self.inner], tangent.twist_change[self.inner]
+            offset = offset + arm * twist
+            offset_change = offset_change + twist * (arm_change + 1j * arm * twist_change)
+        unit = tangent.unit[inner.along]
+        slot = unit * tangent.direction[self.inner]
+        slot_change = unit * tangent.direction_change[self.inner] + 1j * times(slot, turn)
+        start = tangent.at(self.a)
+        rest = start - base - unit * offset_change - 1j * times(unit * offset, turn)
+        rest = rest - times(tangent.slide_value[self.inner], slot_change)
+        value = tangent.slide_value[self.outer]
+        rest = rest - times(value, line_change)
+        slides = _vary_meeting(tangent, rest, slot, line)
+        tangent.slide[self.inner], tangent.slide[self.outer] = slides
+        where = base + times(value, line_change) + times(line, slides[1])
+        tangent.ride(self.outer, outer.point, turn, where)
+        if inner.block is not None:
+            turn_block = turn.copy()
+            turn_block[0] += tangent.twist_change[self.inner]
+            tangent.place(inner.block, turn_block, self.a.point, start)
+
+
+def _meet(motion: Motion, rest: Any, one: Any, two: Any) -> tuple[Any, Any]:
+    """Solve x·one + y·two = rest for real x and y."""
+    by = inverse(imag(one * conjugate(two)))
+    motion.inverse.append(by)
+    return imag(rest * conjugate(two)) * by, -imag(rest * conjugate(one)) * by
+
+
+def _vary_meeting(tangent: Tangent, rest: Any, one: Any, two: Any) -> tuple[Any, Any]:
+    by = tangent.next_inverse()
+    x = times(by, times(two.conj(), rest).imag)
+    return x, -times(by, times(one.conj(), rest).imag)

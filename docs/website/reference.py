@@ -1,0 +1,251 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The pages of reference, made from the code while the site is built.
+
+A page names what it takes in a comment of its own line, ``<!-- made: commands -->``. On a forge
+there is only the comment; `linkage scene --list`, `linkage COMMAND --help` and config/schema say
+the same. Links into the checkout, which a forge follows, become downloads.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from importlib import import_module
+from inspect import cleandoc
+from itertools import chain, zip_longest
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from linkage_ros.cli.main import COMMANDS, module_of
+from linkage_ros.cli.parameter_tables import REGISTRIES, table_of
+from linkage_ros.pages.markdown import table_lines
+from linkage_ros.scene.schema import linkage_schema, scene_schema
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table, its cells as they are."""
+    return '\n'.join(table_lines(heads, rows)) + '\n'
+
+
+def plain(text: str) -> str:
+    """Return a text that Markdown leaves as it is, also in a table; but for code in backticks."""
+    parts = re.split(r'(`[^`]+`)', ' '.join(text.split()))
+    escaped = [re.sub(r'([\\`*_\[\]<>|~{}$])', r'\\\1', part) for part in parts[::2]]
+    kept = [part.replace('|', '\\|') for part in parts[1::2]]
+    return ''.join(chain.from_iterable(zip_longest(escaped, kept, fillvalue='')))
+
+
+def code(text: str) -> str:
+    """Return a text as code, also in a table; nothing where there is none."""
+    escaped = text.replace('|', '\\|')
+    return f'`{escaped}`' if text else ''
+
+
+def commands() -> str:
+    """Return all commands: what each does, its usage and its options."""
+    return '\n'.join(line for name in COMMANDS for line in _command(name))
+
+
+def _command(name: str) -> Iterator[str]:
+    module = import_module(module_of(name))
+    parser = argparse.ArgumentParser(prog=f'linkage {name}', description=module.__doc__)
+    module.add_arguments(parser)
+    yield f'## linkage {name}\n'
+    yield from (f'{plain(part)}\n' for part in cleandoc(parser.description or '').split('\n\n'))
+    # Of the width that a page shows in one piece; a terminal has its own.
+    parser.formatter_class = _narrow
+    yield f'```text\n{parser.format_usage().strip()}\n```\n'
+    for group in parser._action_groups:  # noqa: SLF001 (argparse has no other way)
+        rows = [
+            (_typed(action), plain(_said(parser, action)))
+            for action in group._group_actions  # noqa: SLF001
+            if not isinstance(action, argparse._HelpAction)  # noqa: SLF001
+        ]
+        if rows:
+            yield table((plain(group.title or '').capitalize(), ''), rows)
+    if parser.epilog:
+        yield f'{plain(parser.epilog)}\n'
+
+
+def _narrow(prog: str) -> argparse.HelpFormatter:
+    return argparse.HelpFormatter(prog, width=88)
+
+
+def _typed(action: argparse.Action) -> str:
+    """Return what one types for an argument."""
+    if not action.option_strings:
+        return code(str(action.metavar or action.dest))
+    values = ''
+    if action.nargs == argparse.REMAINDER:
+        values = ' …'
+    elif action.nargs != 0:
+        choices = '|'.join(map(str, action.choices or ()))
+        shown = action.metavar or choices or action.dest.upper()
+        names = (shown,) if isinstance(shown, str) else shown
+        values = ' ' + ' '.join(names)
+    return ', '.join(code(option + values) for option in action.option_strings)
+
+
+def _said(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
+    formatter = parser._get_formatter()  # noqa: SLF001 (as above)
+    return formatter._expand_help(action) if action.help else ''  # noqa: SLF001
+
+
+def parameters(what: str) -> str:
+    """Return all drives, effects, faults or solvers with their parameters."""
+    return '\n'.join(part for name in REGISTRIES[what] for part in _one(what, name))
+
+
+def _one(what: str, name: str) -> Iterator[str]:
+    found = table_of(what, name)
+    yield f'### {plain(name)}\n'
+    yield f'{plain(found.title.removeprefix(f"{what} {name}: "))}\n'
+    if len(found.columns) == 1:
+        yield 'No parameters.\n'
+        return
+    rows = [(code(row[0]), *map(plain, row[1:])) for row in found.rows]
+    yield table(found.columns, rows)
+
+
+_ELSEWHERE = ('drive', 'effects', 'solver')
+"""Keys whose own keys are in the reference of parameters."""
+
+_NAMED = 'NAME'
+_HEADS = ('key', 'takes', 'default', 'meaning')
+
+
+def scene_keys() -> str:
+    """Return the keys of scene files."""
+    return _keys(scene_schema())
+
+
+def linkage_keys() -> str:
+    """Return the keys of linkage files."""
+    return _keys(linkage_schema())
+
+
+def _keys(whole: Mapping[str, Any]) -> str:
+    return table(_HEADS, _rows('', whole, whole))
+
+
+def _rows(path: str, schema: Mapping[str, Any], whole: Mapping[str, Any]) -> Iterator[Any]:
+    required = schema.get('required', ())
+    for key, of in schema.get('properties', {}).items():
+        if isinstance(of, dict):
+            yield from _row(f'{path}{key}', of, whole, key in required)
+
+
+def _row(
+    key: str, schema: Mapping[str, Any], whole: Mapping[str, Any], needed: bool
+) -> Iterator[Any]:
+    of = _resolved(schema, whole)
+    default = code(json.dumps(of['default'])) if 'default' in of else 'required' if needed else ''
+    yield code(key), plain(_takes(of)), default, plain(str(of.get('description', '')))
+    if key.rpartition('.')[2] in _ELSEWHERE or key.startswith('faults'):
+        return
+    if len(key.split('.')) > 1 and 'linkages' in key:
+        return
+    for part, inner in _mappings_within(of):
+        found = _resolved(inner, whole)
+        if 'properties' in found or part == _NAMED:
+            yield from _rows(f'{key}{part and f".{part}"}.', found, whole)
+
+
+def _mappings_within(of: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the mappings within a value: itself, one for each name, one for each item."""
+    if 'properties' in of:
+        yield '', of
+    if isinstance(of.get('additionalProperties'), dict):
+        yield _NAMED, of['additionalProperties']
+    for branch in ('then', 'else'):
+        inner = of.get(branch, {})
+        if 'properties' in inner and 'properties' not in of:
+            yield '', inner
+
+
+def _resolved(schema: Mapping[str, Any], whole: Mapping[str, Any]) -> Mapping[str, Any]:
+    if '$ref' in schema:
+        return {**whole['$defs'][schema['$ref'].rpartition('/')[2]], **schema}
+    return schema
+
+
+def _number(value: float) -> str:
+    """Return a number as a person writes it, and exactly."""
+    short = f'{value:g}'.replace('e+', 'e').replace('e0', 'e').replace('e-0', 'e-')
+    return short if float(short) == value else str(value)
+
+
+_WORDS = {'object': 'a mapping', 'array': 'a list', 'string': 'a text', 'boolean': 'true or false'}
+
+
+def _takes(of: Mapping[str, Any]) -> str:
+    """Return which values a key takes."""
+    if 'enum' in of:
+        return ' or '.join(map(str, of['enum']))
+    kind = of.get('type', '')
+    if kind in ('number', 'integer'):
+        word = 'a whole number' if kind == 'integer' else 'a number'
+        bounds = (
+            (' more than', 'exclusiveMinimum'),
+            (' from', 'minimum'),
+            (' to', 'maximum'),
+        )
+        said = [f'{before} {_number(of[key])}' for before, key in bounds if key in of]
+        return word + ''.join(said)
+    if not kind and 'then' in of:
+        branches = (_takes(of['then']) or 'a list', _takes(of.get('else', {})))
+        return ' or '.join(dict.fromkeys(filter(None, branches)))
+    return _WORDS.get(kind, '')
+
+
+MADE: Mapping[str, Callable[[], str]] = {
+    'commands': commands,
+    'drives': lambda: parameters('drive'),
+    'effects': lambda: parameters('effect'),
+    'faults': lambda: parameters('fault'),
+    'solvers': lambda: parameters('solver'),
+    'scene keys': scene_keys,
+    'linkage keys': linkage_keys,
+}
+"""What there is to put in, by its name."""
+
+_DOCS = Path(__file__).resolve().parents[1]
+_LINK = re.compile(r'(?<!!)\[([^\]\n]+)\]\((\.\./[^)#\s]+)(?:#[^)]*)?\)')
+_MARK = re.compile(r'^<!-- made: (.+) -->$', re.MULTILINE)
+
+
+def put_in(docname: str, source: list[str]) -> None:
+    """Put into a page what it names; Sphinx wants the page changed in its list of one."""
+    names = _MARK.findall(source[0])
+    unknown = sorted({*names} - {*MADE})
+    assert not unknown, f'{docname}: nothing makes {", ".join(unknown)}'
+    text = _LINK.sub(lambda found: _local_link(found, (_DOCS / docname).parent), source[0])
+    source[0] = _MARK.sub(lambda found: MADE[found[1]](), text)
+
+
+def _local_link(link: re.Match[str], folder: Path) -> str:
+    """Return a link that stays within the site: to a file of the checkout it brings the file."""
+    shown, to = link.groups()
+    target = (folder / to).resolve()
+    if target.is_relative_to(_DOCS):
+        return link[0]
+    if target.is_file():
+        return f'{{download}}`{shown.strip("`")} <{to}>`'
+    return shown

@@ -1,0 +1,314 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The truth, proved: balls that hold a linkage's joints, rates and accelerations for certain.
+
+A second reference, which shares nothing with the first but the linkage. Unknown are here the place
+p of each link's frame and its direction u as a vector, no angle and no slide; so that all
+constraints are of second degree at most::
+
+    link       u·u = 1
+    pin        p1 + u1 z1 = p2 + u2 z2                  (z times u as complex numbers)
+    slider     (p2 + u2 z2 − p1 − u1 t) × u1 d = 0
+    block      u1 e^{i·angle} × u2 = 0
+    input      u1 e^{iφ} × u2 = 0, or (p2 + u2 z2 − p1 − u1 t) · u1 d = s
+
+A sum of c·x_i·x_j, with x_0 = 1, is derived by the product rule, and nothing by hand. That a
+ball X about m holds one solution and no other is shown by Krawczyk's operator: with Y near J(m)⁻¹
+it does where m − Y·F(m) + (1 − Y·J(X))·(X − m) lies inside X (R. Krawczyk, Computing 4, 1969).
+"""
+
+from __future__ import annotations
+
+from cmath import rect
+from collections.abc import Sequence
+from math import frexp
+from typing import Any, NamedTuple
+
+from flint import acb, arb, arb_mat, ctx
+from linkage_ros.accuracy.reference import SingularError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
+
+_PRECISIONS = (512, 1024, 2048)
+"""In bits; the next is taken where one proves nothing."""
+
+_RADIUS = 150
+"""Of the ball that is proved to hold one solution: 2 to minus this, in the unit of length."""
+
+Form = list[tuple[int, Any]]
+"""A place or a direction: complex factors by the number of their unknown."""
+
+Term = tuple[tuple[Any, Any, Any], int, int]
+"""A factor with its first and second derivative by time, and the numbers of two unknowns."""
+
+
+class Proof(NamedTuple):
+    """Balls that hold the published joints, their rates and accelerations; angles modulo 2π."""
+
+    joints: tuple[Any, ...]
+    rates: tuple[Any, ...]
+    accelerations: tuple[Any, ...]
+
+
+def prove(
+    linkage: Linkage,
+    inputs: Sequence[float],
+    rates: Sequence[float] | None = None,
+    accelerations: Sequence[float] | None = None,
+) -> Proof:
+    """
+    Return a proved state next to the closure's own.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    inputs, rates, accelerations
+        Of the driven joints; as `Reference.solve` has them.
+
+    Raises
+    ------
+    SingularError
+        Where nothing can be proved: at a toggle or a change point.
+    ValueError
+        Where the linkage does not close.
+
+    """
+    rates = [1.0] * len(inputs) if rates is None else rates
+    accelerations = [0.0] * len(inputs) if accelerations is None else accelerations
+    before = ctx.prec
+    try:
+        for ctx.prec in _PRECISIONS:
+            equations = _Equations(linkage, [*zip(inputs, rates, accelerations, strict=True)])
+            found = _proved(equations, equations.start(Closure(linkage), inputs))
+            if found is not None:
+                return equations.proof(found)
+    finally:
+        ctx.prec = before
+    raise SingularError(f'{tuple(inputs)}: nothing is proved')
+
+
+class _Equations:
+    """The constraints of a linkage as sums of products of two unknowns."""
+
+    def __init__(self, linkage: Linkage, driven: Sequence[tuple[float, float, float]]) -> None:
+        self._linkage = linkage
+        moving = [name for name in linkage.links if name != GROUND]
+        self._links = {name: 1 + 4 * k for k, name in enumerate(moving)}
+        self.count = 4 * len(moving)
+        unit = max(abs(complex(*z)) for points in linkage.links.values() for z in points.values())
+        self.scale = 2.0 ** frexp(unit)[1]
+        self.constraints: list[list[Term]] = []
+        for k in self._links.values():
+            along = self._direction(k, 1)
+            self.constraints.append([*_dot(along, along), _still(-1, 0, 0)])
+        carriers: dict[str, str] = {}
+        for link, points in linkage.links.items():
+            for point in points:
+                if point in carriers:
+                    self._meet(self._place(link, point), self._place(carriers[point], point))
+                carriers.setdefault(point, link)
+        self._slides = {}
+        for name, slider in linkage.sliders.items():
+            end = self._place(slider.block or carriers[slider.point], slider.point)
+            between = _less(end, self._place(slider.along, slider.through))
+            line = acb(*slider.direction)
+            along = self._turned(slider.along, line / abs(line))
+            self._slides[name] = _dot(along, between)
+            self.constraints.append(_cross(along, between))
+            if slider.block:
+                angle = arb(slider.angle)
+                turned = self._turned(slider.along, acb(angle.cos(), angle.sin()))
+                self.constraints.append(_cross(turned, self._turned(slider.block, acb(1))))
+        for joint, (value, rate, change) in zip(linkage.inputs, driven, strict=True):
+            x, v, a = arb(value), arb(rate), arb(change)
+            if joint.slider:
+                given = (-x / self.scale, -v / self.scale, -a / self.scale)
+                self.constraints.append([*self._slides[joint.slider], (given, 0, 0)])
+                continue
+            one = acb(x.cos(), x.sin())
+            series = (one, one * acb(0, v), one * acb(-v * v, a))
+            self.constraints.append(
+                _cross(
+                    self._turned(joint.parent, acb(1)), self._turned(joint.child, acb(1)), series
+                )
+            )
+
+    def start(self, closure: Closure, inputs: Sequence[float]) -> list[Any]:
+        """Return the unknowns as the closure has them; that of number 0 is 1."""
+        position = closure.position(*inputs)
+        if not position.joints:
+            raise ValueError(f'{inputs}: the linkage is {position.status.name.lower()}')
+        angles, points = closure.link_angles(position), closure.points(position)
+        found = [arb(1)]
+        for link in self._links:
+            name, arm = next(iter(self._linkage.links[link].items()))
+            direction = rect(1.0, angles[link])
+            place = (points[link, name] - complex(*arm) * direction) / self.scale
+            found += [arb(x) for x in (direction.real, direction.imag, place.real, place.imag)]
+        return found
+
+    def values(self, motion: Sequence[Sequence[Any]]) -> list[Any]:
+        """Return what the constraints come to, derived as often as the motion has derivatives."""
+        return [_value(terms, motion) for terms in self.constraints]
+
+    def slopes(self, x: Sequence[Any]) -> Any:
+        """Return the derivatives of the constraints by the unknowns."""
+        rows = [[arb(0)] * (self.count + 1) for _ in self.constraints]
+        for row, terms in zip(rows, self.constraints, strict=True):
+            for (factor, *_), i, j in terms:
+                row[i] += factor * x[j]
+                row[j] += factor * x[i]
+        return arb_mat([row[1:] for row in rows])
+
+    def proof(self, x: Sequence[Any]) -> Proof:
+        """Return the published joints and their derivatives."""
+        slopes, motion = self.slopes(x), [list(x)]
+        for _ in range(2):
+            motion.append([arb(0)] * len(x))
+            rest = self.values(motion)
+            try:
+                solved = slopes.solve(arb_mat([[-value] for value in rest]))
+            except ZeroDivisionError:
+                raise SingularError('the balls hold a singular matrix') from None
+            motion[-1] = [arb(0), *solved.entries()]
+        return Proof(
+            *(
+                tuple(
+                    self._turn(joint, motion[: k + 1])
+                    if isinstance(joint, RevoluteJoint)
+                    else _value(self._slides[joint.slider], motion[: k + 1]) * self.scale
+                    for joint in self._linkage.joints.values()
+                )
+                for k in range(3)
+            )
+        )
+
+    def _turn(self, joint: RevoluteJoint, motion: Sequence[Sequence[Any]]) -> Any:
+        """Return an angle; for u on the unit circle its derivatives are u × u' and u × u''."""
+        units = []
+        for link in (joint.child, joint.parent):
+            if link == GROUND:
+                units.append([acb(1), acb(0), acb(0)])
+            else:
+                k = self._links[link]
+                units.append([acb(x[k], x[k + 1]) for x in motion])
+        child, parent = units
+        if len(motion) > 1:
+            order = len(motion) - 1
+            return _across(child[0], child[order]) - _across(parent[0], parent[order])
+        between = child[0] * _conjugate(parent[0])
+        if between.real < 0:
+            return (-between).log().imag + arb.pi()
+        return between.log().imag
+
+    def _meet(self, one: Form, other: Form) -> None:
+        between = _less(one, other)
+        self.constraints.append([_still(c.real, 0, k) for k, c in between])
+        self.constraints.append([_still(c.imag, 0, k) for k, c in between])
+
+    def _place(self, link: str, point: str) -> Form:
+        z = acb(*self._linkage.links[link][point]) / arb(self.scale)
+        if link == GROUND:
+            return [(0, z)]
+        k = self._links[link]
+        return [*self._direction(k, z), (k + 2, acb(1)), (k + 3, acb(0, 1))]
+
+    def _turned(self, link: str, unit: Any) -> Form:
+        return [(0, unit)] if link == GROUND else self._direction(self._links[link], unit)
+
+    @staticmethod
+    def _direction(k: int, z: Any) -> Form:
+        return [(k, acb(z)), (k + 1, acb(0, 1) * z)]
+
+
+def _proved(equations: _Equations, start: list[Any]) -> list[Any] | None:
+    """Return balls that hold one solution, or nothing."""
+    x = start
+    try:
+        for _ in range(12):
+            step = equations.slopes(x).solve(arb_mat([[v] for v in equations.values([x])]))
+            x = [arb(1), *((a - b).mid() for a, b in zip(x[1:], step.entries(), strict=True))]
+            if max(float(abs(one).mid()) for one in step.entries()) < 2.0 ** (-2 * _RADIUS):
+                break
+        inverse = equations.slopes(x).inv().mid()
+    except ZeroDivisionError:
+        return None
+    radius = arb(0, arb(2) ** -_RADIUS)
+    ball = [arb(1), *(one + radius for one in x[1:])]
+    constant = inverse * arb_mat([[v] for v in equations.values([x])])
+    one = arb_mat(
+        equations.count,
+        equations.count,
+        [int(i == j) for i in range(equations.count) for j in range(equations.count)],
+    )
+    spread = (one - inverse * equations.slopes(ball)) * arb_mat([[radius]] * equations.count)
+    image = [
+        middle - c + s
+        for middle, c, s in zip(x[1:], constant.entries(), spread.entries(), strict=True)
+    ]
+    if all(b.contains_interior(k) for b, k in zip(ball[1:], image, strict=True)):
+        return [arb(1), *image]
+    return None
+
+
+def _value(terms: Sequence[Term], motion: Sequence[Sequence[Any]]) -> Any:
+    """Return a sum of products; of a motion, its highest derivative, by the product rule."""
+    x = motion[0]
+    total = arb(0)
+    for (c, c1, c2), i, j in terms:
+        if len(motion) == 1:
+            total += c * x[i] * x[j]
+            continue
+        v = motion[1]
+        swept = v[i] * x[j] + x[i] * v[j]
+        if len(motion) == 2:
+            total += c1 * x[i] * x[j] + c * swept
+            continue
+        a = motion[2]
+        pulled = a[i] * x[j] + 2 * v[i] * v[j] + x[i] * a[j]
+        total += c2 * x[i] * x[j] + 2 * c1 * swept + c * pulled
+    return total
+
+
+def _dot(one: Form, other: Form) -> list[Term]:
+    return [_still((_conjugate(c) * d).real, i, j) for i, c in one for j, d in other]
+
+
+def _cross(one: Form, other: Form, turn: Sequence[Any] = ()) -> list[Term]:
+    """Return one × other; the first turned as the series of a unit vector says."""
+    if not turn:
+        return [_still((_conjugate(c) * d).imag, i, j) for i, c in one for j, d in other]
+    return [
+        (tuple((_conjugate(c * t) * d).imag for t in turn), i, j) for i, c in one for j, d in other
+    ]
+
+
+def _less(one: Form, other: Form) -> Form:
+    return [*one, *((k, -c) for k, c in other)]
+
+
+def _still(factor: Any, i: int, j: int) -> Term:
+    return (arb(factor), arb(0), arb(0)), i, j
+
+
+def _across(one: Any, other: Any) -> Any:
+    return (_conjugate(one) * other).imag
+
+
+def _conjugate(number: Any) -> Any:
+    return acb(number.real, -number.imag)

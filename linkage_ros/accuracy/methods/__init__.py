@@ -1,0 +1,75 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A method of closing the loops of a linkage, as it is measured.
+
+All methods have the same calls, so that a loop over states costs the same for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+Joints = Sequence[Any]
+"""Of the published joints; empty where the method has no answer."""
+
+Motion = tuple[Joints, Joints, Joints]
+"""Joints, rates and accelerations."""
+
+RATE, ACCELERATION = 1.0, 0.5
+"""Of every driven joint, in [rad/s] or [m/s], and by the second, wherever motions are compared."""
+
+NOTHING: Motion = ((), (), ())
+
+
+class Method(NamedTuple):
+    """
+    A method with a setting, made for a linkage.
+
+    Attributes
+    ----------
+    name
+        Of the method.
+    setting
+        In words; '' where it has none.
+    position
+        Takes the inputs of one state; None if single states are never solved.
+    motion
+        Likewise, with rates and accelerations at those of above.
+    batch
+        Takes an array for each input, and how many derivatives are asked for; returns arrays of
+        joints, rates and accelerations, as many of them, of shape (joints, states).
+    memory
+        Memory that it needs, in [bytes]; None where it is negligible.
+    build
+        Time to build it, in [s]; None where it is negligible.
+    remembers
+        Whether an answer depends on the states before.
+    together
+        Whether a position comes with its rates and accelerations, in one call.
+
+    """
+
+    name: str
+    setting: str = ''
+    position: Callable[..., Joints] | None = None
+    motion: Callable[..., Motion] | None = None
+    batch: Callable[[Sequence[Any], int], Sequence[Any]] | None = None
+    memory: int | None = None
+    build: float | None = None
+    remembers: bool = False
+    together: bool = False

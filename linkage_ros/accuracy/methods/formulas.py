@@ -1,0 +1,269 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A four-bar as formulas describe it, and two of these: the textbook form, and single precision.
+
+**Textbook form:** a quadratic in the height of the pin, with K1 … K4. With A = (a·cos θ2,
+a·sin θ2) the pin of the crank and (Bx, By) the pin of coupler and rocker::
+
+    K1 = (b² − c² − a² + d²)/(2(d − Ax))      K2 = Ay/(d − Ax)           Bx = K1 + K2·By
+    K3 = 2(d − K1)·K2/(K2² + 1)               K4 = ((d − K1)² − c²)/(K2² + 1)
+    By = K3/2 ± √((K3/2)² − K4)
+
+It divides by zero where A lies above or below the rocker's pivot (Ax = d, an ordinary pose), and
+loses digits near it. The sign of the root is not the assembly: on the other side of that pose the
+same sign belongs to the other assembly. The formula is used as it is printed, with one sign
+throughout. It gives no rates.
+
+**Single precision:** the closed form in numbers of 32 bits, inputs and constants included. It is
+the stable form by the half angle, as in `linkage_ros.kinematics.crank_diagonal`. With
+near = 2√(ad)·sin(φ/2) and far = 2√(ad)·cos(φ/2), s² = (d − a)² + near²::
+
+    K² = (s² − (b − c)²)·((b + c)² − s²)
+       = ((d − a)² − (b − c)² + near²)·((b + c)² − (a + d)² + far²)
+"""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from collections.abc import Callable, Sequence
+from math import atan2, cos, sin, sqrt
+from typing import Any, NamedTuple
+
+from linkage_ros.accuracy.methods import ACCELERATION, Joints, Method, Motion, RATE
+from linkage_ros.kinematics.four_bars import four_bars
+from linkage_ros.kinematics.groups import find_groups
+from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
+from linkage_ros.kinematics.structure import Driven
+import numpy as np
+
+
+class PlainFourBar(NamedTuple):
+    """
+    A linkage that is a single four-bar with its crank on the ground.
+
+    Attributes
+    ----------
+    a, b, c, d
+        Lengths of crank, coupler, rocker and ground, in [m].
+    side
+        1 where the pin of coupler and rocker lies left of what leads from the crank's to the
+        ground's, −1 where right.
+    turn
+        What the input is multiplied by, ±1, to be a crank that turns counter-clockwise.
+    offset
+        What is added then, to be measured from the line of the ground, in [rad].
+    terms
+        For each published joint the numbers of two directions and a constant: the first less the
+        second, and the constant. The directions are those of ground (0), crank, coupler, rocker.
+
+    """
+
+    a: float
+    b: float
+    c: float
+    d: float
+    side: float
+    turn: float
+    offset: float
+    terms: tuple[tuple[int, int, float], ...]
+
+    def joints(self, directions: Sequence[Any]) -> tuple[Any, ...]:
+        """Return the published joints for directions measured from the line of the ground."""
+        return tuple(directions[i] - directions[j] + constant for i, j, constant in self.terms)
+
+    def changes(self, directions: Sequence[Any]) -> tuple[Any, ...]:
+        """Return the derivatives of the published joints for those of the directions."""
+        return tuple(directions[i] - directions[j] for i, j, _ in self.terms)
+
+    def closed_at(self, theta: float) -> tuple[float, float]:
+        """
+        Return the directions of coupler and rocker at one of the crank, all in [rad].
+
+        By the textbook: good enough to tell a peer once which of the two assemblies is meant.
+        """
+        crank_pin = rect(self.a, theta)
+        across = self.d - crank_pin
+        s = abs(across)
+        along = 0.5 * (s + (self.b - self.c) * (self.b + self.c) / s)
+        aside = self.side * sqrt(max(self.b * self.b - along * along, 0.0))
+        coupler = complex(along, aside) * (across / s)
+        return phase(coupler), phase(crank_pin + coupler - self.d)
+
+
+def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
+    """Return a linkage as a four-bar, or None if it is anything else."""
+    structure = find_groups(linkage)
+    found = list(four_bars(structure))
+    driven = [group for group in structure.groups if isinstance(group, Driven)]
+    if len(found) != 1 or len(structure.groups) != 2 or len(driven) != 1 or linkage.sliders:
+        return None
+    crank, coupler, rocker, ground = found[0].links
+    if ground != GROUND or not all(
+        isinstance(joint, RevoluteJoint) for joint in linkage.joints.values()
+    ):
+        return None
+    ends: Callable[[str, str], str] = lambda one, other: next(  # noqa: E731  # a word for it
+        name for name in linkage.links[one] if name in linkage.links[other]
+    )
+    pivot, pin = ends(crank, ground), ends(crank, coupler)
+    closing, far = ends(coupler, rocker), ends(rocker, ground)
+
+    def facing(link: str, start: str, end: str) -> float:
+        points = linkage.links[link]
+        return phase(complex(*points[end]) - complex(*points[start]))
+
+    arms = {
+        ground: facing(ground, pivot, far),
+        crank: facing(crank, pivot, pin),
+        coupler: facing(coupler, pin, closing),
+        rocker: facing(rocker, far, closing),
+    }
+    numbers = {link: k for k, link in enumerate(arms)}
+    level = arms[ground]
+    turn = 1.0 if linkage.inputs[0].child == crank else -1.0
+    # The angle of a link is its direction less that of its arm; of the ground it is 0.
+    constants = {link: level - arm for link, arm in arms.items()}
+    return PlainFourBar(
+        *found[0].lengths,
+        side=1.0 if linkage.assembly[closing] == 'left' else -1.0,
+        turn=turn,
+        offset=arms[crank] - level,
+        terms=tuple(
+            (numbers[j.child], numbers[j.parent], constants[j.child] - constants[j.parent])
+            for j in linkage.joints.values()
+            if isinstance(j, RevoluteJoint)
+        ),
+    )
+
+
+TEXTBOOK = 'textbook form'
+
+
+def textbook(linkage: Linkage) -> Method | None:
+    """Return it, of a four-bar."""
+    shape = plain_four_bar(linkage)
+    if shape is None:
+        return None
+    a, b, c, d, sign, turn, offset, _ = shape
+    joints = shape.joints
+
+    def position(angle: float) -> Joints:
+        theta = turn * angle + offset
+        ax, ay = a * cos(theta), a * sin(theta)
+        try:
+            k1 = (b**2 - c**2 - a**2 + d**2) / (2.0 * (d - ax))
+            k2 = ay / (d - ax)
+            k3 = 2.0 * (d - k1) * k2 / (k2**2 + 1.0)
+            k4 = ((d - k1) ** 2 - c**2) / (k2**2 + 1.0)
+            by = 0.5 * k3 + sign * sqrt((0.5 * k3) ** 2 - k4)
+        except (ZeroDivisionError, ValueError):
+            return ()
+        bx = k1 + k2 * by
+        return joints((0.0, theta, atan2(by - ay, bx - ax), atan2(by, bx - d)))
+
+    return Method(TEXTBOOK, '', position)
+
+
+SINGLE_PRECISION = 'closed form, float32'
+
+_Single = np.float32
+
+
+def single_precision(linkage: Linkage) -> Method | None:
+    """Return it, of a four-bar."""
+    shape = plain_four_bar(linkage)
+    if shape is None:
+        return None
+    solve = _solver(shape)
+
+    def position(angle: float) -> Joints:
+        found: Joints = solve(_Single(angle), 0)[0]
+        return found
+
+    def motion(angle: float) -> Motion:
+        joints, rates, accelerations = solve(_Single(angle), 2)
+        return joints, rates, accelerations
+
+    def batch(inputs: Sequence[Any], derivatives: int) -> Sequence[Any]:
+        (angles,) = inputs
+        found = solve(angles.astype(_Single), derivatives)
+        return [np.stack([np.broadcast_to(row, angles.shape) for row in rows]) for rows in found]
+
+    return Method(SINGLE_PRECISION, '', position, motion, batch)
+
+
+def _solver(shape: PlainFourBar) -> Any:
+    a, b, c, d = shape[:4]
+    one, half, sign = _Single(1.0), _Single(0.5), _Single(shape.side)
+    turn, offset = _Single(shape.turn), _Single(shape.offset)
+    twice_a, apart, apart_square = _Single(2.0 * a), _Single(d - a), _Single((d - a) ** 2)
+    root = _Single(2.0 * sqrt(a * d))
+    fold = _Single((abs(d - a) - abs(b - c)) * (abs(d - a) + abs(b - c)))
+    stretch = _Single((b + c - a - d) * (a + b + c + d))
+    difference, lengths = _Single((b - c) * (b + c)), _Single((d - a) * (d + a))
+    more, less = (
+        _Single((b - c) * (b + c) + (d - a) ** 2),
+        _Single((b - c) * (b + c) - (d - a) ** 2),
+    )
+    along = _Single(a * (d - a))
+    rate, acceleration = turn * _Single(RATE), turn * _Single(ACCELERATION)
+    terms = [(i, j, _Single(constant)) for i, j, constant in shape.terms]
+    zero = _Single(0.0)
+
+    def solve(angle: Any, derivatives: int) -> list[tuple[Any, ...]]:
+        phi = turn * angle + offset
+        halved = half * phi
+        sine, cosine = np.sin(halved), np.cos(halved)
+        near, far = root * sine, root * cosine
+        near_square, far_square = near * near, far * far
+        square = apart_square + near_square
+        # At a change point the root is signed with the half angle. A negative rest is rounding
+        # where the loop closes; without this a toggle is refused.
+        inner = np.sqrt(np.maximum(fold + near_square, zero)) if fold else near
+        outer = np.sqrt(np.maximum(stretch + far_square, zero)) if stretch else far
+        cross = sign * inner * outer
+        direction = np.arctan2(-twice_a * sine * cosine, apart + twice_a * sine * sine)
+        plus, minus = more + near_square, less - near_square
+        coupler = direction + np.arctan2(cross, plus)
+        rocker = direction + np.arctan2(cross, minus)
+        lines = (zero, phi, coupler, rocker)
+        found = [tuple(lines[i] - lines[j] + constant for i, j, constant in terms)]
+        if not derivatives:
+            return found
+        with np.errstate(all='ignore'):
+            p, q = (along - half * near_square) / square, half * near * far / square
+            cot_beta, cot_gamma = plus / cross, minus / cross
+            lines = (zero, one, q * cot_gamma - p, q * cot_beta - p)
+            swept = [line * rate for line in lines]
+            found.append(tuple(swept[i] - swept[j] for i, j, _ in terms))
+            if derivatives < 2:
+                return found
+            bend = fold * (far / inner) * (far / inner)
+            bend -= stretch * (near / outer) * (near / outer)
+            bend = _Single(0.25) * bend / square
+            swirl = q * (lengths / square) - _Single(2.0) * q * (q * (difference / cross))
+            whirl = rate * rate
+            pulled = (
+                zero,
+                acceleration,
+                acceleration * lines[2] + whirl * (swirl + cot_gamma * bend),
+                acceleration * lines[3] + whirl * (swirl + cot_beta * bend),
+            )
+            found.append(tuple(pulled[i] - pulled[j] for i, j, _ in terms))
+        return found
+
+    return solve

@@ -1,0 +1,313 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What closing the loops costs: the error of a state against its time, for all methods.
+
+Errors are against fifty digits and computed once. Times are measured separately, of all methods on
+all poses in turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
+from math import inf
+from time import perf_counter
+from typing import Any
+
+from linkage_ros.accuracy.methods import ACCELERATION, Method, RATE
+from linkage_ros.accuracy.methods.equations import extended, integrations
+from linkage_ros.accuracy.methods.formulas import single_precision, textbook
+from linkage_ros.accuracy.methods.node import (
+    closed_form,
+    COLD,
+    FROM_KNOTS,
+    ITERATED,
+    newton,
+    STARTS,
+    table,
+    WARM,
+)
+from linkage_ros.accuracy.methods.peers import casadi, mujoco, pinocchio, pylinkage
+from linkage_ros.accuracy.poses import (
+    BATCH,
+    batch_errors,
+    Errors,
+    FAR,
+    Measured,
+    motion_errors,
+    off,
+    path,
+    pose_sets,
+    Poses,
+    position_errors,
+    there_and_back,
+)
+from linkage_ros.accuracy.reference import Reference, Truth
+from linkage_ros.accuracy.results import Part
+from linkage_ros.accuracy.solving_results import part_of
+from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint
+from linkage_ros.measuring import Contender, in_turn, Progress
+from linkage_ros.scene.scene import Scene
+from linkage_ros.solvers.table import ORDERS
+import numpy as np
+
+STATES = 64
+"""Of a turn, where rates are integrated."""
+
+_ARRAY = 2e-2
+"""In [s]: where a full array takes longer, it is no longer than the poses."""
+
+_PASS = 5e-3
+"""A pass over states that takes longer than this is timed on the first of them only, in [s]."""
+
+
+def measure_solving(scene: Scene, quick: bool, progress: Progress) -> Part:
+    """
+    Measure how a scene's first linkage is solved.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    quick
+        Whether a few seconds are to do.
+    progress
+        Called now and then with the share that is done, 0 to 1.
+
+    """
+    member = scene.members[0]
+    sets = pose_sets(member.name or scene.name, member.linkage, 24 if quick else 128)
+    found: list[Measured] = []
+    for number, poses in enumerate(sets):
+        progress(0.3 * number / len(sets))
+        found += judge(poses, quick)
+    take_times(found, 1.0 if quick else 40.0, lambda share: progress(0.3 + 0.7 * share))
+    return part_of(found, quick)
+
+
+def judge(poses: Poses, quick: bool) -> list[Measured]:
+    """
+    Return the errors of all methods on a set of poses, without times.
+
+    Raises
+    ------
+    ArithmeticError
+        Where two references differ.
+
+    """
+    truths = true_states(poses)
+    confirmed(poses, truths)
+    methods = methods_for(poses.linkage, poses.key, quick)
+    found = [_judged(method, poses, truths) for method in methods]
+    if poses.key == 'easy':
+        found += _integrated(poses, quick)
+    return found
+
+
+def take_times(
+    found: Sequence[Measured], seconds: float, progress: Progress = lambda _: None
+) -> None:
+    """Time all judged methods in turn, for about a number of seconds."""
+    jobs = [(one, what, job) for one in found for what, job in _contenders(one)]
+    times = in_turn([job for _, _, job in jobs], seconds, progress)
+    for (one, what, _), time in zip(jobs, times, strict=True):
+        one.times[what] = time
+
+
+def true_states(poses: Poses) -> list[Truth]:
+    """Return the truth at every state of a set."""
+    reference = Reference(poses.linkage)
+    driven = len(poses.linkage.inputs)
+    rates, accelerations = [RATE] * driven, [ACCELERATION] * driven
+    return [reference.solve(inputs, rates, accelerations) for inputs in poses.inputs]
+
+
+def _integrated(poses: Poses, quick: bool) -> Iterator[Measured]:
+    """Yield the results of integration along a turn; its error is that at the end."""
+    way = path(poses, STATES)
+    if way is None:
+        return
+    (truth,) = true_states(way._replace(inputs=way.inputs[-1:]))
+    for method in integrations(way, quick):
+        assert method.position is not None
+        for inputs in way.inputs:
+            joints = method.position(*inputs)
+        error = off(way.linkage, joints, truth) if joints else inf
+        errors = Errors((error,), 0.0) if error <= FAR else Errors((None,), 1.0)
+        yield Measured(way, method, errors, None, None, {})
+
+
+def _judged(method: Method, poses: Poses, truths: Sequence[Truth]) -> Measured:
+    motion = motion_errors(method, poses, truths) if method.motion else None
+    position = motion[0] if motion and method.together else position_errors(method, poses, truths)
+    batch = None
+    # Iteration takes one state at a time; arrays make it no faster.
+    if method.batch is not None and poses.key in ('easy', 'five_dyads'):
+        batch = batch_errors(method.batch, poses, truths)
+    return Measured(poses, method, position, motion, batch, {})
+
+
+def _contenders(one: Measured) -> Iterator[tuple[str, Contender]]:
+    poses, method = one.poses, one.method
+    for what, solve in (('position', method.position), ('motion', method.motion)):
+        if solve is not None:
+            yield what, _looped(solve, poses)
+    if one.batch is not None and method.batch is not None:
+        rows = [np.array(row) for row in zip(*poses.inputs, strict=True)]
+        begun = perf_counter()
+        method.batch(rows, 2)
+        each = (perf_counter() - begun) / len(rows[0])
+        if each * BATCH < _ARRAY:
+            rows = [np.resize(row, BATCH) for row in rows]
+        yield 'batch', _at_once(method.batch, rows, 0)
+        yield 'batch_motion', _at_once(method.batch, rows, 2)
+
+
+def _looped(solve: Callable[..., Any], poses: Poses) -> Contender:
+    states = poses.inputs
+    if poses.key == 'path':
+        # The first state is a new start and no step.
+        solve(*states[0])
+        states = states[1:]
+    done, begun = 0, perf_counter()
+    while done < len(states) and perf_counter() - begun < _PASS:
+        solve(*states[done])
+        done += 1
+    chosen = states[:done]
+    if poses.key == 'path' or done < len(states):
+        chosen = there_and_back(chosen)
+
+    def run() -> None:
+        for inputs in chosen:
+            solve(*inputs)
+
+    return Contender(run, len(chosen))
+
+
+def _at_once(
+    solve: Callable[[Sequence[Any], int], object], arrays: Sequence[Any], derivatives: int
+) -> Contender:
+    return Contender(lambda: solve(arrays, derivatives), len(arrays[0]))
+
+
+TOLERANCES = tuple(10.0**-k for k in range(2, 16))
+KNOTS = tuple(2**k for k in range(4, 21))
+
+PEERS = (pylinkage, casadi, mujoco, pinocchio)
+"""Other packages, where they are installed; to import some of them takes a second."""
+
+_FEW = {FROM_KNOTS: (1e-8,), WARM: (1e-2, 1e-8, 1e-14), COLD: (1e-8,)}
+"""Tolerances by where Newton's method starts."""
+
+_LARGEST = 2**22
+"""Knots times joints of a table: what memory bears beside all others."""
+
+_LARGEST_ITERATED = 2**14
+"""Where each knot is iterated."""
+
+
+def methods_for(linkage: Linkage, key: str, quick: bool) -> Iterator[Method]:
+    """
+    Yield the methods that a linkage has.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    key
+        Of the poses: all settings for easy ones, a few for the others.
+    quick
+        Whether a few settings are to do everywhere, and no other packages.
+
+    """
+    closed = closed_form(linkage)
+    yield closed
+    for made in (single_precision, textbook, *(() if quick else PEERS)):
+        method = made(linkage)
+        if method is not None:
+            yield method
+    whole = key == 'easy' and not quick
+    for start in STARTS:
+        many = TOLERANCES if start == WARM else TOLERANCES[::3]
+        for tolerance in many if whole else _FEW[start]:
+            yield newton(linkage, tolerance, start)
+    if len(linkage.inputs) == 1:
+        many_knots = _knots_of(linkage, closed.name == ITERATED, key, quick)
+        for order in ORDERS:
+            for knots in many_knots:
+                yield table(linkage, knots, order)
+    yield extended(linkage)
+
+
+def _knots_of(linkage: Linkage, iterated: bool, key: str, quick: bool) -> Sequence[int]:
+    if quick and key != 'easy':
+        return KNOTS[4:5] if iterated else KNOTS[6:7]
+    if quick or key != 'easy':
+        return KNOTS[2:11:4]
+    largest = _LARGEST_ITERATED if iterated else _LARGEST // len(linkage.joints)
+    return [knots for knots in KNOTS if knots <= largest]
+
+
+PROVED = 1e-40
+"""Radius of a ball that proves a number, of 1 or of itself where that is more."""
+
+_SAMPLE = 3
+
+
+def confirmed(poses: Poses, truths: Sequence[Truth]) -> int:
+    """
+    Return how many states balls have confirmed; 0 if python-flint is not installed.
+
+    Raises
+    ------
+    ArithmeticError
+        Where the references differ.
+
+    """
+    if find_spec('flint') is None:
+        return 0
+    from linkage_ros.accuracy.enclosure import prove  # local import: an extra of its own
+
+    driven = len(poses.linkage.inputs)
+    rates, accelerations = [RATE] * driven, [ACCELERATION] * driven
+    chosen = range(0, len(truths), max(1, len(truths) // _SAMPLE))
+    for k in chosen:
+        proof = prove(poses.linkage, poses.inputs[k], rates, accelerations)
+        if not same(poses.linkage, proof, truths[k]):
+            raise ArithmeticError(f'{poses.name} at {poses.inputs[k]}: the references differ')
+    return len(chosen)
+
+
+def same(linkage: Linkage, proof: Any, truth: Truth) -> bool:
+    """Return whether small balls hold joints, rates and accelerations, angles modulo 2π."""
+    from flint import arb, ctx  # local import: an extra
+
+    before, ctx.prec = ctx.prec, 512
+    try:
+        for order, (balls, values) in enumerate(zip(proof, truth.orders, strict=True)):
+            joints = linkage.joints.values()
+            for joint, ball, value in zip(joints, balls, values, strict=True):
+                number = arb(value.context.nstr(value, 100))
+                if isinstance(joint, RevoluteJoint) and not order:
+                    turn = 2 * arb.pi()
+                    number -= turn * round(float(((number - ball) / turn).mid()))
+                enough = PROVED * max(1.0, abs(float(value)))
+                if float(ball.rad()) > enough or not (number + arb(0, enough)).overlaps(ball):
+                    return False
+    finally:
+        ctx.prec = before
+    return True

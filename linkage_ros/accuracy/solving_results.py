@@ -1,0 +1,491 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The part of the page on closing the loops: its diagrams, its tables and their conclusions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
+
+from linkage_ros.accuracy.methods import ACCELERATION, RATE
+from linkage_ros.accuracy.methods.equations import EXTENDED
+from linkage_ros.accuracy.methods.formulas import TEXTBOOK
+from linkage_ros.accuracy.methods.node import FROM_KNOTS, ITERATED, NODE_DEFAULTS, TABLES
+from linkage_ros.accuracy.poses import BATCH, Errors, Measured, Poses, unit_of
+from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
+from linkage_ros.measuring import Spread
+
+FLOOR = 1e-18
+"""Where an answer in doubles that is exactly right is drawn, in [rad]."""
+
+_TIME = Axis('time of a state', 'µs')
+_ERROR = 'greatest error'
+_UNIT = 'rad, or of the size'
+_LEAST = 1e-19
+"""Less is drawn on the edge: what has more digits than a double has would flatten all else."""
+
+_ERRORS = Axis(_ERROR, _UNIT, least=_LEAST)
+
+_WITH_PATH = ('easy', 'path')
+"""Integration goes along a path; it is shown with the easy poses."""
+
+
+def part_of(found: Sequence[Measured], quick: bool) -> Part:
+    """Return the part."""
+    return Part(
+        'solving',
+        'Solving the loop',
+        text(found, quick),
+        list(_diagrams(found)),
+        list(_tables(found)),
+        advice(found),
+    )
+
+
+def _diagrams(found: Sequence[Measured]) -> Iterator[Diagram]:
+    easy = _of(found, _WITH_PATH)
+    where = f'of {easy[0].poses.name}'
+    yield Diagram(
+        'solving_easy',
+        f'Position {where}, easy poses: what accuracy costs',
+        _TIME,
+        _ERRORS,
+        _curves(easy, 'position', lambda one: one.position),
+    )
+    yield Diagram(
+        'solving_acceleration',
+        f'Accelerations {where}, easy poses',
+        Axis('time of a state with rates and accelerations', 'µs'),
+        Axis(_ERROR, 'rad/s², or of the greatest', least=_LEAST),
+        _curves(easy, 'motion', lambda one: one.motion and one.motion[2]),
+    )
+    yield Diagram(
+        'solving_batch',
+        f'Positions {where} in arrays, easy poses',
+        _TIME,
+        _ERRORS,
+        _curves(easy, 'batch', lambda one: one.batch and one.batch[0]),
+    )
+    for key, words in (('toggle', 'next to a toggle'), ('change_point', 'at a change point')):
+        some = _of(found, (key,))
+        yield Diagram(
+            f'solving_{key}',
+            f'Position of {some[0].poses.name} {words}: what accuracy costs',
+            _TIME,
+            _ERRORS,
+            _curves(some, 'position', lambda one: one.position),
+        )
+
+
+def _curves(
+    found: Sequence[Measured], what: str, errors_of: Callable[[Measured], Errors | None]
+) -> list[Curve]:
+    """Return a curve for each method; a method that failed everywhere has no point."""
+    points: dict[str, list[Point]] = {}
+    for one in found:
+        errors, time = errors_of(one), one.times.get(what)
+        if errors is None or errors.worst is None or time is None:
+            continue
+        failed = f'fails at {errors.failed:.0%} of the poses' if errors.failed else ''
+        error = errors.worst
+        if one.method.name != EXTENDED:
+            error = max(error, FLOOR)
+        micros = _micros(time)
+        points.setdefault(one.method.name, []).append(
+            Point(
+                micros.middle,
+                error,
+                micros,
+                setting=', '.join(filter(None, (one.method.setting, failed))),
+            )
+        )
+    return [Curve(name, some, joined=len(some) > 1) for name, some in points.items()]
+
+
+def _tables(found: Sequence[Measured]) -> Iterator[Table]:
+    for poses in _sets(found):
+        if poses.key != 'path':
+            yield _table(_of(found, _WITH_PATH if poses.key == 'easy' else (poses.key,)), poses)
+    batch = [one for one in found if one.batch is not None]
+    if batch:
+        yield _batch_table(batch)
+    knots = [one for one in found if one.method.memory is not None and one.poses.key == 'easy']
+    if knots:
+        yield _knot_table(knots)
+    for key in ('toggle', 'change_point'):
+        yield _distance_table(_of(found, (key,)))
+
+
+def _table(found: Sequence[Measured], poses: Poses) -> Table:
+    return Table(
+        f'solving_{poses.key}',
+        f'{poses.name}, {poses.title}: all methods',
+        (
+            'method',
+            'setting',
+            'position [µs]',
+            f'greatest error [{_UNIT}]',
+            'median error',
+            'failed [%]',
+            'with accelerations [µs]',
+            'rates, greatest error [rad/s, or of the greatest]',
+            'accelerations, greatest error [rad/s², or of the greatest]',
+            'accelerations, failed [%]',
+        ),
+        [
+            (
+                one.method.name,
+                one.method.setting,
+                _time(one, 'position'),
+                one.position.worst,
+                one.position.middle,
+                100.0 * one.position.failed,
+                _time(one, 'motion'),
+                one.motion[1].worst if one.motion else None,
+                one.motion[2].worst if one.motion else None,
+                100.0 * one.motion[2].failed if one.motion else None,
+            )
+            for one in found
+        ],
+    )
+
+
+def _batch_table(found: Sequence[Measured]) -> Table:
+    return Table(
+        'solving_batch',
+        'Arrays of states',
+        (
+            'linkage',
+            'method',
+            'setting',
+            'position [µs]',
+            f'greatest error [{_UNIT}]',
+            'failed [%]',
+            'with accelerations [µs]',
+            'accelerations, greatest error [rad/s², or of the greatest]',
+        ),
+        [
+            (
+                one.poses.name,
+                one.method.name,
+                one.method.setting,
+                _time(one, 'batch'),
+                one.batch[0].worst,
+                100.0 * one.batch[0].failed,
+                _time(one, 'batch_motion'),
+                one.batch[2].worst,
+            )
+            for one in found
+            if one.batch is not None
+        ],
+    )
+
+
+def _knot_table(found: Sequence[Measured]) -> Table:
+    return Table(
+        'solving_knots',
+        f'Tables of {found[0].poses.name}: what they hold and take to build',
+        ('table', 'setting', 'memory [kB]', 'build [ms]', f'greatest error [{_UNIT}]'),
+        [
+            (
+                one.method.name,
+                one.method.setting,
+                (one.method.memory or 0) / 1000.0,
+                1000.0 * (one.method.build or 0.0),
+                one.position.worst,
+            )
+            for one in found
+        ],
+    )
+
+
+def _distance_table(found: Sequence[Measured]) -> Table:
+    """Return the errors by the distance from trouble, a column for each method at its best."""
+    poses = found[0].poses
+    best = list(best_of_each(found))
+    rows = []
+    for distance in sorted(set(poses.distances), reverse=True):
+        at = [k for k, apart in enumerate(poses.distances) if apart == distance]
+        rows.append((distance, *(_worst_at(one.position, at) for one in best)))
+    where = 'the toggle' if poses.key == 'toggle' else 'the change point'
+    return Table(
+        f'solving_{poses.key}_distance',
+        f'{poses.name}: greatest error by distance from {where}; nothing where a method fails',
+        (
+            f'distance [{unit_of(poses)}]',
+            *(
+                f'{one.method.name}{one.method.setting and ", "}{one.method.setting} [{_UNIT}]'
+                for one in best
+            ),
+        ),
+        rows,
+    )
+
+
+def best_of_each(found: Sequence[Measured]) -> Iterator[Measured]:
+    """Yield of each method the setting that fails least and is nearest to the truth."""
+    for name in dict.fromkeys(one.method.name for one in found):
+        yield min(
+            (one for one in found if one.method.name == name),
+            key=lambda one: (one.position.failed, one.position.worst or 0.0),
+        )
+
+
+def _worst_at(errors: Errors, states: Sequence[int]) -> float | None:
+    some = [errors.each[k] for k in states]
+    return max((error for error in some if error is not None), default=None)
+
+
+def _of(found: Sequence[Measured], keys: Sequence[str]) -> list[Measured]:
+    return [one for one in found if one.poses.key in keys]
+
+
+def _sets(found: Sequence[Measured]) -> list[Poses]:
+    return list({one.poses.key: one.poses for one in found}.values())
+
+
+def _time(one: Measured, what: str) -> Spread | None:
+    return _micros(one.times[what]) if what in one.times else None
+
+
+def _micros(time: Spread) -> Spread:
+    return Spread(*(1e6 * value for value in time))
+
+
+WANTED = (1e-3, 1e-6, 1e-9, 1e-12)
+"""Accuracies, in [rad]."""
+
+_TROUBLE = ('toggle', 'change_point')
+
+_IN_A_SCENE = (*NODE_DEFAULTS, FROM_KNOTS, TABLES['hermite'])
+"""The methods that ``solver`` of a scene can choose."""
+
+
+def text(found: Sequence[Measured], quick: bool) -> list[str]:
+    """Return paragraphs on the method of measurement and on the results."""
+    sets = {one.poses.key: one.poses for one in found}
+    easy = sets['easy']
+    how = (
+        f'{len(easy.inputs)} easy poses of {easy.name} were solved by each method, one call a '
+        f'state in a loop, and {BATCH:,} in arrays. {_guests(sets)} A time is processor time of '
+        'a state: the median over blocks with its quartiles, of all methods in turn, there and '
+        'back, in one run. What starts from its last state has for it the neighbouring pose.'
+    )
+    errors = (
+        'Errors were worked out apart from the times, at the same states: those of the worst '
+        f'published joint, against fifty digits{_confirmed()}. A slide counts as a part of the '
+        'greatest length of a link. Rates and accelerations are those at '
+        f'{RATE:g} rad/s and {ACCELERATION:g} rad/s² of the input; their errors are relative '
+        f'where they exceed 1. Rates that are integrated have one error, that after {_way(sets)}. '
+        'An answer that is more than 0.1 rad off, or none, counts as failed and is in no error; '
+        'next to a change point also one that is off by a tenth of the distance from it, since '
+        'there the other assembly is as near.'
+    )
+    said = [how, errors]
+    if quick:
+        said.append('This is the quick run: fewer settings, poses and rounds.')
+    said.append(_outcome(found, easy))
+    said += [_near_trouble(found, sets[key]) for key in _TROUBLE]
+    said.append(
+        "Where Newton's method does not converge, next to toggles and change points, it takes the "
+        'state of the closed form.'
+    )
+    said += filter(None, [_textbook(found), _iterated(found)])
+    return said
+
+
+def advice(found: Sequence[Measured]) -> list[str]:
+    """Return a sentence for each accuracy: the cheapest method that a scene can choose."""
+    easy = [one for one in found if one.poses.key == 'easy' and one.times.get('position')]
+    offered = [one for one in easy if one.method.name in _IN_A_SCENE]
+    winners = [_cheapest(offered, wanted) for wanted in WANTED]
+    node = next(one for one in offered if one.method.name in NODE_DEFAULTS)
+    if all(one is node for one in winners):
+        wins = (
+            f'The {node.method.name} wins at every accuracy: {_median_us(node):.2g} µs a state, '
+            f'{node.position.worst or 0.0:.1g} rad off at worst. Nothing else that a scene can '
+            'have is cheaper beyond the spread of the times, however little accuracy is wanted.'
+        )
+        return [wins]
+    said = []
+    for wanted, one in zip(WANTED, winners, strict=True):
+        if one is None:
+            said.append(f'For {wanted:g} rad: nothing that a scene can have.')
+            continue
+        words = (
+            f'For {wanted:g} rad at easy poses: {_named(one)}, {_median_us(one):.2g} µs a state, '
+            f'{_compared(one, node)}'
+        )
+        refuge = _fails_in(found, one, wanted)
+        if refuge:
+            words += f'; but {refuge}'
+        said.append(f'{words}.')
+    said.append(
+        f'The {node.method.name}, what a scene has that says nothing, takes '
+        f'{_median_us(node):.2g} µs a state, in which it also tells toggles and open loops from '
+        'the rest, with the gap.'
+    )
+    return said
+
+
+def _cheapest(found: Sequence[Measured], wanted: float) -> Measured | None:
+    """
+    Return the fastest method of those that never fail and reach the accuracy.
+
+    Of those that are within each other's spreads what the node does wins, else what holds least.
+    """
+    able = [one for one in found if _keeps(one, wanted)]
+    if not able:
+        return None
+    best = min(able, key=lambda one: one.times['position'].middle)
+    near = [one for one in able if one.times['position'].low <= best.times['position'].high]
+    return min(
+        near,
+        key=lambda one: (
+            one.method.name not in NODE_DEFAULTS,
+            one.method.memory or 0,
+            one.times['position'].middle,
+        ),
+    )
+
+
+def _compared(one: Measured, node: Measured) -> str:
+    if one is node:
+        return 'and nothing is cheaper beyond the spread of the times'
+    ratio = node.times['position'].middle / one.times['position'].middle
+    return f'{ratio:.3g} times as fast as the {node.method.name}'
+
+
+def _fails_in(found: Sequence[Measured], one: Measured, wanted: float) -> str:
+    """Return where a method does not keep the accuracy, with its setting if that was measured."""
+    bad = []
+    for key in _TROUBLE:
+        there = [other for other in found if other.poses.key == key]
+        same = [other for other in there if other.method.name == one.method.name]
+        same = [o for o in same if o.method.setting == one.method.setting] or same
+        if same and not any(_keeps(other, wanted) for other in same):
+            poses = same[0].poses
+            bad.append(poses.title if poses.own else f'{poses.title} of other linkages')
+    return f'not {" or ".join(bad)}' if bad else ''
+
+
+def _keeps(one: Measured, wanted: float) -> bool:
+    worst = one.position.worst
+    return not one.position.failed and worst is not None and worst <= wanted
+
+
+def _outcome(found: Sequence[Measured], easy: Poses) -> str:
+    some = [one for one in found if one.poses.key == easy.key and one.times.get('position')]
+    node = next(one for one in some if one.method.name in NODE_DEFAULTS)
+    base = node.times['position'].middle
+    exact = [
+        one
+        for one in some
+        if one is not node
+        and one.method.name != EXTENDED
+        and not one.position.failed
+        and (one.position.worst or 0.0) <= 1e-12
+    ]
+    words = (
+        f'At easy poses the {node.method.name} takes {_median_us(node):.2g} µs a state and is '
+        f'{node.position.worst or 0.0:.1g} rad off at worst.'
+    )
+    if exact:
+        nearest = min(exact, key=lambda one: one.times['position'].middle)
+        words += (
+            f' Of the others that reach 1e-12 rad {_named(nearest)} is the cheapest, '
+            f'{_times(nearest.times["position"].middle / base)}.'
+        )
+    more = [one for one in some if one.method.name == EXTENDED]
+    if more:
+        words += (
+            f' Extended precision, {more[0].method.setting}, takes '
+            f'{more[0].times["position"].middle / base:,.0f} times as long.'
+        )
+    return words
+
+
+def _near_trouble(found: Sequence[Measured], poses: Poses) -> str:
+    some = [one for one in found if one.poses.key == poses.key]
+    node = next(one for one in some if one.method.name in NODE_DEFAULTS)
+    failing = dict.fromkeys(one.method.name for one in some if one.position.failed)
+    where = poses.title[0].upper() + poses.title[1:]
+    words = (
+        f'{where} ({poses.name}, {max(poses.distances):.2g} to {min(poses.distances):.2g} '
+        f'{unit_of(poses)} from '
+        f'it) the {node.method.name} is {node.position.worst or 0.0:.1g} rad off at worst'
+    )
+    if node.motion and node.motion[1].worst is not None:
+        words += f', its rates {node.motion[1].worst:.1g} of themselves'
+    words += '. '
+    return words + (
+        f'At some of these poses fail: {", ".join(failing)}.'
+        if failing
+        else 'No method fails there.'
+    )
+
+
+def _textbook(found: Sequence[Measured]) -> str:
+    some = [one for one in found if one.method.name == TEXTBOOK]
+    if not some:
+        return ''
+    parts = ', '.join(f'{one.poses.title}: {one.position.failed:.0%}' for one in some)
+    return (
+        'The textbook form has one root for one assembly throughout, and divides by zero where '
+        f"the crank's pin stands over the rocker's pivot; of the poses it fails at {parts}."
+    )
+
+
+def _iterated(found: Sequence[Measured]) -> str:
+    some = [one for one in found if one.method.name == ITERATED]
+    if not some:
+        return ''
+    return (
+        f'No dyad covers {some[0].poses.name}: what the node does there is to iterate, from the '
+        'curve of its branch.'
+    )
+
+
+def _confirmed() -> str:
+    if find_spec('flint') is None:
+        return ''
+    return ', which were confirmed at some states of each set by interval arithmetic'
+
+
+def _way(sets: dict[str, Poses]) -> str:
+    return sets['path'].title if 'path' in sets else 'a turn'
+
+
+def _guests(sets: dict[str, Poses]) -> str:
+    told = [
+        f'{poses.title}: {poses.name}' for key, poses in sets.items()
+        if not poses.own and key != 'path'
+    ]  # fmt: skip
+    return (
+        f'Other linkages stand in for what it does not have ({"; ".join(told)}).' if told else ''
+    )
+
+
+def _named(one: Measured) -> str:
+    return f'{one.method.name}{one.method.setting and ", "}{one.method.setting}'
+
+
+def _times(ratio: float) -> str:
+    return f'{ratio:.2g} times the time'
+
+
+def _median_us(one: Measured) -> float:
+    return 1e6 * one.times['position'].middle

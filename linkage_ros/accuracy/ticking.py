@@ -1,0 +1,419 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What the rate of ticks buys: the error of the state that a subscriber has when it uses it.
+
+A node and a subscriber run in processes of their own and talk over DDS, in a domain of their own;
+no message leaves the machine. The crank moves so that a stale state shows: by a chirp, and by a
+constant acceleration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from importlib.util import find_spec
+import json
+from math import sqrt
+import os
+from pathlib import Path
+import tempfile
+from time import monotonic
+from typing import NamedTuple
+
+from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
+from linkage_ros.drives.chirp import Chirp, curve
+from linkage_ros.errors import LinkageError
+from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.survey import usual_inputs, Way
+from linkage_ros.measuring import Progress, Spread, spread_of
+from linkage_ros.processes import Graph, MeasurementError
+from linkage_ros.scene.linkage_text import linkage_text
+from linkage_ros.scene.scene import Scene
+
+CHIRP, ACCELERATION = 'chirp', 'constant acceleration'
+
+_FREQUENCIES = (0.2, 5.0)  # [Hz]
+_SWING = 1.0  # [rad]
+_GROWTH = 10.0  # [rad/s²]
+_PART = 0.8
+"""Of its range that an input moves through where it cannot turn round."""
+
+CrankAt = Callable[[int], tuple[float, float]]
+"""Value and rate of the input, in [rad] or [m] and a second, at a time since the start in [ns]."""
+
+
+class Motions(NamedTuple):
+    """
+    The motions of a linkage's input.
+
+    Attributes
+    ----------
+    by_name
+        `CHIRP` and `ACCELERATION`.
+    greatest
+        For each the greatest rate and acceleration of the input, in [rad/s] and [rad/s²], or of m.
+
+    """
+
+    by_name: Mapping[str, CrankAt]
+    greatest: Mapping[str, tuple[float, float]]
+
+
+def motions_of(closure: Closure, seconds: float) -> Motions:
+    """
+    Return motions within the range where the loops close.
+
+    Parameters
+    ----------
+    closure
+        A linkage with one input.
+    seconds
+        How long they take.
+
+    """
+    (start,) = usual_inputs(closure)
+    widest = Way(closure).widest_range
+    length = round(seconds * NANOSECONDS)
+    middle, swing, begin, growth = start, _SWING, start, _GROWTH
+    if widest is not None and not widest.whole:
+        width = widest.highest - widest.lowest
+        middle, swing = widest.lowest + 0.5 * width, min(swing, 0.5 * _PART * width)
+        begin = widest.lowest + 0.5 * (1.0 - _PART) * width
+        growth = min(growth, 2.0 * _PART * width / seconds**2)
+    sweep = curve(Chirp(swing, *_FREQUENCIES, seconds, middle, 'linear', repeat=False))
+
+    def chirp(time: int) -> tuple[float, float]:
+        value, rate, _ = sweep(min(max(time, 0), length - 1))
+        return value, rate
+
+    def accelerated(time: int) -> tuple[float, float]:
+        t = min(max(time, 0), length) * 1e-9
+        return begin + 0.5 * growth * t * t, growth * t
+
+    steps = [sweep(length * k // 4000) for k in range(4000)]
+    return Motions(
+        {CHIRP: chirp, ACCELERATION: accelerated},
+        {
+            CHIRP: (max(abs(s[1]) for s in steps), max(abs(s[2]) for s in steps)),
+            ACCELERATION: (growth * seconds, growth),
+        },
+    )
+
+
+HELD, CARRIED = 'held', 'carried forward'
+"""How a state is used: as it is, or carried by its rates from its stamp to now."""
+
+CRANK_RATE = 1000.0
+USE_RATE = 500.0
+"""Samples of the crank and uses of a state, a second."""
+
+_LINKAGE_FILE, _SCENE_FILE = 'linkage.yaml', 'ticking.yaml'
+_PATIENCE = 30.0  # [s]
+_DOMAINS = 101
+"""Domain ids up to this one are safe with the ports of every operating system."""
+
+
+class Used(NamedTuple):
+    """
+    The states that a subscriber used, at one rate of ticks and in one motion of the crank.
+
+    Attributes
+    ----------
+    rate
+        Ticks a second, in [Hz].
+    motion
+        Of the crank.
+    age
+        Of the states when used, in [s].
+    errors
+        By `HELD` and `CARRIED`: of each use the greatest error of a joint.
+    unused
+        Uses at which no state had come yet.
+    cpu
+        Of the node, the share of a core.
+
+    """
+
+    rate: float
+    motion: str
+    age: Sequence[float]
+    errors: dict[str, Sequence[float]]
+    unused: int
+    cpu: float
+
+
+def use_states(folder: Path, linkage: Linkage, rate: float, seconds: float) -> list[Used]:
+    """
+    Run a node and let its states be used.
+
+    Parameters
+    ----------
+    folder
+        An empty one, for its files.
+    linkage
+        What the node solves.
+    rate
+        Ticks a second, in [Hz].
+    seconds
+        How long each motion takes.
+
+    Raises
+    ------
+    LinkageError
+        Where node or user do not do their part.
+
+    """
+    inputs = {given.joint for given in linkage.inputs}
+    joints = {name: joint for name, joint in linkage.joints.items() if name not in inputs}
+    published = 'true' if len(joints) < len(linkage.joints) else 'false'
+    text = linkage_text(replace(linkage, joints=joints))
+    (folder / _LINKAGE_FILE).write_text(text, 'utf-8')
+    scene = folder / _SCENE_FILE
+    scene.write_text(
+        f'linkage: {_LINKAGE_FILE}\nrate: {rate:g}\ndrive: {{topic: {{}}}}\n'
+        f'publish_input: {published}\neffects: {{velocity: {{}}}}\n',
+        'utf-8',
+    )
+    task = {
+        'scene': str(scene),
+        'seconds': seconds,
+        'crank_rate': CRANK_RATE,
+        'use_rate': USE_RATE,
+    }
+    graph = Graph(1 + os.getpid() % _DOMAINS, folder)
+    arguments = ('--ros-args', '-p', f'scene:={scene}')
+    found = []
+    with (
+        _in_one_line(),
+        graph.run('linkage_ros.ros.linkage_node', arguments) as server,
+        graph.run('linkage_ros.ros.consumer', [json.dumps(task)]) as consumer,
+    ):
+        for _ in range(2):
+            consumer.read(_PATIENCE)
+            begun, spent = monotonic(), _processor_time(server.pid)
+            said = consumer.read(_PATIENCE)
+            spent = _processor_time(server.pid) - spent
+            found.append(
+                Used(
+                    rate,
+                    said['motion'],
+                    [age * 1e-9 for age in said['ages']],
+                    {HELD: said['held'], CARRIED: said['carried']},
+                    said['unused'],
+                    spent / (monotonic() - begun),
+                )
+            )
+    if not all(used.age for used in found):
+        raise LinkageError(str(scene), 'no joint state came', 'see that DDS works on this machine')
+    return found
+
+
+@contextmanager
+def _in_one_line() -> Iterator[None]:
+    """Let a process that does not do its part be an error that a user can read."""
+    try:
+        yield
+    except MeasurementError as error:
+        reason = f'node and subscriber did not meet: {error}'
+        raise LinkageError('ticking', reason, 'run it by hand') from None
+
+
+def _processor_time(pid: int) -> float:
+    """Return the processor time that a process has used, in [s]."""
+    fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
+
+RATES = (20, 50, 100, 200, 500, 1000, 2000)
+"""Ticks a second, in [Hz]."""
+
+QUICK_RATES = (100, 1000)
+
+_WANTED = (1e-1, 1e-2, 1e-3, 1e-4)
+_UNIT = {True: 'rad', False: 'm'}
+
+
+def measure_ticking(scene: Scene, quick: bool, progress: Progress) -> Part | None:
+    """
+    Measure the states that a subscriber gets; None without rclpy or with several inputs.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    quick
+        Whether a few seconds are to do.
+    progress
+        Called now and then with the share that is done, 0 to 1.
+
+    Raises
+    ------
+    LinkageError
+        Where the node or the subscriber does not do its part.
+
+    """
+    linkage = scene.members[0].linkage
+    if find_spec('rclpy') is None or len(linkage.inputs) > 1:
+        return None
+    rates = QUICK_RATES if quick else RATES
+    seconds = 0.6 if quick else 2.0
+    closure = Closure(linkage)
+    found: list[Used] = []
+    with tempfile.TemporaryDirectory(prefix='linkage_ticking_') as folder:
+        for number, rate in enumerate(rates):
+            progress(number / len(rates))
+            found += use_states(Path(folder), linkage, rate, seconds)
+    progress(1.0)
+    unit = _UNIT[any(closure.turning)]
+    return Part(
+        'ticking',
+        'What the rate of ticks buys',
+        _text(closure, seconds, found, unit),
+        [
+            _diagram('ticking_rate', 'The faster the ticks, the nearer the state in use', found,
+                     unit, Axis('ticks a second', 'Hz'), lambda used: used.rate),
+            _diagram('ticking_cpu', 'What that costs the processor', found, unit,
+                     Axis('processor time of the node', '% of a core'),
+                     lambda used: 100.0 * used.cpu),
+        ],
+        [_table(found, unit)],
+        list(_advice(found, unit)),
+    )  # fmt: skip
+
+
+def rms(values: Sequence[float]) -> float:
+    """Return the root of the mean square."""
+    return sqrt(sum(value * value for value in values) / len(values))
+
+
+def _diagram(
+    key: str,
+    title: str,
+    found: Sequence[Used],
+    unit: str,
+    axis: Axis,
+    place: Callable[[Used], float],
+) -> Diagram:
+    curves = []
+    for motion in dict.fromkeys(used.motion for used in found):
+        for way in (HELD, CARRIED):
+            chosen = [
+                (used, spread_of(used.errors[way])) for used in found if used.motion == motion
+            ]
+            points = [
+                Point(place(used), spread.middle, y_spread=spread, setting=f'{used.rate:g} Hz')
+                for used, spread in chosen
+            ]
+            curves.append(Curve(f'{motion}, {way}', points))
+    return Diagram(key, title, axis, Axis('error of a joint when used', unit), curves)
+
+
+def _table(found: Sequence[Used], unit: str) -> Table:
+    return Table(
+        'ticking',
+        'The state that a subscriber has, when it uses it',
+        (
+            'ticks a second [Hz]',
+            'motion of the crank',
+            'age of the state [ms]',
+            f'held, error [{unit}]',
+            f'held, rms [{unit}]',
+            f'carried forward, error [{unit}]',
+            f'carried forward, rms [{unit}]',
+            'processor [% of a core]',
+            'uses',
+            'before the first state',
+        ),
+        [
+            (
+                used.rate,
+                used.motion,
+                Spread(*(1e3 * age for age in spread_of(used.age))),
+                spread_of(used.errors[HELD]),
+                rms(used.errors[HELD]),
+                spread_of(used.errors[CARRIED]),
+                rms(used.errors[CARRIED]),
+                100.0 * used.cpu,
+                len(used.age),
+                used.unused,
+            )
+            for used in found
+        ],
+    )
+
+
+def _text(closure: Closure, seconds: float, found: Sequence[Used], unit: str) -> list[str]:
+    greatest = motions_of(closure, seconds).greatest
+    of = {True: 'rad', False: 'm'}[not closure.linkage.inputs[0].slider]
+    moves = '; '.join(
+        f'{name}: up to {rate:.3g} {of}/s and {acceleration:.3g} {of}/s²'
+        for name, (rate, acceleration) in greatest.items()
+    )
+    how = (
+        'The node ran the linkage with its rates, in a process of its own; another process turned '
+        f'its crank ({CRANK_RATE:g} samples a second over DDS; {moves}), and at random instants, '
+        f'{USE_RATE:g} a second, used the newest joint state that had come: held as it was, or '
+        'carried forward by its rates from its stamp to the instant of use. The error is that of '
+        'the worst joint against the linkage solved at the exact crank of that instant. So it has '
+        'all in it: the crank sample on its way, the wait for the tick, the tick, the way back.'
+    )
+    slow, fast = found[0].rate, found[-1].rate
+    said = []
+    for motion in greatest:
+        ends = {
+            used.rate: used
+            for used in found
+            if used.motion == motion and used.rate in (slow, fast)
+        }
+        if len(ends) == 2:
+            said.append(_gain(motion, ends[slow], ends[fast], unit))
+    return [how, *said]
+
+
+def _gain(motion: str, slow: Used, fast: Used, unit: str) -> str:
+    """Return the gain of the fastest ticks over the slowest."""
+    parts = [
+        f'{way} from {rms(slow.errors[way]):.2g} to {rms(fast.errors[way]):.2g} {unit}'
+        for way in (HELD, CARRIED)
+    ]
+    return (
+        f'{motion[0].upper()}{motion[1:]}: from {slow.rate:g} to {fast.rate:g} ticks a second the '
+        f'rms error falls, {" and ".join(parts)}; the node takes {100.0 * slow.cpu:.0f} % of a '
+        f'core, then {100.0 * fast.cpu:.0f} %.'
+    )
+
+
+def _advice(found: Sequence[Used], unit: str) -> Iterator[str]:
+    """Yield the slowest ticks that reach each of some accuracies, in both motions."""
+    for wanted in _WANTED:
+        held, carried = (_slowest(found, way, wanted) for way in (HELD, CARRIED))
+        words = f'For {wanted:g} {unit} (rms) when used: '
+        if carried is None and held is None:
+            yield f'{words}none of these rates will do.'
+        elif held is None or (carried is not None and carried < held):
+            more = f', {held:g} where they are {HELD}' if held else ''
+            yield f'{words}{carried:g} ticks a second where states are {CARRIED}{more}.'
+        else:
+            yield f'{words}{held:g} ticks a second.'
+
+
+def _slowest(found: Sequence[Used], way: str, wanted: float) -> float | None:
+    poor = {used.rate for used in found if rms(used.errors[way]) > wanted}
+    return min((used.rate for used in found if used.rate not in poor), default=None)

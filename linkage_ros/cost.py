@@ -1,0 +1,469 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What each effect of a scene costs: the scene's own pipeline, with and without it.
+
+A stage is not timed by itself, since its cost includes what it changes in the message and what it
+brings in. Variants of the scene tick in turn, a block of ticks each, over the same simulated times
+and crank messages: a disturbance of the machine affects them alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import cos, sin, tau
+from random import Random
+from statistics import median
+from time import perf_counter_ns
+from typing import NamedTuple
+
+from linkage_ros.effects.stage import bringing, brings, EFFECTS, in_order, LOADED, module_of
+from linkage_ros.errors import FileError
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.survey import usual_inputs, Way
+from linkage_ros.measuring import spread_of
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.scene import Member, Scene
+
+_BEGIN = 1_000_000_000
+_USUAL_RATE = 1000.0
+_CRANK_RATE = 1.0
+"""Turns, or swings, of the crank a second."""
+
+
+def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
+    """Yield times, in [ns], each with a crank message, or b'' where nobody listens."""
+    period = 1e9 / (scene.rate or _USUAL_RATE)
+    names = [name for member in scene.members for name in member.inputs]
+    write = JointStateWriter(names).write
+    paths = [path for closure in pipeline.closures for path in _paths(closure)]
+    count = 0
+    while True:
+        now = _BEGIN + round(count * period)
+        message = b''
+        if pipeline.topic:
+            seconds = (now - _BEGIN) * 1e-9
+            angles, rates = zip(*[path(seconds) for path in paths], strict=True)
+            message = write(now, angles, rates, (0.0,) * len(names))
+        yield now, message
+        count += 1
+
+
+Path = Callable[[float], tuple[float, float]]
+
+
+def _paths(closure: Closure) -> list[Path]:
+    """Return for each input where it is, and its rate, at a time in [s]: round, or to and fro."""
+    centers = usual_inputs(closure)
+    speed = tau * _CRANK_RATE
+    if len(centers) > 1:
+        sizes = [0.01 * closure.scale if i.slider else 0.01 for i in closure.linkage.inputs]
+        return [_swing(c, size, speed) for c, size in zip(centers, sizes, strict=True)]
+    widest = Way(closure).widest_range
+    if widest is None or widest.whole:
+        return [lambda seconds: (speed * seconds, speed)]
+    middle, width = 0.5 * (widest.lowest + widest.highest), widest.highest - widest.lowest
+    return [_swing(middle, 0.4 * width, speed)]
+
+
+def _swing(center: float, amplitude: float, speed: float) -> Path:
+    return lambda seconds: (
+        center + amplitude * sin(speed * seconds),
+        amplitude * speed * cos(speed * seconds),
+    )
+
+
+_FAULT = 'fault '
+"""With the name of a fault, what stands in the place of an effect for it: it is not injected."""
+
+Names = frozenset[str]
+
+
+def faults_of(scene: Scene) -> Names:
+    """Return the faults of a scene, as they stand among the names of effects."""
+    return Names(f'{_FAULT}{name}' for name in scene.faults)
+
+
+class Variant:
+    """A variant of the scene at work, and how long its ticks took, in [ns]."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        self.pipeline = pipeline
+        self.ticks: list[int] = []
+        self.offers: list[int] = []
+        self.published = 0
+
+    def run(self, nows: Sequence[int], messages: Sequence[bytes]) -> None:
+        """Tick at these times, in [ns], each after its message, as the node does."""
+        offer, tick, clock = self.pipeline.offer, self.pipeline.tick, perf_counter_ns
+        injection = self.pipeline.injection
+        for now, message in zip(nows, messages, strict=True):
+            begin = clock()
+            if injection is not None:
+                injection.advance(now)
+                now = injection.clock(now)  # noqa: PLW2901 (the time by which the tick goes)
+            if message:
+                offer(message, now)
+                self.offers.append(clock() - begin)
+            done = tick(now)
+            self.ticks.append(clock() - begin)
+            self.published += bool(done.message)
+
+    def forget(self) -> None:
+        """Begin to count."""
+        self.ticks.clear()
+        self.offers.clear()
+        self.published = 0
+
+
+class Variants:
+    """Variants of a scene, by the effects that they have."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.built: dict[Names, Variant] = {}
+        self._closures: dict[bool, list[Closure]] = {}
+
+    def build(self, named: Names) -> Variant:
+        """Return the scene with these of its effects, and without its recording; one of each."""
+        if named not in self.built:
+            self.built[named] = Variant(self.pipeline(named))
+        return self.built[named]
+
+    def pipeline(self, named: Names) -> Pipeline:
+        """Return the scene with these of its effects at its start; another one each time."""
+        scene = replace(
+            self.scene,
+            members=tuple(_with(member, named) for member in self.scene.members),
+            faults={
+                # Nobody injects it, nor does a timeline.
+                name: replace(fault, at=(), seconds=0.0)
+                for name, fault in self.scene.faults.items()
+                if f'{_FAULT}{name}' in named
+            },
+            record=None,
+        )
+        # To solve a linkage for the first time may take a second where it is iterated.
+        altered = 'tolerance' in named
+        pipeline = Pipeline(scene, self._closures.get(altered))
+        self._closures.setdefault(altered, pipeline.closures)
+        return pipeline
+
+    def attempt(self, named: Names) -> Variant | None:
+        """Return the scene with these effects; None if they do not go together."""
+        try:
+            return self.build(named)
+        except FileError:
+            return None
+
+
+def _with(member: Member, named: Names) -> Member:
+    """Return a linkage with these effects, of those that it has or that they bring in."""
+    own = member.effects
+    brought = {need for effect in own for need in brings(effect)}
+    effects = {
+        name: own[name] if name in own else module_of(name).PARAMETERS()
+        for name in in_order({*own, *brought})
+        if name in named
+    }
+    forced = member.drive[0] == 'torque' or not named.isdisjoint(LOADED)
+    return replace(member, effects=effects, loads=member.loads if forced else None)
+
+
+_BLOCK = 100
+"""Ticks of a variant in one go: long enough for the caches, short beside a drift."""
+
+_WARM_UP = 200
+_THOUSAND = 1000
+
+
+class Times(NamedTuple):
+    """
+    How long ticks take.
+
+    Attributes
+    ----------
+    median
+        Of all ticks, in [µs].
+    p99
+        The 99th percentile of a thousand ticks on end: of those of all thousands the median, so
+        that it is not what else the machine did for a moment, in [µs].
+    low, high
+        Quartiles of the medians of a hundred ticks on end, in [µs].
+
+    """
+
+    median: float
+    p99: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class EffectCost:
+    """
+    The cost of an effect.
+
+    Attributes
+    ----------
+    name
+        Of the effect; of a fault, which nobody injects, one of `faults_of`.
+    adds
+        What it, and what it starts from, add to the scene without effects; nothing where it
+        cannot be measured alone.
+    beside
+        The effect beside which that was measured, since alone it acts on nothing; '' for none.
+    saves
+        By how much the median of the whole scene's tick is shorter without it, in [µs]; nothing
+        where it cannot be left out.
+    left_out_with
+        The effect that would act on nothing then and is left out too; '' for none.
+    needed_by
+        The effects that bring it in anyway.
+
+    """
+
+    name: str
+    adds: Times | None
+    beside: str
+    saves: float | None
+    left_out_with: str
+    needed_by: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SceneCost:
+    """
+    The cost of a scene.
+
+    Attributes
+    ----------
+    offer
+        A crank message, read and taken; None if the drives listen to no topic.
+    bare
+        A tick of the scene without effects, its crank message with it.
+    whole
+        A tick of the scene, its crank message with it.
+    effects
+        What is between the two, in physical order.
+    published
+        The part of all ticks that published something.
+
+    """
+
+    offer: Times | None
+    bare: Times
+    whole: Times
+    effects: tuple[EffectCost, ...]
+    published: float
+
+
+def measure(
+    scene: Scene,
+    ticks: int,
+    *,
+    leave_out: bool = True,
+    stopped: Callable[[], bool] = lambda: False,
+) -> SceneCost | None:
+    """
+    Measure a scene on this machine.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    ticks
+        How often each variant ticks.
+    leave_out
+        Whether to measure also what leaving an effect out saves.
+    stopped
+        Asked now and then whether to give up; then nothing is returned.
+
+    Raises
+    ------
+    FileError
+        Where something in the scene does not go together.
+
+    """
+    named = Names(name for member in scene.members for name in member.effects)
+    faults = faults_of(scene)
+    named |= faults
+    variants = Variants(scene)
+    bare, whole = variants.build(Names()), variants.build(named)
+    effects_of = in_order({*EFFECTS, *named} - faults)
+    computed = [n for n in effects_of if n in named or bringing(n, named)]
+    computed += sorted(faults)
+    added = {name: _added(name, named, variants) for name in computed}
+    without = {
+        name: _left_out(name, named, variants)
+        for name in computed
+        if leave_out and not bringing(name, named)
+    }
+    built = list(variants.built.values())
+    if not _run([(feed(scene, built[0].pipeline), built)], ticks, stopped):
+        return None
+
+    effects = []
+    for name in computed:
+        base, one, beside = added[name]
+        less, left_out_with = without.get(name, (None, ''))
+        effects.append(
+            EffectCost(
+                name,
+                _difference(one.ticks, base.ticks) if base and one else None,
+                beside,
+                _times(whole.ticks).median - _times(less.ticks).median if less else None,
+                left_out_with,
+                bringing(name, named),
+            )
+        )
+    offers = bare.offers
+    return SceneCost(
+        offer=_times(offers) if offers else None,
+        bare=_times(bare.ticks),
+        whole=_times(whole.ticks),
+        effects=tuple(effects),
+        published=whole.published / len(whole.ticks),
+    )
+
+
+def _added(
+    name: str, named: Names, variants: Variants
+) -> tuple[Variant | None, Variant | None, str]:
+    """Return the scene without and with an effect alone, or beside another; and which."""
+    for beside in ('', *(loaded for loaded in LOADED if loaded in named and loaded != name)):
+        base = Names({beside} - {''})
+        one = variants.attempt(base | {name})
+        if one is not None:
+            return variants.build(base), one, beside
+    return None, None, ''
+
+
+def _left_out(name: str, named: Names, variants: Variants) -> tuple[Variant | None, str]:
+    """Return the scene without an effect, and what has to go with it."""
+    for other in ('', 'friction'):
+        less = variants.attempt(named - {name, other})
+        if less is not None:
+            return less, other
+    return None, ''
+
+
+def compare(
+    bare: Scene,
+    others: Mapping[str, Scene],
+    ticks: int,
+    *,
+    stopped: Callable[[], bool] = lambda: False,
+) -> dict[str, Times] | None:
+    """
+    Measure by how much the ticks of scenes differ from those of a bare one.
+
+    Parameters
+    ----------
+    bare
+        The scene to compare with.
+    others
+        Scenes that differ from it in one thing each, by a name for each; of the same rate.
+    ticks, stopped
+        As for `measure`.
+
+    Returns
+    -------
+    differences
+        By the names of the others; None where it was stopped.
+
+    """
+    variants = {name: Variant(Pipeline(scene)) for name, scene in others.items()}
+    first = Variant(Pipeline(bare))
+    each = [(feed(bare, first.pipeline), [first])]
+    each += [(feed(others[name], one.pipeline), [one]) for name, one in variants.items()]
+    if not _run(each, ticks, stopped):
+        return None
+    return {name: _difference(one.ticks, first.ticks) for name, one in variants.items()}
+
+
+def _run(
+    fed: Sequence[tuple[Iterator[tuple[int, bytes]], Sequence[Variant]]],
+    ticks: int,
+    stopped: Callable[[], bool],
+) -> bool:
+    """
+    Let variants tick in turn; return whether nobody stopped it.
+
+    Parameters
+    ----------
+    fed
+        Times with crank messages, and the variants that tick by them.
+    ticks, stopped
+        As for `measure`.
+
+    """
+    contenders = [(number, one) for number, (_, ones) in enumerate(fed) for one in ones]
+    shuffle = Random(0).shuffle
+    for number, size in enumerate((_WARM_UP, *_blocks(ticks))):
+        if stopped():
+            return False
+        blocks = [tuple(zip(*[next(times) for _ in range(size)], strict=True)) for times, _ in fed]
+        # Who runs first, or behind a slow one, finds the caches cold: nobody always does.
+        shuffle(contenders)
+        for by, contender in contenders:
+            contender.run(*blocks[by])
+            if number == 0:
+                contender.forget()
+    return True
+
+
+def _blocks(ticks: int) -> Iterator[int]:
+    for begin in range(0, ticks, _BLOCK):
+        yield min(_BLOCK, ticks - begin)
+
+
+def _times(nanoseconds: Sequence[int]) -> Times:
+    return Times(*_middle(nanoseconds), *_quartiles(_medians(nanoseconds)))
+
+
+def _middle(nanoseconds: Sequence[int]) -> tuple[float, float]:
+    """Return the median and the p99, in [µs]."""
+    count = len(nanoseconds)
+    parts = max(1, count // _THOUSAND)
+    ends = [count * i // parts for i in range(parts + 1)]
+    p99s = [_p99(nanoseconds[begin:end]) for begin, end in pairwise(ends)]
+    return median(nanoseconds) * 1e-3, median(p99s) * 1e-3
+
+
+def _medians(nanoseconds: Sequence[int]) -> list[float]:
+    """Return the median of each block of ticks, in [µs]."""
+    ends = [*range(0, len(nanoseconds), _BLOCK), len(nanoseconds)]
+    return [median(nanoseconds[begin:end]) * 1e-3 for begin, end in pairwise(ends)]
+
+
+def _quartiles(values: Sequence[float]) -> tuple[float, float]:
+    low, _, high = spread_of(values)
+    return low, high
+
+
+def _p99(nanoseconds: Sequence[int]) -> int:
+    return sorted(nanoseconds)[int(0.99 * (len(nanoseconds) - 1))]
+
+
+def _difference(one: Sequence[int], other: Sequence[int]) -> Times:
+    """Return what one takes beyond another; both have ticked in turn, block by block."""
+    middle = [a - b for a, b in zip(_middle(one), _middle(other), strict=True)]
+    blocks = [a - b for a, b in zip(_medians(one), _medians(other), strict=True)]
+    return Times(middle[0], middle[1], *_quartiles(blocks))

@@ -1,0 +1,189 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A page that needs no other file: style, script, data and plotting library within one file.
+
+Its policy forbids the browser every request, whatever the page holds. Tables and facts are set
+here for all pages.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+from importlib.resources import files
+from importlib.util import find_spec
+import json
+from typing import Any
+
+from linkage_ros.errors import clean, LinkageError
+
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
+    "base-uri 'none'; form-action 'none'"
+)
+
+_HERE = 'linkage_ros.pages'
+
+Parts = Sequence[tuple[str, str]]
+"""Files of a page's own: each with its package and its name."""
+
+
+def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts: Parts) -> str:
+    """
+    Return a page.
+
+    Parameters
+    ----------
+    title
+        Of the window.
+    body
+        Lines of HTML.
+    data
+        For the script, as JSON has it; numbers are finite.
+    styles, scripts
+        Files that the page has beside those of all pages, in their order.
+
+    Raises
+    ------
+    LinkageError
+        Where plotly is not installed.
+
+    """
+    return '\n'.join(
+        [
+            '<!doctype html>',
+            '<html lang="en">',
+            '<head>',
+            '<meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<meta name="color-scheme" content="light dark">',
+            # Without it a browser asks the server for one.
+            '<link rel="icon" href="data:,">',
+            f'<title>{escape(clean(title))}</title>',
+            f'<style>\n{_joined("page.css", styles)}</style>',
+            '</head>',
+            '<body>',
+            _clean_lines('\n'.join(body)),
+            f'<script type="application/json" id="data">{_json(data)}</script>',
+            f'<script>{_within_script(plotting_library())}</script>',
+            f'<script>\n{_joined("page.js", scripts)}</script>',
+            '</body>',
+            '</html>',
+            '',
+        ]
+    )
+
+
+def picture(svg: bytes) -> str:
+    """Return an SVG as the address of an image that holds it."""
+    return f'data:image/svg+xml;base64,{b64encode(svg).decode()}'
+
+
+def plotting_library() -> str:
+    """
+    Return the script of Plotly.
+
+    Raises
+    ------
+    LinkageError
+        Where it is not installed.
+
+    """
+    if find_spec('plotly') is None:
+        raise LinkageError('plotly', 'is not installed', 'pip install linkage_ros[report]')
+    from plotly.offline import get_plotlyjs  # local import: an extra, and slow to load
+
+    return str(get_plotlyjs())
+
+
+def _joined(name: str, parts: Parts) -> str:
+    """Return a file that all pages have, and those of a page's own behind it."""
+    found = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
+    return '\n'.join(file.read_text('utf-8') for file in found)
+
+
+def _json(data: Any) -> str:
+    # No text within can end the element, or open a comment.
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
+    text = text.replace('<', r'\u003c')
+    # Text that the script shows is made readable here, too; json has escaped the rest.
+    return _without({letter for letter in set(text) if not letter.isprintable()}, text, '\\')
+
+
+def _clean_lines(text: str) -> str:
+    return _without({letter for letter in set(text) - {'\n'} if not letter.isprintable()}, text)
+
+
+def _without(letters: set[str], text: str, before: str = '') -> str:
+    for letter in letters:
+        text = text.replace(letter, before + clean(letter))
+    return text
+
+
+def _within_script(text: str) -> str:
+    return text.replace('</script', r'<\/script')
+
+
+_LONG = 28
+"""Letters from which on a cell may be broken."""
+
+
+def table_html(
+    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[bool]
+) -> Iterator[str]:
+    """
+    Yield a table, within a figure that is left open.
+
+    Parameters
+    ----------
+    title
+        Its caption.
+    columns
+        Headings; all empty: none are written.
+    rows
+        The cells.
+    numbers
+        Which columns hold numbers, and are set right.
+
+    """
+    yield f'<figure><figcaption>{escape(title)}</figcaption>'
+    yield '<div class="scroll" tabindex="0"><table>'
+    if any(columns):
+        yield f'<thead><tr>{"".join(map(_head, columns, numbers))}</tr></thead>'
+    yield '<tbody>'
+    for row in rows:
+        yield f'<tr>{"".join(map(_cell, row, numbers))}</tr>'
+    yield '</tbody></table></div>'
+
+
+def facts_html(facts: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Yield facts, each with its name."""
+    yield '<dl class="facts">'
+    for name, value in facts:
+        yield f'<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>'
+    yield '</dl>'
+
+
+def _head(column: str, number: bool) -> str:
+    return f'<th{" class=number" if number else ""}>{escape(column)}</th>'
+
+
+def _cell(text: str, number: bool) -> str:
+    kind = ' class=number' if number else ' class=long' if len(text) >= _LONG else ''
+    return f'<td{kind}>{escape(text)}</td>'

@@ -1,0 +1,51 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Markdown that programs write: tables, and the part of a page between two marks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+
+def table_lines(
+    heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[bool] = ()
+) -> list[str]:
+    """
+    Return the lines of a table.
+
+    Parameters
+    ----------
+    heads, rows
+        Its cells, which are Markdown.
+    numbers
+        Which columns hold numbers and are aligned to the right; none if not given.
+
+    """
+    rule = ['---:' if number else '---' for number in numbers or (False,) * len(heads)]
+    return [f'| {" | ".join(line)} |' for line in (heads, rule, *rows)]
+
+
+def marks(name: str) -> tuple[str, str]:
+    """Return the two comments between which a program writes."""
+    return f'<!-- {name}: begin -->', f'<!-- {name}: end -->'
+
+
+def filled(page: str, name: str, text: str) -> str:
+    """Return a page with a text between two of its marks; the rest is written by hand."""
+    begin, end = marks(name)
+    head, _, rest = page.partition(begin)
+    _, _, tail = rest.partition(end)
+    return f'{head}{begin}\n{text}\n{end}{tail}'

@@ -1,0 +1,341 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The curves of a run: joint states, poses for the moving picture, input ages and tick lateness.
+
+Lateness is computed from the times of the ticks alone. With the period T, the tick with number i
+of those that follow each other, at the time tᵢ, is off an even row by eᵢ = tᵢ − i·T. A tick is due
+on the row of the most punctual ticks shortly before it and shortly after it, b and a; where these
+are rows apart, on the later one::
+
+    lateness = eᵢ − min(b, a)   where |a − b| < T/2, else eᵢ − max(b, a)
+
+So late ticks that run one after the other are late until they have caught up, and lost ticks
+shift the row: ticks before them keep the old row, ticks after them have the new one. At the
+beginning and the end of a run there is only one side. A delay that all ticks nearby have in common
+cannot be seen. The least within a window is found in two sweeps (M. van Herk, *A fast algorithm
+for local minimum and maximum filters*, 1992).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from linkage_ros.kinematics.linkage import RevoluteJoint
+from linkage_ros.report.decimation import (
+    capacity,
+    Decimation,
+    DURATION_BYTES,
+    Flags,
+    FRAME_BYTES,
+    Histogram,
+    MinMaxCurve,
+    most_columns,
+    MOST_FRAMES,
+    Numbers,
+    SAMPLE_BYTES,
+    STATE_BYTES,
+    Times,
+)
+from linkage_ros.report.labels import short
+from linkage_ros.report.run import Column, Curves, Frames, Window
+from linkage_ros.scene.scene import Scene
+import numpy as np
+
+_WINDOW = 0.25
+"""In [s]: farther away the clocks have drifted, and nearer ticks may still be catching up."""
+
+_FEWEST, _MOST_TICKS = 32, 4096
+
+_NONE = 2**62
+"""In [ns]: where there is nothing to be the least."""
+
+
+class Lateness:
+    """
+    The lateness of ticks, as they come.
+
+    Parameters
+    ----------
+    rate
+        Ticks a second, in [Hz], more than 0.
+
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._period = 1e9 / rate
+        self._window = min(max(round(_WINDOW * rate), _FEWEST), _MOST_TICKS)
+        self._begin: int | None = None
+        self._number = 0
+        self._ended = False
+        # The last window of those that are done, and all that are not.
+        self._times = np.empty(0, np.int64)
+        self._off = np.empty(0, np.int64)
+        self._done = 0
+
+    def add(self, times: Times) -> tuple[Times, Times]:
+        """Take times of ticks, in [ns]; return those whose lateness is known by now, and it."""
+        if not len(times):
+            return self._found(0)
+        if self._begin is None:
+            self._begin = int(times[0])
+        numbers = np.arange(self._number, self._number + len(times))
+        self._number += len(times)
+        # In whole numbers: of long runs, or behind a long pause, a double loses the nanoseconds.
+        whole, part = divmod(self._period, 1.0)
+        due = numbers * int(whole) + np.rint(numbers * part).astype(np.int64)
+        self._times = np.concatenate([self._times, times])
+        self._off = np.concatenate([self._off, times - self._begin - due])
+        return self._found(max(0, len(self._off) - self._window - self._done))
+
+    def end(self) -> tuple[Times, Times]:
+        """Return what is left; nothing is to be added after it."""
+        self._ended = True
+        return self._found(len(self._off) - self._done)
+
+    def _found(self, count: int) -> tuple[Times, Times]:
+        first, end = self._done, self._done + count
+        if not count:
+            return np.empty(0, np.int64), np.empty(0, np.int64)
+        due = self._due()
+        late = self._off[first:end] - due[first:end]
+        times = self._times[first:end]
+        kept = max(0, end - self._window)
+        self._times, self._off, self._done = self._times[kept:], self._off[kept:], end - kept
+        return times, late
+
+    def _due(self) -> Times:
+        """Return the even row that each tick belongs to."""
+        before, after = _least_around(self._off, self._window)
+        few, n = self._window // 4, len(self._off)
+        if self._number == n:
+            before[:few] = -_NONE
+        if self._ended:
+            last = max(0, n - few)
+            after[last:] = -_NONE
+        due = np.maximum(before, after)
+        near = np.abs(before - after) < 0.5 * self._period
+        due[near] = np.minimum(before, after)[near]
+        return np.where(due == -_NONE, self._off.min(), due)
+
+
+def _least_around(values: Times, window: int) -> tuple[Times, Times]:
+    """Return the least of each value and so many before it, and of it and so many after it."""
+    size = window + 1
+    n = len(values)
+    padded = np.full(-(-n // size) * size + size, _NONE)
+    padded[:n] = values
+    blocks = padded.reshape(-1, size)
+    onward = np.minimum.accumulate(blocks, axis=1).ravel()
+    back = np.minimum.accumulate(blocks[:, ::-1], axis=1)[:, ::-1].ravel()
+    end = window + n
+    after = np.minimum(back[:n], onward[window:end])
+    before = onward[:n].copy()
+    before[window:] = np.minimum(before[window:], back[: max(0, n - window)])
+    return before, after
+
+
+MOST_LINKAGES = 16
+"""Those that move in a picture."""
+
+UNITS = {'position': ('rad', 'm'), 'rate': ('rad/s', 'm/s'), 'effort': ('N·m', 'N')}
+"""Of each quantity where the joint turns, and where it slides."""
+
+NO_ROOM = 'curves for which there is no room'
+
+LATENESS, AGE = Column('tick', 'lateness', 'ms'), Column('input', 'age', 'ms')
+
+
+class Kept:
+    """
+    Curves that share their times, as far as they are within a window.
+
+    Parameters
+    ----------
+    title
+        What they are of.
+    columns
+        What each tells.
+    space
+        How much of them may come onto a page, in [bytes].
+    window
+        The part of the run that is shown.
+
+    Attributes
+    ----------
+    left_out
+        How many columns there is no room for, behind the others.
+
+    """
+
+    def __init__(self, title: str, columns: Sequence[Column], space: int, window: Window) -> None:
+        most = most_columns(space)
+        self._title, self._columns, self._window = short(title), tuple(columns[:most]), window
+        self.left_out = max(0, len(columns) - most)
+        n = len(self._columns)
+        self._kept = MinMaxCurve(n, capacity(n, space))
+        self._rows = 0
+
+    def add(self, times: Times, values: Numbers) -> None:
+        """Add rows, in the time of the run in [ns]."""
+        since, until = self._window
+        within = (times >= since) & (times <= until)
+        self._rows += int(within.sum())
+        self._kept.add(times[within], values[within, : len(self._columns)])
+
+    def curves(self) -> Curves | None:
+        """Return the curves that there are; nothing without rows."""
+        found = self._kept.intervals()
+        told = [not np.isnan(column).all() for column in found.first.T]
+        if not any(told):
+            return None
+        columns = [column for column, there in zip(self._columns, told, strict=True) if there]
+        found = found._replace(first=found.first[:, told], second=found.second[:, told])
+        return Curves(self._title, columns, self._rows, found)
+
+
+def joint_columns(names: Sequence[str], turning: Sequence[bool]) -> list[Column]:
+    """Return the columns of joints: positions, rates, and efforts, in the order of a message."""
+    return [
+        Column(name, quantity, units[not turns])
+        for quantity, units in UNITS.items()
+        for name, turns in zip(names, turning, strict=True)
+    ]
+
+
+class SceneCurves:
+    """
+    Collects what is drawn of a run.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    topics
+        Names of the topics of the joint states and of the crank.
+    bodies
+        How many links there are to be moved in the picture.
+    window
+        The part of the run that is shown.
+
+    """
+
+    def __init__(self, scene: Scene, topics: tuple[str, str], bodies: int, window: Window) -> None:
+        turning = {
+            member.prefix + name: isinstance(joint, RevoluteJoint)
+            for member in scene.members
+            for name, joint in member.linkage.joints.items()
+        }
+        inputs = {
+            name: not given.slider
+            for member in scene.members
+            for name, given in zip(member.inputs, member.linkage.inputs, strict=True)
+        }
+        states, crank = topics
+        columns = joint_columns(scene.joints, [turning[name] for name in scene.joints])
+        self._window = window
+        self._states = Kept(states, columns, STATE_BYTES, window)
+        self._samples = Kept(
+            crank, joint_columns([*inputs], [*inputs.values()]), SAMPLE_BYTES, window
+        )
+        self._lates = Kept('ticks', [LATENESS], DURATION_BYTES, window)
+        self._ages = Kept('ticks', [AGE], DURATION_BYTES, window)
+        self._lateness = Lateness(scene.rate) if scene.rate else None
+        self.late, self.age = Histogram(), Histogram()
+        moving = scene.members[:MOST_LINKAGES]
+        names = (name for each in moving for name in (*each.inputs, *each.joints))
+        self._places = {name: place for place, name in enumerate(dict.fromkeys(names))}
+        # Beside the values the frames of the links come onto the page, three numbers each, and by
+        # how much they are apart.
+        size = 8 * (1 + len(self._places)) + 12 * bodies + 4 * len(moving)
+        most = min(MOST_FRAMES, FRAME_BYTES // size)
+        self._frames = Decimation(len(self._places), max(2, most - most % 2))
+        # The joints of a scene stand in the order of its linkages.
+        self._joints = [self._places[name] for each in moving for name in each.joints]
+
+    def add_states(
+        self, times: Times, numbers: Numbers, inputs: Sequence[tuple[Sequence[str], Numbers]]
+    ) -> None:
+        """
+        Add joint states.
+
+        Parameters
+        ----------
+        times
+            In the time of the run, in [ns].
+        numbers
+            As `JointBlock.numbers` has them.
+        inputs
+            Where driven joints were, by the samples, with their names.
+
+        """
+        self._states.add(times, numbers.reshape(len(times), numbers.shape[1] * numbers.shape[2]))
+        values = np.full((len(times), len(self._places)), np.nan)
+        for names, angles in inputs:
+            if names[0] in self._places:
+                values[:, [self._places[name] for name in names]] = angles
+        # What is published goes before what a sample said.
+        positions = numbers[:, 0, : len(self._joints)]
+        there = ~np.isnan(positions)
+        under = values[:, self._joints]
+        values[:, self._joints] = np.where(there, positions, under)
+        within = self._within(times)
+        self._frames.add(times[within], values[within])
+
+    def add_samples(self, times: Times, numbers: Numbers) -> None:
+        """Add samples of the crank, as joint states."""
+        self._samples.add(times, numbers.reshape(len(times), numbers.shape[1] * numbers.shape[2]))
+
+    def add_ticks(self, times: Times) -> None:
+        """Add ticks, at which something was published or not, in the time of the run in [ns]."""
+        if self._lateness is not None:
+            self._add_late(*self._lateness.add(times))
+
+    def add_ages(self, times: Times, ages: Times) -> None:
+        """Add how old the input was at ticks, in [ns]."""
+        self._ages.add(times, _milliseconds(ages))
+        self.age.add(ages[self._within(times)])
+
+    def end(self) -> tuple[list[Curves], Frames]:
+        """Return all that was collected; nothing is to be added after it."""
+        if self._lateness is not None:
+            self._add_late(*self._lateness.end())
+        kept = (self._states, self._samples, self._lates, self._ages)
+        found = [curves for each in kept if (curves := each.curves()) is not None]
+        values = dict(zip(self._places, self._frames.values.T, strict=True))
+        return found, Frames(self._frames.step, self._frames.times, values)
+
+    @property
+    def left_out(self) -> dict[tuple[str, str], int]:
+        """Return of how many curves there is no room for, by what they are of, and why."""
+        return {
+            (what, NO_ROOM): kept.left_out
+            for what, kept in (('joint states', self._states), ('samples', self._samples))
+            if kept.left_out
+        }
+
+    def _add_late(self, times: Times, late: Times) -> None:
+        self._lates.add(times, _milliseconds(late))
+        self.late.add(late[self._within(times)])
+
+    def _within(self, times: Times) -> Flags:
+        since, until = self._window
+        return (times >= since) & (times <= until)
+
+
+def _milliseconds(durations: Times) -> Numbers:
+    """Return durations in [ns] as a column in [ms]."""
+    return (durations * 1e-6).astype(np.float64)[:, None]

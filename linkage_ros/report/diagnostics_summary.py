@@ -1,0 +1,189 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What the diagnostics of a run add to its messages: lost ticks, drops and warnings.
+
+``diagnostic_msgs/msg/DiagnosticArray`` messages are read as bytes. The reader stands on its own:
+the messages of a bag may have been written by any program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from struct import error as StructError
+from struct import Struct
+from typing import NamedTuple
+
+from linkage_ros.cdr import aligned, STAMP_END
+from linkage_ros.report.labels import short
+from linkage_ros.report.run import Lane
+
+_MOST_ITEMS = 10_000
+"""Statuses of a message, and values of a status; what says to have more is damaged."""
+
+
+class Status(NamedTuple):
+    """
+    The status of one task.
+
+    Attributes
+    ----------
+    level
+        0 OK, 1 WARN, 2 ERROR, 3 STALE.
+    name
+        Of the task.
+    message
+        In words.
+    values
+        By key, as text.
+
+    """
+
+    level: int
+    name: str
+    message: str
+    values: Mapping[str, str]
+
+
+def statuses(data: bytes) -> list[Status]:
+    """Return what a message says; nothing of one that is damaged."""
+    order = {b'\x00\x00': '>', b'\x00\x01': '<'}.get(data[:2])
+    if order is None:
+        return []
+    try:
+        return _Cursor(data, Struct(f'{order}I')).statuses()
+    except (StructError, IndexError):
+        return []
+
+
+class _Cursor:
+    """Goes through a message from its header on."""
+
+    def __init__(self, data: bytes, count: Struct) -> None:
+        self._data, self._count, self._at = data, count, STAMP_END
+        self._text()
+
+    def statuses(self) -> list[Status]:
+        return [self._status() for _ in range(self._size())]
+
+    def _status(self) -> Status:
+        level = self._data[self._at]
+        self._at += 1
+        name, message, _ = self._text(), self._text(), self._text()
+        pairs = [(self._text(), self._text()) for _ in range(self._size())]
+        return Status(level, name, message, dict(pairs))
+
+    def _size(self) -> int:
+        at = aligned(self._at, 4)
+        self._at = at + 4
+        (number,) = self._count.unpack_from(self._data, at)
+        if number > _MOST_ITEMS:
+            raise StructError
+        return int(number)
+
+    def _text(self) -> str:
+        at = aligned(self._at, 4)
+        (length,) = self._count.unpack_from(self._data, at)
+        start = at + 4
+        self._at = start + length
+        if self._at > len(self._data):
+            raise StructError
+        end = self._at - 1
+        return self._data[start:end].decode('utf-8', 'backslashreplace')
+
+
+_LEVELS = {1: 'warning', 2: 'error', 3: 'stale'}
+_TASKS = ('tick', 'crank', 'loop closure', 'recording', 'faults')
+
+_COUNTED = {
+    'Lost ticks': ('lost', ''),
+    'Ticks open': ('told_open', 'open'),
+    'Ticks indeterminate': ('told_open', 'indeterminate'),
+    'Ticks at a toggle': ('told_toggle', ''),
+    'Ticks beyond limits': ('told_limited', ''),
+}
+"""Counts that only grow, the lane that tells of it, and what it says."""
+
+_DROPPED = 'Dropped: '
+
+MOST_VALUES = 500
+"""Values that are remembered; our node says some sixty."""
+
+
+class DiagnosticsSummary:
+    """
+    Follows the diagnostics.
+
+    Parameters
+    ----------
+    lanes
+        Where what happens is put, by kind: lost, told_open, told_toggle, told_limited, dropped
+        and health.
+    from_beginning
+        Whether the bag holds the run from its beginning: where not, counts have begun before.
+
+    Attributes
+    ----------
+    said
+        The last values, by task and key; no more than `MOST_VALUES`.
+
+    """
+
+    def __init__(self, lanes: Mapping[str, Lane], from_beginning: bool = True) -> None:
+        self.said: dict[tuple[str, str], str] = {}
+        self._lanes, self._from_beginning = lanes, from_beginning
+        self._before = 0
+        self._counts: dict[tuple[str, str], int] = {}
+
+    def take(self, message: bytes, time: int) -> None:
+        """Take a message, at a time of the run in [ns]."""
+        ours = [
+            (task, status)
+            for status in statuses(message)
+            for task in _TASKS
+            if status.name.endswith(f': {task}')
+        ]
+        for task, status in ours:
+            self._take(task, status, time)
+        if ours:
+            self._before = time
+
+    def _take(self, task: str, status: Status, time: int) -> None:
+        if status.level in _LEVELS:
+            text = f'{_LEVELS[status.level]}, {task}: {status.message}'
+            self._lanes['health'].add(self._before, time, text)
+        for key, value in status.values.items():
+            named = task, short(key)
+            if named not in self.said and len(self.said) >= MOST_VALUES:
+                continue
+            self.said[named] = short(value)
+            if key in _COUNTED:
+                lane, what = _COUNTED[key]
+                self._count(lane, what, named, value, time)
+            elif key.startswith(_DROPPED):
+                topic = key.removeprefix(_DROPPED)
+                self._count('dropped', f'messages of {topic}', named, value, time)
+
+    def _count(self, lane: str, what: str, of: tuple[str, str], value: str, time: int) -> None:
+        if not value.isdecimal() or len(value) > 18:
+            return
+        count = int(value)
+        known = self._counts.get(of, 0 if self._from_beginning else count)
+        self._counts[of] = count
+        # Of a node that was started anew it begins at 0 again.
+        more = count - known if count >= known else count
+        if more:
+            self._lanes[lane].add(self._before, time, what, more)

@@ -1,0 +1,225 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The crank samples of a run: which were good, which were refused and why, and the crank angle.
+
+Each sample is offered to the scene's own pipeline, as in the run, so that it is refused for the
+same reason. The crank angle is that of the newest good sample, carried forward by its rate.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.errors import BagError
+from linkage_ros.joint_state import Rejection
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import read_change, turn
+from linkage_ros.report.blocks import Rows
+from linkage_ros.report.decimation import Flags, Numbers, Times
+from linkage_ros.report.labels import short
+from linkage_ros.report.run import Lane
+from linkage_ros.scene.scene import Member, Scene
+import numpy as np
+
+
+class Crank:
+    """
+    The driven joints of a linkage, by the newest good sample.
+
+    Parameters
+    ----------
+    member
+        The linkage in its scene, driven from a topic.
+    columns
+        Of its inputs among those of the samples.
+
+    """
+
+    def __init__(self, member: Member, columns: Sequence[int]) -> None:
+        self._columns = list(columns)
+        self._carried = bool(getattr(member.drive[1], 'carry_forward', False))
+        width = len(columns)
+        self._number = np.array([-1])
+        self._stamp = np.zeros(1, np.int64)
+        self._angles, self._rates = np.full((1, width), np.nan), np.zeros((1, width))
+
+    def take(self, numbers: Times, stamps: Times, good: Flags, values: Numbers) -> Flags:
+        """
+        Take samples; return which were for this linkage.
+
+        Parameters
+        ----------
+        numbers
+            Of the messages in their block, rising.
+        stamps
+            Theirs, in [ns].
+        good
+            Which were not refused.
+        values
+            As `JointBlock.numbers` has them.
+
+        """
+        angles, rates = values[:, 0, self._columns], values[:, 1, self._columns]
+        own: Flags = good & ~np.isnan(angles).any(axis=1)
+        # The last one of before stands before the first message of this block.
+        self._number = np.concatenate([[-1], numbers[own]])
+        self._stamp = np.concatenate([self._stamp[-1:], stamps[own]])
+        self._angles = np.concatenate([self._angles[-1:], angles[own]])
+        self._rates = np.concatenate([self._rates[-1:], np.nan_to_num(rates[own])])
+        return own
+
+    def at(self, numbers: Times, times: Times) -> tuple[Numbers, Times]:
+        """
+        Return where the crank was at messages of the block, in [rad] or [m], and its stamp.
+
+        Parameters
+        ----------
+        numbers
+            Of the messages in their block.
+        times
+            That were solved for, in [ns].
+
+        """
+        places = np.searchsorted(self._number, numbers) - 1
+        stamps, angles = self._stamp[places], self._angles[places]
+        if self._carried:
+            ages = (times - stamps) * 1e-9
+            angles = angles + self._rates[places] * ages[:, None]
+        return angles, stamps
+
+
+class SampleJudge:
+    """
+    Separates good samples from refused ones.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+    scene
+        Its scene.
+    from_beginning
+        Whether the bag holds the run from its beginning: where not, faults may be on already.
+
+    Attributes
+    ----------
+    listens
+        Whether the scene takes samples at all.
+    rejected
+        How many were refused, by reason.
+
+    """
+
+    def __init__(self, bag: Bag, scene: Scene, from_beginning: bool) -> None:
+        self._bag, self._scene = bag, scene
+        # Of the others it is not known yet whether they were on as the bag began.
+        self._known = {*(scene.faults if from_beginning else ())}
+        self._pipeline = Pipeline(scene)
+        self._last = 0
+        self.listens = bool(self._pipeline.topic)
+        self.rejected: Counter[str] = Counter()
+        self._faults: dict[str, int] = {}
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """Return the scene at work, as it was built last."""
+        return self._pipeline
+
+    def take(self, rows: Mapping[str, Rows], lanes: Mapping[str, Lane]) -> Flags:
+        """
+        Return which samples of a block were good; in between, faults turn and all is forgotten.
+
+        Parameters
+        ----------
+        rows
+            The messages of the block, by kind.
+        lanes
+            Where what happens is put: fault, reset and rejected.
+
+        """
+        samples = rows['samples']
+        good = np.zeros(len(samples.data), bool)
+        events = sorted(
+            (number, kind, place)
+            for kind in ('faults', 'resets', 'samples')
+            if kind != 'samples' or self.listens
+            for place, number in enumerate(rows[kind].numbers.tolist())
+        )
+        for _, kind, place in events:
+            message, time = rows[kind].data[place], int(rows[kind].passed[place])
+            if kind == 'faults':
+                self._turn(message, time, lanes['fault'])
+            elif kind == 'resets':
+                self._reset()
+                lanes['reset'].add(time, time)
+            else:
+                rejection = self._offer(message, int(samples.logged[place]))
+                good[place] = rejection is None
+                if rejection is not None:
+                    lanes['rejected'].add(time, time, rejection.value)
+        return good
+
+    def hear(self, said: Mapping[tuple[str, str], str]) -> None:
+        """Take from what the diagnostics say, by task and key, which faults were on before."""
+        for name in [name for name in self._scene.faults if name not in self._known]:
+            state = said.get(('faults', short(self._fault(name))))
+            if state:
+                self._known.add(name)
+            if state == 'injected':
+                self._faults[name] = 0
+
+    def end(self, time: int, lane: Lane) -> None:
+        """Put the faults that are still on onto their lane, to the end of the run."""
+        for name, begun in self._faults.items():
+            lane.add(begun, time, self._fault(name))
+
+    def _offer(self, message: bytes, logged: int) -> Rejection | None:
+        """Offer a sample; return why it is refused."""
+        if logged < self._last:
+            self._reset()
+        self._last = logged
+        rejection = self._pipeline.offer(message, logged)
+        if rejection is not None:
+            self.rejected[rejection.value] += 1
+        return rejection
+
+    def _reset(self) -> None:
+        """Forget all, as the run has."""
+        self._pipeline = Pipeline(self._scene, self._pipeline.closures, self._pipeline.injection)
+
+    def _turn(self, message: bytes, time: int, lane: Lane) -> None:
+        """Turn a fault on or off, at a time of the run in [ns]; one that ends goes on its lane."""
+        injection = self._pipeline.injection
+        try:
+            if injection is None:
+                return
+            turn(self._bag, injection, message)
+            name, on = read_change(message)
+        except (BagError, ValueError):
+            return
+        if on:
+            self._faults.setdefault(name, time)
+        elif name in self._faults:
+            lane.add(self._faults.pop(name), time, self._fault(name))
+        elif name not in self._known:
+            lane.add(0, time, self._fault(name))
+        self._known.add(name)
+
+    def _fault(self, name: str) -> str:
+        return f'{name} ({self._scene.faults[name].kind})'

@@ -1,0 +1,269 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Read the run of a scene from its bag: ticks, samples, events, and spans with an open loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from linkage_ros.bag.reading.beginning import lost_beginning
+from linkage_ros.bag.reading.contents import Contents
+from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.reading.run_events import run_said, RunAccount
+from linkage_ros.kinematics.batch import CODES
+from linkage_ros.kinematics.status import Status
+from linkage_ros.replay import own_joint_states
+from linkage_ros.report.blocks import Entry, Rows, rows_of, RunClock
+from linkage_ros.report.curves import MOST_LINKAGES, SceneCurves
+from linkage_ros.report.decimation import Flags, Numbers, Times
+from linkage_ros.report.diagnostics_summary import DiagnosticsSummary
+from linkage_ros.report.joint_states import JointBlock, JointStates
+from linkage_ros.report.run import APART, Lane, LinkageRun, Run, Silences, Window
+from linkage_ros.report.samples import Crank, SampleJudge
+from linkage_ros.scene.scene import Scene
+import numpy as np
+
+
+def find_open_loop_spans(linkage: LinkageRun, times: Times, angles: Numbers, lane: Lane) -> None:
+    """
+    Put samples at which a linkage does not close onto a lane.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    times
+        Of the samples, in the time of the run in [ns].
+    angles
+        Where they have its driven joints, of shape (samples, inputs), in [rad] or [m].
+    lane
+        The lane.
+
+    """
+    if not len(times):
+        return
+    status = linkage.closure.solve(*angles.T, derivatives=0).status
+    found = status >= CODES[Status.OPEN]
+    for time, given in zip(times[found].tolist(), angles[found].tolist(), strict=True):
+        text = ''
+        # The text is that of the first of those that are one span.
+        if not lane.spans or time - lane.spans[-1].end > lane.near:
+            position = linkage.closure.position(*given)
+            text = f'{position.status.value}, the links miss by {position.gap:.3g} m'
+        lane.add(time, time, f'{linkage.name} {text}'.strip())
+
+
+LANES = (
+    'fault', 'open', 'told_open', 'toggle', 'told_toggle', 'told_limited', 'silent', 'withheld',
+    'rejected', 'stale', 'lost', 'dropped', 'reset', 'jump', 'health',
+)  # fmt: skip
+
+_TOGETHER = 20_000_000
+"""How near to each other things of a kind are one, in [ns]."""
+
+_ALIKE = ('open', 'toggle')
+_MOST_SILENCES = 400
+_NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving picture'
+
+
+class SceneRun:
+    """
+    Reads a run of a scene block by block.
+
+    Parameters
+    ----------
+    bag, run, scene
+        The bag, what its run says of itself, and its scene.
+    window
+        The part of the run that is shown.
+
+    Raises
+    ------
+    LinkageError
+        Where the scene cannot be built here.
+
+    """
+
+    def __init__(self, bag: Bag, run: RunAccount, scene: Scene, window: Window) -> None:
+        from_beginning = not lost_beginning(bag, run)
+        self._judge = SampleJudge(bag, scene, from_beginning)
+        pipeline = self._judge.pipeline
+        self._rate, self._window, self._clock = scene.rate, window, RunClock()
+        self._lanes = {
+            name: Lane(_TOGETHER, alike=name in _ALIKE, window=window) for name in LANES
+        }
+        said = run_said(bag).get('diagnostics_topic')
+        self._topics = {
+            said if isinstance(said, str) else '/diagnostics': 'health',
+            run.crank_topic: 'samples',
+            run.faults_topic: 'faults',
+            run.withheld_topic: 'withheld',
+            run.resets_topic: 'resets',
+            run.joint_states_topic: 'states',
+        }
+        self._topics.pop('', None)
+        shared = run.crank_topic == run.joint_states_topic
+        self._own = own_joint_states(scene) if shared else None
+        self._linkages = [
+            LinkageRun(
+                member.name,
+                member.prefix,
+                line.closure,
+                member.inputs,
+                member.joints,
+                tuple('m' if given.slider else 'rad' for given in member.linkage.inputs),
+                Lane(APART, longest=True, most=_MOST_SILENCES, window=window),
+            )
+            for member, line in zip(scene.members, pipeline.lines, strict=True)
+        ]
+        inputs = [name for linkage in self._linkages for name in linkage.inputs]
+        self._states = JointStates(scene.joints, others=False)
+        self._samples = JointStates(inputs, others=False)
+        self._cranks = {
+            number: Crank(member, [inputs.index(name) for name in member.inputs])
+            for number, member in enumerate(scene.members)
+            if member.drive[0] == 'topic'
+        }
+        self._first_joints = [scene.joints.index(linkage.joints[0]) for linkage in self._linkages]
+        self._has_limits = any(member.linkage.limits for member in scene.members)
+        self._tells_toggles = len(scene.members) == 1 and 'velocity' in scene.members[0].effects
+        self._health = DiagnosticsSummary(self._lanes, from_beginning)
+        bodies = sum(len(each.closure.structure.links) for each in self._linkages[:MOST_LINKAGES])
+        topics = run.joint_states_topic, run.crank_topic
+        self._curves = SceneCurves(scene, topics, bodies, window)
+        period = round(1e9 / scene.rate) if scene.rate else 0
+        self._silences = [Silences(each.silent, period) for each in self._linkages]
+        self._stale = Silences(self._lanes['stale'], 0, pipeline.max_age)
+
+    @property
+    def topics(self) -> set[str]:
+        """Return the topics whose messages are wanted."""
+        return {*self._topics}
+
+    def take(self, block: Mapping[str, list[Entry]]) -> None:
+        """Take the messages of a block."""
+        rows = rows_of(block, self._topics, self._own, self._clock)
+        for time, by in self._clock.jumps():
+            self._lanes['jump'].add(time, time, f'by {by / 1e9:.6g} s')
+        states, withheld, health = rows['states'], rows['withheld'], rows['health']
+        read = self._states.read(states.data)
+        good = self._judge.take(rows, self._lanes)
+        if self._judge.listens:
+            self._look_at_samples(rows['samples'], good, states, read)
+        for time in withheld.passed.tolist():
+            self._lanes['withheld'].add(time, time)
+        self._look_at_states(states, read)
+        self._curves.add_ticks(np.union1d(states.passed[read.good], withheld.passed))
+        for time, message in zip(health.passed.tolist(), health.data, strict=True):
+            self._health.take(message, time)
+            self._judge.hear(self._health.said)
+
+    def end(self, contents: Contents) -> Run:
+        """Return what there is to tell; with the counts of all messages."""
+        end = self._clock.end
+        self._judge.end(end, self._lanes['fault'])
+        for silences in self._silences:
+            silences.end(end)
+        if self._judge.listens and self._stale.limit:
+            self._stale.end(end)
+        curves, frames = self._curves.end()
+        left_out = self._curves.left_out
+        for what, reader in (('joint states', self._states), ('samples', self._samples)):
+            left_out |= {(what, reason): n for reason, n in reader.left_out.items() if n}
+        if len(self._linkages) > MOST_LINKAGES:
+            left_out['the scene', _NOT_MOVING] = len(self._linkages) - MOST_LINKAGES
+        told = {*self._told()}
+        return Run(
+            begin=self._clock.begin,
+            end=end,
+            window=self._window,
+            contents=contents,
+            curves=curves,
+            frames=frames,
+            linkages=self._linkages[:MOST_LINKAGES],
+            lanes={key: lane for key, lane in self._lanes.items() if key in told or lane.count},
+            lateness=self._curves.late if self._curves.late.count else None,
+            age=self._curves.age if self._curves.age.count else None,
+            rejected=self._judge.rejected,
+            left_out=left_out,
+            said=self._health.said,
+        )
+
+    def _told(self) -> Iterator[str]:
+        """Yield the kinds of what happens of which it would be known."""
+        yield from ('silent', 'jump')
+        kinds = self._topics.values()
+        for kind, lane in (('faults', 'fault'), ('withheld', 'withheld'), ('resets', 'reset')):
+            if kind in kinds:
+                yield lane
+        if self._judge.listens:
+            yield 'rejected'
+            if self._cranks:
+                yield 'open'
+            if self._stale.limit:
+                yield 'stale'
+        if self._tells_toggles:
+            yield 'toggle'
+        if self._health.said:
+            yield from ('lost', 'dropped', 'health', 'told_open', 'told_toggle')
+            if self._has_limits:
+                yield 'told_limited'
+
+    def _look_at_samples(self, samples: Rows, good: Flags, states: Rows, read: JointBlock) -> None:
+        """Draw the crank, and look for samples at which a loop does not close."""
+        told = self._samples.read(samples.data)
+        self._curves.add_samples(samples.passed[told.good], told.numbers[told.good])
+        if self._stale.limit:
+            self._stale.add(samples.passed[good])
+        for number, crank in self._cranks.items():
+            own = crank.take(samples.numbers, told.stamps, good, told.numbers)
+            there = read.good & self._is_there(read.numbers, number)
+            alone = own & ~np.isin(samples.logged, states.logged[there])
+            at = samples.logged if self._rate else told.stamps
+            angles, _ = crank.at(samples.numbers[alone] + 1, at[alone])
+            find_open_loop_spans(
+                self._linkages[number], samples.passed[alone], angles, self._lanes['open']
+            )
+
+    def _look_at_states(self, states: Rows, read: JointBlock) -> None:
+        good = read.good
+        numbers, passed = read.numbers[good], states.passed[good]
+        if self._tells_toggles:
+            for time in passed[np.isnan(numbers[:, 1]).all(axis=1)].tolist():
+                self._lanes['toggle'].add(time, time)
+        places = states.numbers[good]
+        inputs, stamps = [], []
+        for number, crank in self._cranks.items():
+            angles, newest = crank.at(places, states.published[good])
+            inputs.append((self._linkages[number].inputs, angles))
+            stamps.append(newest)
+        self._curves.add_states(passed, numbers, inputs)
+        if stamps:
+            # Of several linkages that counts whose input is oldest; 0 is none.
+            found = np.array(stamps)
+            oldest = np.where(found > 0, found, _NEVER).min(axis=0)
+            known = oldest < _NEVER
+            self._curves.add_ages(passed[known], states.logged[good][known] - oldest[known])
+        for number, silences in enumerate(self._silences):
+            silences.add(passed[self._is_there(numbers, number)])
+
+    def _is_there(self, numbers: Numbers, linkage: int) -> Flags:
+        """Return of which joint states a linkage is a part."""
+        found: Flags = ~np.isnan(numbers[:, 0, self._first_joints[linkage]])
+        return found
+
+
+_NEVER = 2**62
