@@ -31,8 +31,8 @@ import platform
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros import __version__
-from linkage_ros.bag.reading.reader import Bag, BagMessage, RUN_FILE
-from linkage_ros.bag.reading.run_events import (
+from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
+from linkage_ros.bag.run_events import (
     Made,
     recorded_events,
     Reset,

@@ -36,7 +36,7 @@ from campaigns.attacks.mutations import mutated
 from campaigns.in_process import confined, in_process
 from campaigns.processes import tried_in_parts
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml

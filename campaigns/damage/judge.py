@@ -20,9 +20,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from campaigns.damage.subject import Subject
-from linkage_ros.bag.reading.reader import BagMessage, read_bag, topic_of
-from linkage_ros.bag.reading.records import Message, Source
-from linkage_ros.bag.recovering.salvage import Salvage
+from linkage_ros.bag.mcap_records import Message, Source
+from linkage_ros.bag.reader import BagMessage, read_bag, topic_of
+from linkage_ros.bag.salvage import Salvage
 from linkage_ros.errors import BagError
 from mcap.records import Attachment
 

@@ -23,9 +23,9 @@ import os
 from pathlib import Path
 from random import Random
 
-from linkage_ros.bag.reading.reader import BagMessage, read_bag
+from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 

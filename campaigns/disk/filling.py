@@ -30,7 +30,7 @@ from typing import NamedTuple
 from campaigns.disk.judge import Expectation, judge, Outcome
 from campaigns.disk.small_disks import Disk, free_on, mounted
 from campaigns.disk.subject import expected_messages, offer_all, Recorded
-from linkage_ros.bag.writing.storage import Storage
+from linkage_ros.bag.storage import Storage
 
 FLOOR = 1_500_000
 _PATIENCE = 120.0  # [s]

@@ -25,10 +25,10 @@ from typing import Any
 
 from campaigns.disk.subject import Recorded
 from campaigns.kills.plan import TOPICS
-from linkage_ros.bag.account import FAILURE, UNFINISHED
 from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
-from linkage_ros.bag.reading.reader import Bag, BagMessage, read_bag
-from linkage_ros.bag.recovering.recover import recover
+from linkage_ros.bag.reader import Bag, BagMessage, read_bag
+from linkage_ros.bag.recording_stats import FAILURE, UNFINISHED
+from linkage_ros.bag.recover import recover
 from linkage_ros.errors import BagError
 from rosbags.highlevel import AnyReader
 import yaml

@@ -33,7 +33,7 @@ from bench.processes import BenchError, Graph
 from campaigns.disk.small_disks import Disk, mounted
 from campaigns.endurance.account import Account, account_of
 from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.errors import BagError
 
 _FREEZE, _THAW = 0xC0045877, 0xC0045878

@@ -23,10 +23,10 @@ from time import monotonic_ns, sleep
 
 from campaigns.kills.plan import ATTACHMENTS, expected, message, TOPICS
 from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.reading.reader import BagMessage
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import BagMessage
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 
 MESSAGES = 240

@@ -37,10 +37,10 @@ from bench.report import say
 from campaigns.endurance.account import shortcomings
 from campaigns.endurance.memory import Usage, usage
 from campaigns.endurance.telling import telling
+from linkage_ros.bag.recorder import Recorder, RecordingSummary
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.recorder import Recorder, RecordingSummary
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros.tick_loop import TickLoop

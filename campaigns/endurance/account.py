@@ -21,8 +21,8 @@ from collections import Counter
 import json
 from pathlib import Path
 
-from linkage_ros.bag.account import ACCOUNT
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recording_stats import ACCOUNT
 from linkage_ros.errors import BagError
 from mcap.reader import make_reader
 

@@ -32,7 +32,7 @@ from bench.processes import BenchError, Graph
 from campaigns.endurance.accelerated import SCENES
 from campaigns.endurance.account import Account, account_of, shortcomings
 from campaigns.endurance.memory import Usage, usage
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from rosbags.typesys import get_typestore, Stores
 
 _CRANK_RATE = 500

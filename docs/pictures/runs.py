@@ -26,7 +26,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.effects.stage import Reading
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.pipeline import Look, Pipeline

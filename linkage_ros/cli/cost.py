@@ -25,7 +25,7 @@ from tempfile import TemporaryDirectory
 from threading import Event
 
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.tables import show, Table
 from linkage_ros.cost.measure import compare, EffectCost, measure, SceneCost, Times
 from linkage_ros.effects.stage import NEEDS

@@ -32,8 +32,8 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.bag.reading.layout import layout_of
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.contents import layout_of
+from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.bag_reading import opened, run_or_blank, unfinished_text
 from linkage_ros.cli.message_values import JOINT_STATE, Key, POSITION, TYPES, UNITS
 from linkage_ros.cli.progress import progress

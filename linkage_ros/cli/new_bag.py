@@ -22,8 +22,8 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.reader import Bag, RUN_FILE
-from linkage_ros.bag.reading.run_events import (
+from linkage_ros.bag.reader import Bag, RUN_FILE
+from linkage_ros.bag.run_events import (
     BEGUN,
     OWN_EFFECTS,
     Reset,
@@ -35,7 +35,7 @@ from linkage_ros.bag.reading.run_events import (
     WITH_THE_RUN,
 )
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cdr import time_message
 from linkage_ros.cli.message_values import JOINT_STATE
 from linkage_ros.cli.what_if import Done, WhatIf

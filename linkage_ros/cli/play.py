@@ -30,9 +30,8 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.bag.reading.being_written import is_being_written
-from linkage_ros.bag.reading.in_time import TimeOrder
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.order import TimeOrder
+from linkage_ros.bag.reader import Bag, is_being_written
 from linkage_ros.bag.topic import Topic
 from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.progress import progress, Told

@@ -21,7 +21,7 @@ from collections.abc import Iterator, Mapping
 from math import isfinite
 from typing import Any
 
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.bag_reading import BagReading, gaps, unfinished_text
 from linkage_ros.cli.message_values import UNITS
 from linkage_ros.cli.proof import beginning_text, Proof

@@ -21,8 +21,8 @@ from pathlib import Path
 import sys
 from typing import Any
 
-from linkage_ros.bag.reading.reader import Bag
-from linkage_ros.bag.reading.run_events import recorded_events, run_account, RunAccount
+from linkage_ros.bag.reader import Bag
+from linkage_ros.bag.run_events import recorded_events, run_account, RunAccount
 from linkage_ros.cli.bag_reading import BagReading
 from linkage_ros.cli.crank_topic import find_crank_topic
 from linkage_ros.cli.message_values import JOINT_STATE

@@ -28,7 +28,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from dataclasses import dataclass
 
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.drives.bag_samples import read_samples, Samples
 from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.drives.topic import TopicDrive, TopicParameters

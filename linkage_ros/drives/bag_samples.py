@@ -25,8 +25,8 @@ from array import array
 from collections import Counter
 from collections.abc import Mapping
 
-from linkage_ros.bag.reading.reader import Bag
-from linkage_ros.bag.reading.run_events import run_said
+from linkage_ros.bag.reader import Bag
+from linkage_ros.bag.run_events import run_said
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import BagError, listed
 from linkage_ros.joint_state import JointStateReader, Rejection

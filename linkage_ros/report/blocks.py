@@ -20,8 +20,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.contents import Contents, TopicContents
-from linkage_ros.bag.reading.reader import Bag, BagMessage
+from linkage_ros.bag.contents import Contents, TopicContents
+from linkage_ros.bag.reader import Bag, BagMessage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError
 

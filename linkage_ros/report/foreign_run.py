@@ -19,8 +19,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from linkage_ros.bag.reading.contents import Contents
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.contents import Contents
+from linkage_ros.bag.reader import Bag
 from linkage_ros.report.blocks import Entry
 from linkage_ros.report.clock import RunClock, times_of
 from linkage_ros.report.joint_states import JointStates

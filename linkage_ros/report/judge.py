@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.reader import Bag
 from linkage_ros.errors import BagError
 from linkage_ros.joint_state import Rejection
 from linkage_ros.pipeline import Pipeline

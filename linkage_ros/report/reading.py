@@ -20,8 +20,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from linkage_ros.bag.reading.reader import Bag
-from linkage_ros.bag.reading.run_events import run_account
+from linkage_ros.bag.reader import Bag
+from linkage_ros.bag.run_events import run_account
 from linkage_ros.errors import LinkageError
 from linkage_ros.replay import recorded_scene
 from linkage_ros.report.blocks import Blocks, Progress

@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.contents import Contents
+from linkage_ros.bag.contents import Contents
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.report.arrays import Numbers, Times
 from linkage_ros.report.extremes import Intervals

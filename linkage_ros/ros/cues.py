@@ -22,7 +22,7 @@ from queue import Empty, Full, Queue
 from threading import Event, Thread
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.in_time import TimeOrder
+from linkage_ros.bag.order import TimeOrder
 from linkage_ros.errors import LinkageError
 
 _BATCH = 256

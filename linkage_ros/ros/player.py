@@ -24,7 +24,7 @@ import sys
 from threading import Event
 from time import monotonic
 
-from linkage_ros.bag.reading.in_time import TimeOrder
+from linkage_ros.bag.order import TimeOrder
 from linkage_ros.cdr import TIME_END, time_message
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import NANOSECONDS

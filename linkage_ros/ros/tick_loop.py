@@ -29,7 +29,7 @@ from threading import Event, Thread
 from time import monotonic_ns
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.bag.writing.recorder import Recorder
+from linkage_ros.bag.recorder import Recorder
 from linkage_ros.cdr import time_message
 from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Position

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from linkage_ros.bag.writing.storage import COMPRESSIONS, Storage
+from linkage_ros.bag.storage import COMPRESSIONS, Storage
 from linkage_ros.parameters import choice, number, whole
 from linkage_ros.scene.read import read_parameters
 from linkage_ros.scene.section import Section

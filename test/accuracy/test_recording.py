@@ -25,7 +25,7 @@ from linkage_ros.accuracy.recording.cost import Cost, cost_of, measure_costs
 from linkage_ros.accuracy.recording.measure import measure_recording, part_of
 from linkage_ros.accuracy.recording.recorded_run import Flush, record_run, Recorded
 from linkage_ros.accuracy.spread import Spread
-from linkage_ros.bag.writing.storage import Storage
+from linkage_ros.bag.storage import Storage
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.scene.load import load_scene
 from linkage_ros.shipped import shipped

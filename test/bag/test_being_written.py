@@ -20,7 +20,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from linkage_ros.bag.reading.being_written import is_being_written
+from linkage_ros.bag.reader import is_being_written
 import pytest
 
 WRITES = 'import sys; stream = open(sys.argv[1], "ab"); print(flush=True); sys.stdin.read()'

@@ -19,9 +19,8 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.bag.reading import in_time
-from linkage_ros.bag.reading.in_time import TimeOrder
-from linkage_ros.bag.reading.reader import BagMessage, read_bag
+from linkage_ros.bag.order import TimeOrder, WINDOW
+from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.errors import BagError
 from mcap.writer import CompressionType, IndexType, Writer
 import pytest
@@ -81,7 +80,7 @@ def test_a_file_without_an_index_is_put_in_order_within_a_window(
 
 
 def test_what_is_without_an_index_is_held_for_a_window_only(tmp_path):
-    second = in_time.WINDOW
+    second = WINDOW
     times = [3 * second, second, 9 * second, 10 * second + 1, 9 * second + 2]
     write(tmp_path / 'plain.mcap', [('/a', time) for time in times], use_chunking=False)
     found = [m.log_time for m in TimeOrder(read_bag(tmp_path / 'plain.mcap')).messages()]
@@ -142,6 +141,6 @@ def test_a_bag_whose_chunks_all_overlap_does_not_fill_memory(tmp_path, monkeypat
     write(tmp_path / 'a.mcap', [('/a', 1), ('/a', 9)] * 250, 64, CompressionType.NONE, **options)
     order = TimeOrder(read_bag(tmp_path / 'a.mcap'))
     assert len(list(order.messages())) == 500
-    monkeypatch.setattr('linkage_ros.bag.reading.in_time.MOST_HELD', 100_000)
+    monkeypatch.setattr('linkage_ros.bag.order.MOST_HELD', 100_000)
     with pytest.raises(BagError, match='more than 100,000 bytes of its messages are not in'):
         list(order.messages())

@@ -24,7 +24,7 @@ from campaigns.damage import judge as judge_module
 from campaigns.damage.judge import FAULT, judge_reading, judge_salvage
 from campaigns.damage.run import JUDGES, parts, run, Tally
 from campaigns.damage.subject import KILLED, KINDS, make
-from linkage_ros.bag.reading.reader import Bag, BagMessage
+from linkage_ros.bag.reader import Bag, BagMessage
 import pytest
 
 SEED = 20261121

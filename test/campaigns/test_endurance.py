@@ -27,9 +27,9 @@ from campaigns.endurance import over_dds
 from campaigns.endurance.accelerated import Plan, run_all
 from campaigns.endurance.account import shortcomings
 from campaigns.endurance.memory import flatness, MOST_GROWTH, Usage, usage
-from linkage_ros.bag.account import Account
+from linkage_ros.bag.recording_stats import Account
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 import pytest
 
 MINUTES = 15.0 / 60.0  # h

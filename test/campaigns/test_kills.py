@@ -27,9 +27,9 @@ from campaigns.kills.marks import Marks
 from campaigns.kills.plan import message, PERIOD_NS, Phase, Plan, plans, TOPICS
 from campaigns.kills.run import run
 from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reading.reader import Bag, BagMessage
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 import pytest
 
 SEED = 20261121

@@ -32,8 +32,8 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.bag.reading.reader import RUN_FILE
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import RUN_FILE
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import export, table_files
 from linkage_ros.cli.message_values import JOINT_STATE, MessageValues, TRAJECTORY, WRENCHES
 from linkage_ros.errors import LinkageError

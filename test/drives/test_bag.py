@@ -23,7 +23,7 @@ from math import inf, nan
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.drives.bag import BagParameters, build
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.drives.topic import TopicDrive, TopicParameters

@@ -25,9 +25,9 @@ from pathlib import Path
 import subprocess
 import sys
 
-from linkage_ros.bag.reading.reader import RUN_FILE
+from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cdr import time_message
 from linkage_ros.cli.violations import violations
 from linkage_ros.effects.own import FUNCTIONS

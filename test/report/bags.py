@@ -24,8 +24,8 @@ from math import acos, cos, nan, pi, sin
 from pathlib import Path
 from struct import unpack_from
 
-from linkage_ros.bag.reading.reader import RUN_FILE
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import RUN_FILE
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cdr import time_message
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.scene.load import load_scene

@@ -20,11 +20,11 @@ from dataclasses import replace
 import json
 from threading import Event
 
-from linkage_ros.bag.reading.contents import Contents
-from linkage_ros.bag.reading.reader import BagMessage
-from linkage_ros.bag.reading.run_events import run_account
+from linkage_ros.bag.contents import Contents
+from linkage_ros.bag.reader import BagMessage
+from linkage_ros.bag.run_events import run_account
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter

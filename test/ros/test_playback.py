@@ -19,8 +19,8 @@ from __future__ import annotations
 
 from threading import Event
 
-from linkage_ros.bag.reading.in_time import TimeOrder
-from linkage_ros.bag.reading.reader import BagMessage
+from linkage_ros.bag.order import TimeOrder
+from linkage_ros.bag.reader import BagMessage
 from linkage_ros.errors import BagError, LinkageError
 from linkage_ros.ros.cues import Cue, cues, Part, read_ahead
 from linkage_ros.ros.playback import LATE, Playback, Ticks

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.reading.run_events import CHOSEN, run_account
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.run_events import CHOSEN, run_account
 from linkage_ros.cli.violations import violations
 from linkage_ros.errors import FileError
 from linkage_ros.joint_state import JointStateWriter

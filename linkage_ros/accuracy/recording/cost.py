@@ -30,8 +30,8 @@ from typing import NamedTuple
 
 from linkage_ros.accuracy.recording.recorded_run import record_run, Recorded
 from linkage_ros.accuracy.spread import Spread, spread_of
-from linkage_ros.bag.writing.packing import compression_type
-from linkage_ros.bag.writing.storage import COMPRESSIONS, FLUSH_AFTER, NONE, Storage
+from linkage_ros.bag.bag_file import compression_type
+from linkage_ros.bag.storage import COMPRESSIONS, FLUSH_AFTER, NONE, Storage
 from linkage_ros.errors import RecordingError
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene

@@ -24,7 +24,7 @@ from linkage_ros.accuracy.recording.cost import Cost, measure_costs, settings
 from linkage_ros.accuracy.recording.recorded_run import FASTEST
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
 from linkage_ros.accuracy.spread import Spread
-from linkage_ros.bag.writing.storage import COMPRESSIONS, NONE
+from linkage_ros.bag.storage import COMPRESSIONS, NONE
 from linkage_ros.scene.scene import Scene
 
 FLUSH_PERIODS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)

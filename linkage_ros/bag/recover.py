@@ -19,27 +19,270 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import os
 from pathlib import Path
 import shutil
-from typing import Any
+from typing import Any, NamedTuple
 
-from linkage_ros.bag.account import UNFINISHED
-from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reading.being_written import is_being_written
-from linkage_ros.bag.reading.folder import (
+from linkage_ros import __version__
+from linkage_ros.bag.disk import CHUNK_SIZE
+from linkage_ros.bag.mcap_records import Definitions, Found, Message, Source
+from linkage_ros.bag.metadata import (
+    BagSummary,
+    METADATA_FILE,
+    metadata_text,
+    NO_START,
+    sync_folder,
+    write_metadata,
+)
+from linkage_ros.bag.reader import (
     by_number,
     custom_of,
     files_of,
     information_of,
+    is_being_written,
+    serialized_metadata,
+    topic_of,
     unreadable,
 )
-from linkage_ros.bag.reading.records import Message, Source
-from linkage_ros.bag.recovering.new_bag import NewBag
-from linkage_ros.bag.recovering.recovery import promised_counts, RECOVERED, Recovery, TopicRecovery
-from linkage_ros.bag.recovering.salvage import BEGINNING, Loss, Salvage
+from linkage_ros.bag.recording_stats import UNFINISHED
+from linkage_ros.bag.salvage import BEGINNING, Loss, Salvage
+from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError, quoted, RecordingError
+from mcap.exceptions import UnsupportedCompressionError
+from mcap.records import Attachment, Channel
+from mcap.writer import CompressionType, Writer
+
+RECOVERED = 'linkage_ros.recovered'
+"""Key in the ``custom_data`` of a recovered bag: what it was made of, and what was lost."""
+
+
+NOTHING_LOST = 'nothing lost'
+"""How that text ends where it is so."""
+
+
+class TopicRecovery(NamedTuple):
+    """How many messages of a topic were saved, and how many there were; None if unknown."""
+
+    name: str
+    saved: int
+    promised: int | None
+
+
+class Recovery(NamedTuple):
+    """
+    What became of a damaged bag.
+
+    Attributes
+    ----------
+    folder
+        The new bag.
+    topics
+        What was saved of each, and what was to be there.
+    attachments
+        Names of those that were saved.
+    losses
+        What is lost, with the name of its file.
+    repaired
+        What was damaged or missing and cost nothing, each on a line.
+    remarks
+        What else one has to know, each on a line.
+
+    """
+
+    folder: Path
+    topics: tuple[TopicRecovery, ...]
+    attachments: tuple[str, ...]
+    losses: tuple[tuple[str, Loss], ...]
+    repaired: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def missing(self) -> int:
+        """Return how many messages were promised and are not there."""
+        return sum(max((topic.promised or 0) - topic.saved, 0) for topic in self.topics)
+
+    @property
+    def whole(self) -> bool:
+        """Return whether nothing was lost."""
+        return not self.losses and not self.missing
+
+    def in_short(self, path: Path) -> str:
+        """Return in a line what became of the bag of this name."""
+        saved = sum(topic.saved for topic in self.topics)
+        lost = NOTHING_LOST
+        if not self.whole:
+            size = sum(loss.end - loss.start for _, loss in self.losses)
+            lost = f'{size} bytes lost in {len(self.losses)} places'
+        return f'from {path.absolute().name}: {saved} messages, {lost}'
+
+
+def promised_counts(information: Mapping[str, Any]) -> dict[str, int]:
+    """Return how many messages of each topic ``metadata.yaml`` promises, if it does."""
+    counts = {}
+    try:
+        for each in information['topics_with_message_count']:
+            counts[str(each['topic_metadata']['name'])] = int(each['message_count'])
+    except Exception:  # noqa: BLE001 (it may say anything)
+        return {}
+    return counts if any(counts.values()) else {}
+
+
+MOST_CHANNELS = 10_000
+"""How many channels a new bag may have: its metadata, 700 bytes for each, must stay readable."""
+
+_COMPRESSIONS = {'lz4': CompressionType.LZ4, 'zstd': CompressionType.ZSTD}
+
+
+class NewBag:
+    """
+    A new bag, open for writing.
+
+    Parameters
+    ----------
+    folder
+        Where it goes; it is there, and empty.
+    profile
+        The profile of its file: 'ros2'.
+    compression
+        How its chunks are packed: '', 'lz4' or 'zstd'.
+
+    Attributes
+    ----------
+    counts
+        Messages by topic.
+    attachments
+        Content by name.
+    information
+        What rosbag2 wrote of itself into the file that this is made of.
+
+    Raises
+    ------
+    OSError
+        As the system gives it, here and from all that writes.
+    BagError
+        From `add` and `describe`: there are more than `MOST_CHANNELS`.
+
+    """
+
+    def __init__(self, folder: Path, profile: str, compression: str) -> None:
+        self.counts: Counter[str] = Counter()
+        self.attachments: dict[str, bytes] = {}
+        self.information: Mapping[str, Any] = {}
+        self._folder = folder
+        self._topics: dict[str, Topic] = {}
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._channels: dict[tuple[object, ...], int] = {}
+        self._numbers: dict[int, int] = {}
+        self._start, self._end = NO_START, 0
+        self._file = (folder / f'{folder.name}_0.mcap').open('xb')
+        packing = _COMPRESSIONS.get(compression, CompressionType.NONE)
+        try:
+            self._mcap = Writer(self._file, chunk_size=CHUNK_SIZE, compression=packing)
+        except UnsupportedCompressionError:
+            self._mcap = Writer(
+                self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.NONE
+            )
+        self._mcap.start(profile=profile, library=f'linkage_ros {__version__}')
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Return the names of its topics."""
+        return tuple(self._topics)
+
+    def begin_file(self) -> None:
+        """Forget the numbers of channels: they are those of a file."""
+        self._numbers.clear()
+
+    def add(self, found: Found, definitions: Definitions) -> None:
+        """Add what was found in a file, of which these schemas and channels are known."""
+        if isinstance(found, Message):
+            if not self._numbers:
+                self.describe(definitions)
+            number = self._numbers.get(found.channel.id)
+            if number is None:
+                # Not all that are known by now: of thousands, each comes with its first message.
+                number = self._number_of(found.channel, definitions)
+                self._numbers[found.channel.id] = number
+            self._mcap.add_message(
+                number, found.log_time, found.data, found.publish_time, found.sequence
+            )
+            self.counts[found.channel.topic] += 1
+            self._start = min(self._start, found.log_time)
+            self._end = max(self._end, found.log_time)
+        elif isinstance(found, Attachment):
+            # Files of one bag repeat them.
+            if self.attachments.get(found.name) != found.data:
+                self.attachments.setdefault(found.name, found.data)
+                self._mcap.add_attachment(
+                    found.create_time, found.log_time, found.name, found.media_type, found.data
+                )
+        elif found.name != 'rosbag2':
+            self._mcap.add_metadata(found.name, found.metadata)
+        else:
+            self.information = serialized_metadata(found)
+
+    def describe(self, definitions: Definitions) -> None:
+        """Take over all channels, those without a message too."""
+        for channel in definitions.channels.values():
+            if channel.id not in self._numbers:
+                self._numbers[channel.id] = self._number_of(channel, definitions)
+
+    def close(self, custom: Mapping[str, str]) -> BagSummary:
+        """Finish the bag, and return what it holds."""
+        summary = self._summary()
+        text = metadata_text(summary, custom, root=False)
+        self._mcap.add_metadata('rosbag2', {'serialized_metadata': text})
+        self._mcap.finish()  # type: ignore[no-untyped-call]
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        summary = self._summary()
+        self._file.close()
+        write_metadata(summary, custom)
+        sync_folder(self._folder.absolute().parent)
+        return summary
+
+    def abandon(self) -> None:
+        """Let go of the file; what is in it is of no use."""
+        with suppress(OSError):
+            self._file.close()
+
+    def _number_of(self, channel: Channel, definitions: Definitions) -> int:
+        """Return the number that a channel has here, the same for the same one of each file."""
+        schema = definitions.schema_of(channel)
+        kind = (schema.name, schema.encoding, schema.data) if schema else None
+        described = (channel.topic, channel.message_encoding, kind, *channel.metadata.items())
+        if described not in self._channels:
+            if len(self._channels) == MOST_CHANNELS:
+                raise BagError(
+                    self._folder,
+                    f'would hold more than {MOST_CHANNELS:,} channels; no more are recovered',
+                    'no ROS graph has as many: ask who made the bag',
+                )
+            number = 0
+            if kind is not None:
+                if kind not in self._schemas:
+                    self._schemas[kind] = self._mcap.register_schema(*kind)
+                number = self._schemas[kind]
+            self._channels[described] = self._mcap.register_channel(
+                channel.topic, channel.message_encoding, number, channel.metadata
+            )
+            self._topics.setdefault(channel.topic, topic_of(channel, schema))
+        return self._channels[described]
+
+    def _summary(self) -> BagSummary:
+        return BagSummary(
+            folder=self._folder,
+            file=Path(self._file.name).name,
+            topics=tuple(self._topics.values()),
+            counts=tuple(self.counts[name] for name in self._topics),
+            refused=(0,) * len(self._topics),
+            start=self._start,
+            duration=max(0, self._end - self._start),
+            size=self._file.tell(),
+        )
+
 
 Told = Callable[[int, int], None]
 Stopped = Callable[[], bool]

@@ -19,9 +19,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 import json
+import re
 from typing import Any, NamedTuple
 
-from linkage_ros.bag.reading.reader import Bag, BagMessage, RUN_FILE
+from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
+from linkage_ros.bag.recording_stats import counts_in
 from linkage_ros.errors import BagError
 
 BEGUN, MID_RUN, WITH_THE_RUN = 'begun', 'mid-run', 'with the run'
@@ -265,3 +267,30 @@ def recorded_events(
     if open_tick is not None:
         log, time, made = open_tick
         yield Made(log, time, tuple(made))
+
+
+_NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')
+
+
+def lost_beginning(bag: Bag, run: RunAccount) -> str:
+    """
+    Return in words why the first messages of a run are not in its bag; '' where they are.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+    run
+        What the run says of itself in it.
+
+    """
+    let_go = sum(counts_in(bag.custom, 'let_go').values())
+    if let_go:
+        return f'its first {let_go} messages have made way for newer ones'
+    if run.begun == MID_RUN:
+        return 'begun in mid-run'
+    first = bag.files[0].name
+    number = _NUMBER.search(first)
+    if number and int(number[1]):
+        return f'begins with {first}, which is not the first file of its recording'
+    return ''

@@ -27,25 +27,69 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 import threading
 import time
 
-from linkage_ros.bag.account import Account
 from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.writing.handover import (
-    BATCH,
-    in_places,
-    NAP,
-    Offered,
-    PLACE,
-    POLL,
-    ROOM_POLL,
-    Tally,
-)
-from linkage_ros.bag.writing.storage import FLUSH_AFTER
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.recording_stats import Account
+from linkage_ros.bag.storage import FLUSH_AFTER
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
+
+POLL = 0.02
+"""How often a thread looks for what was offered, in [s]."""
+
+ROOM_POLL = 1.0
+"""How often a recorder looks whether a disk that was full has room again, in [s]."""
+
+BATCH, NAP = 50, 50e-6
+"""
+Messages between two naps of a thread, about 0.3 ms of work, and the nap [s].
+
+It is not 0: with a nap of 0 the thread often takes the interpreter back before a waiting tick
+wakes up.
+"""
+
+
+PLACE = 16 * 1024
+"""
+How large a message may be that takes one place in a queue [bytes]; a larger one takes more.
+
+So a bound on the places is one on the bytes too, at most one message more for each thread that
+offers. To count bytes, these threads would need a lock, and a tick would wait for it.
+"""
+
+Offered = tuple[int, int, int, bytes]
+"""A message on its way: topic, log time, publish time [ns] and its CDR bytes."""
+
+
+def in_places(message: Offered) -> tuple[Offered | None, ...]:
+    """Return a message and, for each further `PLACE` that it fills, None; data is not copied."""
+    return message, *(None,) * (len(message[3]) // PLACE)
+
+
+class Tally:
+    """
+    A counter that several threads count up without a lock.
+
+    Stepping an `itertools.count` is one C call, which threads cannot tear apart as they can
+    ``n += 1``. It can only be read by stepping it, so the steps made for reading are taken off.
+    """
+
+    __slots__ = ('_reading', '_readings', 'add')
+
+    def __init__(self) -> None:
+        self.add = count().__next__
+        self._readings = 0
+        self._reading = threading.Lock()
+
+    def value(self) -> int:
+        with self._reading:
+            steps = self.add() - self._readings
+            self._readings += 1
+            return steps
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+
 """
 A bag's file on a disk that may fill: whole records, room for the index, and an end that fits.
 

@@ -30,20 +30,18 @@ from pathlib import Path
 import time
 from typing import NoReturn
 
-from linkage_ros.bag.account import (
+from linkage_ros.bag.bag_file import BagFile, channels_file, compression_type
+from linkage_ros.bag.disk import FIRST_RESERVE, LostError, NO_ROOM, Reserve
+from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_metadata
+from linkage_ros.bag.recording_stats import (
     Account,
     custom_data,
     FAILURE,
     last_records,
     UNFINISHED_DATA,
 )
-from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_metadata
+from linkage_ros.bag.storage import scarcity, Storage
 from linkage_ros.bag.topic import CHANNELS_FILE, Topic
-from linkage_ros.bag.writing.bag_file import BagFile
-from linkage_ros.bag.writing.channels import channels_file
-from linkage_ros.bag.writing.disk import FIRST_RESERVE, LostError, NO_ROOM, Reserve
-from linkage_ros.bag.writing.packing import compression_type
-from linkage_ros.bag.writing.storage import scarcity, Storage
 from linkage_ros.errors import RecordingError
 
 _MAKE_ROOM = 'make room there'
@@ -105,6 +103,7 @@ class BagWriter:
         self.folder = Path(folder)
         self.topics = tuple(topics)
         self.storage = storage or Storage()
+        self._compression = compression_type(self.storage.compression, self.folder)
         self.let_go = (0,) * len(self.topics)
         self.account: Callable[[BagSummary], Account | None] = lambda summary: None
         channels = 'application/mcap', channels_file(self.topics)
@@ -124,7 +123,6 @@ class BagWriter:
         self.out_of_room = False
         self._failure: RecordingError | None = None
         self._said: dict[str, str] = {}  # of failures, in the metadata
-        self._compression = compression_type(self.storage.compression, self.folder)
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError:

@@ -24,21 +24,90 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
+from io import BytesIO
 from pathlib import Path
 import time
 from typing import cast, IO
 
-from linkage_ros.bag.metadata import BagSummary, NO_START
+from linkage_ros import __version__
+from linkage_ros.bag.disk import CHUNK_SIZE, FIRST_RESERVE, RecordFile, Reserve
+from linkage_ros.bag.metadata import BagSummary, NO_START, qos_text
+from linkage_ros.bag.storage import NONE
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.channels import register, start
-from linkage_ros.bag.writing.disk import (
-    CHUNK_SIZE,
-    FIRST_RESERVE,
-    RecordFile,
-    Reserve,
-)
+from linkage_ros.errors import RecordingError
+from mcap.exceptions import UnsupportedCompressionError
 from mcap.records import Statistics
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType, IndexType, Writer
+
+_TYPES: Mapping[str, CompressionType] = {
+    NONE: CompressionType.NONE,
+    'lz4': CompressionType.LZ4,
+    'zstd': CompressionType.ZSTD,
+}
+_LIBRARIES = {'lz4': 'lz4', 'zstd': 'zstandard'}
+
+
+def compression_type(name: str, folder: Path) -> CompressionType:
+    """
+    Return mcap's compression of a name.
+
+    Raises
+    ------
+    RecordingError
+        Its library is missing here; ``folder`` is what was to be recorded to.
+
+    """
+    kind = _TYPES[name]
+    try:
+        Writer(BytesIO(), compression=kind)
+    except UnsupportedCompressionError:
+        library = _LIBRARIES[name]
+        raise RecordingError(
+            folder,
+            f'cannot be packed with {name}: the Python package {library} is missing',
+            f'install {library}, or set record.compression: {NONE}',
+        ) from None
+    return kind
+
+
+def start(mcap: Writer) -> None:
+    """Begin a file, as all of ours begin."""
+    mcap.start(profile='ros2', library=f'linkage_ros {__version__}')
+
+
+def register(mcap: Writer, topics: Sequence[Topic]) -> list[int]:
+    """Tell a writer of topics; return their channels' numbers, the same for the same topics."""
+    schemas: dict[str, int] = {}
+    channels = []
+    for topic in topics:
+        if topic.type not in schemas:
+            definition = topic.definition.encode()
+            schemas[topic.type] = mcap.register_schema(topic.type, 'ros2msg', definition)
+        description = {
+            'offered_qos_profiles': qos_text(topic.qos),
+            'topic_type_hash': topic.type_hash,
+        }
+        channels.append(mcap.register_channel(topic.name, 'cdr', schemas[topic.type], description))
+    return channels
+
+
+def channels_file(topics: Sequence[Topic]) -> bytes:
+    """Return an MCAP file that has these topics, and no messages."""
+    file = BytesIO()
+    mcap = Writer(
+        file,
+        compression=CompressionType.NONE,
+        index_types=IndexType.NONE,
+        repeat_channels=False,
+        repeat_schemas=False,
+        use_chunking=False,
+        use_statistics=False,
+        use_summary_offsets=False,
+    )
+    start(mcap)
+    register(mcap, topics)
+    mcap.finish()  # type: ignore[no-untyped-call]
+    return file.getvalue()
 
 
 class BagFile:

@@ -31,11 +31,17 @@ from itertools import count
 from operator import attrgetter
 from pathlib import Path
 
-from linkage_ros.bag.reading.compression import DamagedError
-from linkage_ros.bag.reading.file_index import FileIndex, index_of
-from linkage_ros.bag.reading.folder import unreadable
-from linkage_ros.bag.reading.reader import Bag, BagMessage
-from linkage_ros.bag.reading.records import chunk_at, content_of, Definitions, messages_in, Source
+from linkage_ros.bag.mcap_records import (
+    chunk_at,
+    content_of,
+    DamagedError,
+    Definitions,
+    FileIndex,
+    index_of,
+    messages_in,
+    Source,
+)
+from linkage_ros.bag.reader import Bag, BagMessage, unreadable
 from linkage_ros.errors import BagError
 
 WINDOW = 1_000_000_000
