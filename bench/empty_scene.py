@@ -31,7 +31,7 @@ from math import atan2, cos, isclose, sin, sqrt
 from bench.in_turn import compare, in_turn
 from bench.processes import BenchError, ROOT
 from bench.report import Table
-from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
+from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 

@@ -40,9 +40,9 @@ from linkage_ros.bag.run_events import (
     Taken,
     VERSIONS,
 )
-from linkage_ros.cdr import text_of, TIME_END
 from linkage_ros.errors import BagError, listed
-from linkage_ros.joint_state import OwnJointStates
+from linkage_ros.messages.joint_state import OwnJointStates
+from linkage_ros.messages.single_values import text_of, TIME_END
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Look, Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest

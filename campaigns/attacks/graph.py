@@ -38,8 +38,8 @@ import time
 from typing import Any
 
 from bench.processes import BenchError, Graph
-from linkage_ros.joint_state import JointStateReader, JointStateWriter
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 from linkage_ros.shipped import shipped

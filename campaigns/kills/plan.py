@@ -25,7 +25,7 @@ from typing import NamedTuple
 from linkage_ros.bag.reader import BagMessage
 from linkage_ros.bag.storage import COMPRESSIONS, Storage
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 
 PERIOD_NS = 1_000_000
 """Of the ticks: 1 kHz."""

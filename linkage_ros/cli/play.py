@@ -36,7 +36,7 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.progress import progress, Told
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
-from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.ros.bag_publishers import offer
 from linkage_ros.ros.cues import Part
 from linkage_ros.ros.playback import LATE, Playback

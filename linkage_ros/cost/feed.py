@@ -20,9 +20,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from math import cos, sin, tau
 
-from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import usual_inputs, Way
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 

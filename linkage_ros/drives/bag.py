@@ -33,7 +33,7 @@ from linkage_ros.drives.bag_samples import read_samples, Samples
 from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import DefinitionError
-from linkage_ros.joint_state import CrankSample
+from linkage_ros.messages.joint_state import CrankSample
 from linkage_ros.parameters import choice, file, flag, number, text
 
 

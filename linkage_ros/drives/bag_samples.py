@@ -29,7 +29,7 @@ from linkage_ros.bag.reader import Bag
 from linkage_ros.bag.run_events import run_said
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import BagError, listed
-from linkage_ros.joint_state import JointStateReader, Rejection
+from linkage_ros.messages.joint_state import JointStateReader, Rejection
 
 _TYPE = 'sensor_msgs/msg/JointState'
 

@@ -25,9 +25,9 @@ from threading import Event
 from time import monotonic
 
 from linkage_ros.bag.order import TimeOrder
-from linkage_ros.cdr import TIME_END, time_message
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages.single_values import TIME_END, time_message
 from linkage_ros.ros.cues import cues, Part, read_ahead
 from linkage_ros.ros.playback import Playback, SteadyClock, Ticks
 from linkage_ros.ros.transports import leave_out_shared_memory

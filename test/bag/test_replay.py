@@ -27,7 +27,7 @@ from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import recorded_scene, replay
 import pytest

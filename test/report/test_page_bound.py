@@ -27,8 +27,8 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.page.document import plotting_library
 from linkage_ros.replay import recorded_scene
 from linkage_ros.report.blocks import Blocks, Progress

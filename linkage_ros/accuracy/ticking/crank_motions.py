@@ -21,9 +21,9 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from linkage_ros.drives.chirp import Chirp, curve
-from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import usual_inputs, Way
+from linkage_ros.messages.layout import NANOSECONDS
 
 CHIRP, ACCELERATION = 'chirp', 'constant acceleration'
 

@@ -26,12 +26,11 @@ a joint which follows from others has none is known.
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from struct import Struct
-from typing import NamedTuple
+from collections.abc import Callable, Collection
+from typing import Any, NamedTuple
 
-from linkage_ros.cdr import STAMP_END
-from linkage_ros.joint_state import arrays_of, NANOSECONDS, Rejection
+from linkage_ros.messages.joint_state import arrays_of, Rejection
+from linkage_ros.messages.layout import NANOSECONDS, Pattern, pattern
 
 
 class EffortCommand(NamedTuple):
@@ -51,15 +50,6 @@ class EffortCommand(NamedTuple):
     effort: float
 
 
-class _Layout(NamedTuple):
-    """Where things stand in a message; two messages of one publisher have the same layout."""
-
-    size: int
-    fields: Struct
-    """Encapsulation, stamp, all up to the positions, and counts of rates and efforts; effort."""
-    fixed: tuple[bytes, bytes, int, int]
-
-
 class JointEffortReader:
     """
     Reads the effort of a joint out of serialized messages.
@@ -73,52 +63,40 @@ class JointEffortReader:
 
     """
 
-    __slots__ = ('_dependent', '_joint', '_layout')
+    __slots__ = ('_dependent', '_joint', '_known')
 
     def __init__(self, joint: str, dependent: Collection[str] = ()) -> None:
         self._joint = joint.encode()
         self._dependent = frozenset(name.encode() for name in dependent)
-        self._layout: _Layout | None = None
+        self._known: tuple[int, Callable[[bytes], tuple[Any, ...]], tuple[Any, ...]] | None = None
 
     def read(self, data: bytes) -> EffortCommand | Rejection:
         """Return the command for the joint, or why there is none."""
-        layout = self._layout
-        if layout is not None:
-            size, fields, fixed = layout
+        if self._known is not None:
+            size, unpack_from, fixed = self._known
             if len(data) >= size:
-                order, seconds, nanoseconds, names, rates, efforts, effort = fields.unpack_from(
-                    data
-                )
+                order, seconds, nanoseconds, names, rates, efforts, effort = unpack_from(data)
                 if (order, names, rates, efforts) == fixed:
                     return EffortCommand(seconds * NANOSECONDS + nanoseconds, effort)
-        found = _find(data, self._joint, self._dependent)
+        found = _pattern(data, self._joint, self._dependent)
         if isinstance(found, Rejection):
             return found
-        self._layout = found
+        self._known = found.size, found.unpack_from, found.fixed
         return self.read(data)
 
 
-def _find(data: bytes, joint: bytes, dependent: Collection[bytes]) -> _Layout | Rejection:
+def _pattern(data: bytes, joint: bytes, dependent: Collection[bytes]) -> Pattern | Rejection:
     found = arrays_of(data)
     if isinstance(found, Rejection):
         return found
-    order, names, arrays = found
-    (position_at, n_positions, _), (rate_at, n_rates, _), (effort_at, n_efforts, efforts) = arrays
-    if not n_efforts:
+    _, names, arrays = found
+    efforts = arrays[-1]
+    if not efforts.length:
         return Rejection.NO_EFFORT
     able = [name for name in names if name not in dependent]
-    if not {n_positions, n_rates, n_efforts} <= {0, len(able), len(names)}:
+    if not {array.length for array in arrays} <= {0, len(able), len(names)}:
         return Rejection.UNEQUAL
     if names.count(joint) != 1:
         return Rejection.TWICE if joint in names else Rejection.MISSING
-    named = position_at + 4  # with the count of the positions
-    commanded = names if n_efforts == len(names) else able
-    effort = efforts + 8 * commanded.index(joint)
-    return _Layout(
-        size=efforts + 8 * n_efforts,
-        fields=Struct(
-            f'{order}2s2xiI{named - STAMP_END}s{rate_at - named}xI'
-            f'{effort_at - rate_at - 4}xI{effort - effort_at - 4}xd'
-        ),
-        fixed=(data[:2], data[STAMP_END:named], n_rates, n_efforts),
-    )
+    commanded = names if efforts.length == len(names) else able
+    return pattern(data, arrays, [[efforts.first + 8 * commanded.index(joint)]])

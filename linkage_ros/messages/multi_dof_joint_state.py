@@ -24,10 +24,13 @@ wrench[]; of a wrench: force (x, y, z), torque (x, y, z). An array that does not
 from __future__ import annotations
 
 from collections.abc import Sequence
-from struct import Struct
 
-from linkage_ros.cdr import ENCAPSULATION, head_of_joints
-from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.messages.layout import declared, NANOSECONDS, packed, packing, parsed
+
+MULTI_DOF_JOINT_STATE = declared(
+    'Time stamp, string frame_id, string[] joint_names, '
+    'Transform[] transforms, Twist[] twist, Wrench[] wrench'
+)
 
 
 class PlanarWrenchWriter:
@@ -41,12 +44,14 @@ class PlanarWrenchWriter:
 
     """
 
-    __slots__ = ('_head', '_layout')
+    __slots__ = ('_constants', '_pack')
 
     def __init__(self, names: Sequence[str]) -> None:
-        self._head = head_of_joints(names, 0, 0, len(names))
+        values = {'joint_names': names, 'wrench': [(0.0,) * 6] * len(names)}
+        message = packed(MULTI_DOF_JOINT_STATE, values)
+        wrenches = parsed(message, MULTI_DOF_JOINT_STATE)['wrench']
         # Of each wrench force z and torque x, y are zeros, which stand between the moving numbers.
-        self._layout = Struct(f'<4siI{len(self._head)}s{"dd24xd" * len(names)}')
+        self._pack, self._constants = packing(message, [(wrenches.first, 'dd24xd' * len(names))])
 
     def write(self, stamp: int, wrenches: Sequence[tuple[float, float, float]]) -> bytes:
         """
@@ -64,4 +69,5 @@ class PlanarWrenchWriter:
         numbers: tuple[float, ...] = ()
         for wrench in wrenches:
             numbers += wrench
-        return self._layout.pack(ENCAPSULATION, seconds, nanoseconds, self._head, *numbers)
+        encapsulation, head = self._constants
+        return self._pack(encapsulation, seconds, nanoseconds, head, *numbers)

@@ -25,10 +25,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from math import cos, sin
 from struct import Struct
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from linkage_ros.cdr import aligned, ENCAPSULATION
-from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.messages.layout import declared, NANOSECONDS, Numbers, packed, parsed
 
 ARROW, LINE_STRIP, LINE_LIST, SPHERE_LIST = 0, 4, 5, 7
 TEXT_VIEW_FACING, TRIANGLE_LIST = 9, 11
@@ -86,22 +85,38 @@ class Marker(NamedTuple):
 
 _COUNT = Struct('<I')
 _STAMP = Struct('<iI')
-_KIND = Struct('<iii')
-_PLACE = Struct('<3d')
-_POSE = Struct('<7d')
 _COLOUR = Struct('<4f')
-_XY = Struct('<2d')
-_TURN = Struct('<2d')
+_XY = _TURN = Struct('<2d')
+
+_MARKER_ARRAY = declared(
+    'Marker[] markers',
+    Marker=declared(
+        'Time stamp, string frame_id, string ns, int32 id, int32 type, int32 action, Pose pose, '
+        'Vector3 scale, ColorRGBA color, Duration lifetime, bool frame_locked, Point[] points, '
+        'ColorRGBA[] colors, string texture_resource, CompressedImage texture, '
+        'UVCoordinate[] uv_coordinates, string text, string mesh_resource, MeshFile mesh_file, '
+        'bool mesh_use_embedded_materials',
+        CompressedImage=declared('Time stamp, string frame_id, string format, uint8[] data'),
+        MeshFile=declared('string filename, uint8[] data'),
+    ),
+)
 
 
-class _Where(NamedTuple):
-    """Where the fields of a marker stand that change."""
-
-    stamp: int
-    action: int
-    pose: int
-    colour: int
-    points: int
+def _values(frame: str, marker: Marker) -> dict[str, Any]:
+    """Return the fields of a marker that are neither zero nor empty."""
+    return {
+        'frame_id': frame,
+        'ns': marker.ns,
+        'id': marker.number,
+        'type': marker.kind,
+        'action': marker.action,
+        'pose': (marker.at.real, marker.at.imag, marker.z, 0.0, 0.0, 0.0, 1.0),
+        'scale': marker.scale,
+        'color': marker.colour,
+        'lifetime': divmod(marker.lifetime, NANOSECONDS),
+        'points': marker.points,
+        'text': marker.text,
+    }
 
 
 class MarkerArrayWriter:
@@ -122,86 +137,37 @@ class MarkerArrayWriter:
     __slots__ = ('_buffer', '_where')
 
     def __init__(self, frame: str, markers: Sequence[Marker]) -> None:
-        packed = _Packed()
-        packed.count(len(markers))
-        self._where = tuple(packed.marker(frame, marker) for marker in markers)
-        self._buffer = packed.data
+        message = packed(_MARKER_ARRAY, {'markers': [_values(frame, one) for one in markers]})
+        self._buffer = bytearray(message)
+        self._where = [
+            {name: field.first for name, field in marker.items() if isinstance(field, Numbers)}
+            for marker in parsed(message, _MARKER_ARRAY)['markers']
+        ]
 
     def message(self, stamp: int) -> bytes:
         """Return the message of a state at a time in [ns]."""
         time = divmod(stamp, NANOSECONDS)
         for where in self._where:
-            _STAMP.pack_into(self._buffer, where[0], *time)
+            _STAMP.pack_into(self._buffer, where['stamp'], *time)
         return bytes(self._buffer)
 
     def show(self, number: int, shown: bool) -> None:
         """Add a marker, or delete it."""
-        _COUNT.pack_into(self._buffer, self._where[number][1], ADD if shown else DELETE)
+        _COUNT.pack_into(self._buffer, self._where[number]['action'], ADD if shown else DELETE)
 
     def place(self, number: int, place: complex, angle: float) -> None:
         """Move a marker's frame to a place in [m], turned by an angle in [rad]."""
-        at = self._where[number][2]
+        at = self._where[number]['pose']
         _XY.pack_into(self._buffer, at, place.real, place.imag)
         _TURN.pack_into(self._buffer, at + 40, sin(0.5 * angle), cos(0.5 * angle))
 
     def paint(self, number: int, colour: Colour) -> None:
         """Give a marker another colour."""
-        _COLOUR.pack_into(self._buffer, self._where[number][3], *colour)
+        _COLOUR.pack_into(self._buffer, self._where[number]['color'], *colour)
 
     def draw(self, number: int, places: Iterable[complex]) -> None:
         """Move the points of a marker, which stay as many, to places in its frame, in [m]."""
-        at = self._where[number][4]
+        at = self._where[number]['points']
         for place in places:
             _XY.pack_into(self._buffer, at, place.real, place.imag)
             at += 24
-
-
-class _Packed:
-    """Bytes to which fields are added, each at a multiple of its size."""
-
-    def __init__(self) -> None:
-        self.data = bytearray(ENCAPSULATION)
-
-    def _add(self, fields: Struct, size: int, *values: float) -> int:
-        """Return where the values stand."""
-        self.data.extend(bytes(aligned(len(self.data), size) - len(self.data)))
-        at = len(self.data)
-        self.data.extend(fields.pack(*values))
-        return at
-
-    def count(self, number: int) -> int:
-        return self._add(_COUNT, 4, number)
-
-    def _text(self, text: str) -> None:
-        data = text.encode() + b'\0'
-        self.count(len(data))
-        self.data.extend(data)
-
-    def marker(self, frame: str, marker: Marker) -> _Where:
-        stamp = self._add(_STAMP, 4, 0, 0)
-        self._text(frame)
-        self._text(marker.ns)
-        kind = self._add(_KIND, 4, marker.number, marker.kind, marker.action)
-        x, y = marker.at.real, marker.at.imag
-        pose = self._add(_POSE, 8, x, y, marker.z, 0.0, 0.0, 0.0, 1.0)
-        self._add(_PLACE, 8, *marker.scale)
-        colour = self._add(_COLOUR, 4, *marker.colour)
-        self._add(_STAMP, 4, *divmod(marker.lifetime, NANOSECONDS))
-        self.data.append(0)  # frame_locked
-        points = self.count(len(marker.points)) + 4
-        points = aligned(points, 8) if marker.points else points
-        for point in marker.points:
-            self._add(_PLACE, 8, *point)
-        self.count(0)  # colors
-        self._text('')  # texture_resource
-        self._add(_STAMP, 4, 0, 0)
-        for _ in range(2):  # frame_id and format of the texture
-            self._text('')
-        self.count(0)  # its data
-        self.count(0)  # uv_coordinates
-        self._text(marker.text)
-        for _ in range(2):  # mesh_resource and the mesh's file name
-            self._text('')
-        self.count(0)  # its data
-        self.data.append(0)  # mesh_use_embedded_materials
-        return _Where(stamp, kind + 8, pose, colour, points)
