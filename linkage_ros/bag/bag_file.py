@@ -39,7 +39,7 @@ from mcap.exceptions import UnsupportedCompressionError
 from mcap.records import Statistics
 from mcap.writer import CompressionType, IndexType, Writer
 
-_TYPES: Mapping[str, CompressionType] = {
+COMPRESSION_TYPES: Mapping[str, CompressionType] = {
     NONE: CompressionType.NONE,
     'lz4': CompressionType.LZ4,
     'zstd': CompressionType.ZSTD,
@@ -57,7 +57,7 @@ def compression_type(name: str, folder: Path) -> CompressionType:
         Its library is missing here; ``folder`` is what was to be recorded to.
 
     """
-    kind = _TYPES[name]
+    kind = COMPRESSION_TYPES[name]
     try:
         Writer(BytesIO(), compression=kind)
     except UnsupportedCompressionError:
@@ -70,9 +70,9 @@ def compression_type(name: str, folder: Path) -> CompressionType:
     return kind
 
 
-def start(mcap: Writer) -> None:
+def start(mcap: Writer, profile: str = 'ros2') -> None:
     """Begin a file, as all of ours begin."""
-    mcap.start(profile='ros2', library=f'linkage_ros {__version__}')
+    mcap.start(profile=profile, library=f'linkage_ros {__version__}')
 
 
 def register(mcap: Writer, topics: Sequence[Topic]) -> list[int]:

@@ -17,16 +17,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from io import BytesIO
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
-from struct import Struct
-from typing import BinaryIO, NamedTuple
+from typing import NamedTuple
 
+from linkage_ros.bag.mcap_records import chunk_head, DamagedError, HEAD, Source, strict
 from linkage_ros.bag.reader import Bag, MOST_METADATA, unreadable
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Header, Metadata
 from mcap.writer import MCAP0_MAGIC
@@ -156,13 +155,6 @@ def contents_of(
     )
 
 
-_RECORD = Struct('<BQ')
-_CHUNK = Struct('<QQQII')
-"""First and last time, size when decompressed, its checksum, length of the compression's name."""
-
-_LONGEST_NAME = 64
-
-
 class Layout(NamedTuple):
     """
     How a file is laid out.
@@ -202,58 +194,30 @@ def layout_of(file: Path) -> Layout:
     compressions: dict[str, tuple[int, int]] = {}
     content = 0
     rosbag2: Metadata | None = None
+    at = len(MCAP0_MAGIC)
     try:
-        with file.open('rb') as stream:
-            for opcode, length in _records(stream):
-                unpacked = length
-                if opcode == Opcode.CHUNK:
-                    name, unpacked = _chunk(stream)
-                    stored, made = compressions.get(name, (0, 0))
-                    compressions[name] = stored + length, made + unpacked
-                elif opcode == Opcode.HEADER and length <= MOST_METADATA:
-                    library = _library(stream.read(length))
-                elif opcode == Opcode.METADATA and length <= MOST_METADATA:
-                    rosbag2 = _rosbag2(stream.read(length)) or rosbag2
+        with file.open('rb') as stream, suppress(DamagedError):
+            source = Source(stream)
+            while True:
+                opcode, end = source.head(at)
+                if end > source.size or opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                    break
+                length = unpacked = end - at - HEAD.size
+                # What is damaged is passed over; reading the messages says so.
+                with suppress(DamagedError):
+                    if opcode == Opcode.CHUNK:
+                        head = chunk_head(source, at)
+                        unpacked, name = head.size, head.compression or 'none'
+                        stored, made = compressions.get(name, (0, 0))
+                        compressions[name] = stored + length, made + unpacked
+                    elif opcode in (Opcode.HEADER, Opcode.METADATA) and length <= MOST_METADATA:
+                        data = source.read(at + HEAD.size, length)
+                        if opcode == Opcode.HEADER:
+                            library = strict(Header, data).library
+                        elif (record := strict(Metadata, data)).name == 'rosbag2':
+                            rosbag2 = record
                 content += unpacked
+                at = end
     except OSError as error:
         raise unreadable(file, error) from None
     return Layout(library, compressions, content, rosbag2)
-
-
-def _records(stream: BinaryIO) -> Iterator[tuple[int, int]]:
-    """Yield kind and length of each whole record up to the index; the stream is at its content."""
-    size = stream.seek(0, 2)
-    at = len(MCAP0_MAGIC)
-    while at + _RECORD.size <= size:
-        stream.seek(at)
-        opcode, length = _RECORD.unpack(stream.read(_RECORD.size))
-        at += _RECORD.size + length
-        if at > size or opcode in (Opcode.DATA_END, Opcode.FOOTER):
-            return
-        yield opcode, length
-
-
-def _chunk(stream: BinaryIO) -> tuple[str, int]:
-    """Return the name of a chunk's compression, and how long it is when decompressed."""
-    head = stream.read(_CHUNK.size + _LONGEST_NAME)
-    if len(head) < _CHUNK.size:
-        return '?', 0
-    _, _, unpacked, _, length = _CHUNK.unpack_from(head)
-    start = _CHUNK.size
-    end = start + min(length, _LONGEST_NAME)
-    return head[start:end].decode('utf-8', 'backslashreplace') or 'none', unpacked
-
-
-def _library(content: bytes) -> str:
-    try:
-        return str(Header.read(ReadDataStream(BytesIO(content))).library)
-    except Exception:  # noqa: BLE001 (as the damage has it; reading the messages says so)
-        return ''
-
-
-def _rosbag2(content: bytes) -> Metadata | None:
-    try:
-        record = Metadata.read(ReadDataStream(BytesIO(content)))
-    except Exception:  # noqa: BLE001 (as above)
-        return None
-    return record if record.name == 'rosbag2' else None

@@ -171,24 +171,18 @@ class Message(NamedTuple):
     data: bytes
 
 
+class ChunkHead(NamedTuple):
+    """The head of a chunk: size [bytes] and CRC (0: none) of what it holds, where its data are."""
+
+    size: int
+    crc: int
+    compression: str
+    begin: int
+    length: int
+
+
 class Chunk(NamedTuple):
-    """
-    A chunk as it stands in a file.
-
-    Attributes
-    ----------
-    size
-        What it says to be when unpacked [bytes].
-    crc
-        The checksum of what is unpacked; 0 where there is none.
-    compression
-        How it is packed.
-    data
-        Packed.
-    end
-        Where the file goes on, by the length of its content, not by that of its record.
-
-    """
+    """A chunk: as in its head, its data, and where they end, whatever its record's length is."""
 
     size: int
     crc: int
@@ -246,17 +240,22 @@ def strict(kind: Any, content: bytes) -> Any:
     return record
 
 
-def chunk_at(source: Source, at: int) -> Chunk:
-    """Return the chunk whose record begins there; its content is not looked at."""
+def chunk_head(source: Source, at: int) -> ChunkHead:
+    """Return the head of the chunk whose record begins there."""
     begin = at + HEAD.size
     _, _, size, crc, letters = _CHUNK.unpack(source.read(begin, _CHUNK.size))
     if letters > _LONGEST_NAME:
         raise DamagedError(f'has {letters:,} letters for how it is packed')
     begin += _CHUNK.size
     name = source.read(begin, letters + _LONG.size)
-    begin += len(name)
     (length,) = _LONG.unpack_from(name, letters)
     compression = name[:letters].decode('ascii', 'backslashreplace')
+    return ChunkHead(size, crc, compression, begin + len(name), length)
+
+
+def chunk_at(source: Source, at: int) -> Chunk:
+    """Return the chunk whose record begins there; its content is not looked at."""
+    size, crc, compression, begin, length = chunk_head(source, at)
     return Chunk(size, crc, compression, source.read(begin, length), begin + length)
 
 

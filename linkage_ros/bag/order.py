@@ -57,7 +57,7 @@ _Entry = tuple[int, int, int, int, BagMessage | None]
 """Time, number of the file, place of the chunk, number in it from 1; a whole chunk has none."""
 
 
-class TimeOrder:
+class LogTimeOrder:
     """
     The order of a bag's messages in time.
 

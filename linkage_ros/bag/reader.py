@@ -41,7 +41,7 @@ from linkage_ros.bag.mcap_records import (
     strict,
 )
 from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
-from linkage_ros.bag.recording_stats import ACCOUNT, UNFINISHED
+from linkage_ros.bag.recording_stats import STATS_RECORD, UNFINISHED
 from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
 from linkage_ros.bounded_yaml import bounded_yaml
 from linkage_ros.errors import BagError, quoted
@@ -169,7 +169,7 @@ def unreadable(file: Path, error: OSError) -> BagError:
     return BagError(file, reason, 'check its permissions and the disk')
 
 
-def is_being_written(file: Path) -> bool:
+def is_in_use(file: Path) -> bool:
     """
     Return whether some process has a file open for writing; not if that cannot be known.
 
@@ -194,7 +194,7 @@ def is_being_written(file: Path) -> bool:
     return False
 
 
-class Ending(NamedTuple):
+class FooterMetadata(NamedTuple):
     """
     What the end of a file says.
 
@@ -211,7 +211,7 @@ class Ending(NamedTuple):
     accounted: bool
 
 
-def ending_of(file: Path) -> Ending:
+def footer_metadata(file: Path) -> FooterMetadata:
     """Return what the end of a file says; nothing where it has no end, or a damaged one."""
     custom: Mapping[str, str] = {}
     accounted = False
@@ -219,7 +219,7 @@ def ending_of(file: Path) -> Ending:
         with file.open('rb') as stream:
             source = Source(stream)
             records = index_of(source).metadata
-            accounted = any(each.name == ACCOUNT for each in records)
+            accounted = any(each.name == STATS_RECORD for each in records)
             # Where there are several, the last says what came of it in the end.
             said = [each for each in records if each.name == 'rosbag2'][-1:]
             for each in said:
@@ -231,7 +231,7 @@ def ending_of(file: Path) -> Ending:
                     custom = custom_of(serialized_metadata(record))
     except (DamagedError, OSError):
         pass  # to be met, and told, when the messages are read
-    return Ending(custom, accounted)
+    return FooterMetadata(custom, accounted)
 
 
 RUN_FILE = 'run.json'
@@ -360,7 +360,7 @@ def read_bag(
         for attachment in attached:
             if attachment.name != CHANNELS_FILE:
                 attachments.setdefault(attachment.name, attachment.data)
-    ending = ending_of(files[-1])
+    ending = footer_metadata(files[-1])
     custom = custom_of(information) if information else ending.custom
     # Where the account is there, nothing is missing but the last words of the metadata.
     unfinished = UNFINISHED in custom and not ending.accounted

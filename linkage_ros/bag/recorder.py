@@ -25,7 +25,7 @@ it ends by, the bag says what became of all that was offered until `Recorder.sto
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -33,7 +33,7 @@ import threading
 import time
 
 from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.recording_stats import Account
+from linkage_ros.bag.recording_stats import RecordingStats
 from linkage_ros.bag.storage import FLUSH_AFTER
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
@@ -65,12 +65,7 @@ Offered = tuple[int, int, int, bytes]
 """A message on its way: topic, log time, publish time [ns] and its CDR bytes."""
 
 
-def in_places(message: Offered) -> tuple[Offered | None, ...]:
-    """Return a message and, for each further `PLACE` that it fills, None; data is not copied."""
-    return message, *(None,) * (len(message[3]) // PLACE)
-
-
-class Tally:
+class ThreadCounter:
     """
     A counter that several threads count up without a lock.
 
@@ -90,6 +85,70 @@ class Tally:
             steps = self.add() - self._readings
             self._readings += 1
             return steps
+
+
+class MessageQueue:
+    """
+    Messages on their way to one thread, and how many of each topic were offered and dropped.
+
+    Parameters
+    ----------
+    topics
+        How many topics there are.
+    capacity
+        Messages that may wait, each of up to `PLACE`; a larger one counts as so many more.
+
+    Attributes
+    ----------
+    open
+        Whether messages are taken; else they are dropped.
+    received, dropped
+        A counter for each topic.
+
+    """
+
+    def __init__(self, topics: int, capacity: int) -> None:
+        self.open = True
+        self._capacity = capacity
+        self._waiting: deque[Offered | None] = deque()
+        self.received = [ThreadCounter() for _ in range(topics)]
+        self.dropped = [ThreadCounter() for _ in range(topics)]
+        self._add_received = [counter.add for counter in self.received]
+        self._add_dropped = [counter.add for counter in self.dropped]
+
+    def offer(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
+        """
+        Hand over one message, from any thread; never blocks, never raises for the disk's sake.
+
+        Parameters
+        ----------
+        topic
+            The topic's number.
+        log_time, publish_time
+            When it was received, and when its source made it [ns].
+        data
+            The CDR bytes. They are kept, not copied: a buffer that is reused must be given as
+            ``bytes(buffer)``.
+
+        """
+        self._add_received[topic]()
+        if not self.open or len(self._waiting) >= self._capacity:
+            self._add_dropped[topic]()
+        elif len(data) < PLACE:
+            self._waiting.append((topic, log_time, publish_time, data))
+        else:
+            places = len(data) // PLACE
+            self._waiting.extend(((topic, log_time, publish_time, data), *(None,) * places))
+
+    def __len__(self) -> int:
+        """Return how many places are taken."""
+        return len(self._waiting)
+
+    def take(self, most: int) -> Iterator[Offered]:
+        """Yield the messages that wait, of so many places."""
+        for _ in range(min(most, len(self._waiting))):
+            if message := self._waiting.popleft():
+                yield message
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,14 +218,10 @@ class Recorder:
         self._recording = True
         self.folder = writer.folder
         self._writer = writer
-        self._capacity = capacity
         self._flush_after = FLUSH_AFTER * flush_period
-        self._queue: deque[Offered | None] = deque()
-        self._open = True
-        self._received = [Tally() for _ in writer.topics]
-        self._add_received = [tally.add for tally in self._received]
-        self._overflowed = [Tally() for _ in writer.topics]
-        self._add_overflowed = [tally.add for tally in self._overflowed]
+        self._queue = MessageQueue(len(writer.topics), capacity)
+        self.offer = self._queue.offer
+        """Hands over one message, as `MessageQueue.offer`."""
         # The thread's own: what the writer took, and what did not get there. One tuple, so that
         # another thread never sees a message in both, or in neither.
         self._done = ([0] * len(writer.topics), [0] * len(writer.topics))
@@ -179,29 +234,6 @@ class Recorder:
         self._thread = threading.Thread(target=self._run, name='bag recorder', daemon=True)
         self._thread.start()
 
-    def offer(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
-        """
-        Hand over one message, from any thread; never blocks, never raises for the disk's sake.
-
-        Parameters
-        ----------
-        topic
-            The topic's number.
-        log_time, publish_time
-            When it was received, and when its source made it [ns].
-        data
-            The CDR bytes. They are kept, not copied: a buffer that is reused must be given as
-            ``bytes(buffer)``.
-
-        """
-        self._add_received[topic]()
-        if not self._open or len(self._queue) >= self._capacity:
-            self._add_overflowed[topic]()
-        elif len(data) < PLACE:
-            self._queue.append((topic, log_time, publish_time, data))
-        else:
-            self._queue.extend(in_places((topic, log_time, publish_time, data)))
-
     def inspect(self) -> tuple[TopicCounts, ...]:
         """Return the counts as they are now; after a failure, ``recorded`` is what was kept."""
         counts = []
@@ -212,9 +244,9 @@ class Recorder:
         for number, topic in enumerate(self._writer.topics):
             gone = let_go[number]
             recorded = taken[number] + opened[number] - gone
-            dropped = self._overflowed[number].value() + lost[number]
+            dropped = self._queue.dropped[number].value() + lost[number]
             # Last, so that a message on its way is waiting, and never gone twice.
-            received = self._received[number].value() + opened[number]
+            received = self._queue.received[number].value() + opened[number]
             waiting = received - recorded - dropped - gone
             counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting, gone))
         return tuple(counts)
@@ -237,7 +269,7 @@ class Recorder:
         if self._summary:
             return self._summary
         self._custom = dict(custom or {})
-        self._open = False
+        self._queue.open = False
         self._stopping.set()
         self._thread.join(timeout)
         stuck = self._thread.is_alive()
@@ -270,7 +302,7 @@ class Recorder:
     @property
     def ended(self) -> bool:
         """Return whether it has failed for good, so that no more messages are taken."""
-        return self.failure is not None and not self._open
+        return self.failure is not None and not self._queue.open
 
     def _run(self) -> None:
         going = True
@@ -317,25 +349,22 @@ class Recorder:
                 if more:
                     time.sleep(NAP)
 
-    def _account(self, summary: BagSummary) -> Account:
+    def _account(self, summary: BagSummary) -> RecordingStats:
         """Return what became of all messages, once no more are taken; `dropped` is the rest."""
         received = [
             tally.value() + opened
-            for tally, opened in zip(self._received, self._writer.opened, strict=True)
+            for tally, opened in zip(self._queue.received, self._writer.opened, strict=True)
         ]
         dropped = [
             came - there - gone
             for came, there, gone in zip(received, summary.counts, summary.let_go, strict=True)
         ]
-        return Account(received, summary.counts, dropped, summary.let_go)
+        return RecordingStats(received, summary.counts, dropped, summary.let_go)
 
     def _write_batch(self) -> bool:
         """Write up to a batch of messages; return whether there may be more."""
         queue, write, (taken, lost) = self._queue, self._writer.write, self._done
-        for _ in range(min(BATCH, len(queue))):
-            message = queue.popleft()
-            if message is None:
-                continue
+        for message in queue.take(BATCH):
             topic = message[0]
             # Until the writer has answered, the message is counted nowhere, and so it waits.
             try:
@@ -354,7 +383,7 @@ class Recorder:
             error = RecordingError(self._writer.folder, reason, 'please report this')
         self._count_kept()
         if not self._writer.out_of_room:
-            self._open = False
+            self._queue.open = False
             self._lose_queue()
         self.failure = error
 
@@ -370,5 +399,5 @@ class Recorder:
         """Count what waits as lost."""
         _, lost = self._done
         while self._queue:
-            if message := self._queue.popleft():
-                lost[message[0]] += 1
+            for topic, *_ in self._queue.take(BATCH):
+                lost[topic] += 1

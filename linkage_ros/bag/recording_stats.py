@@ -25,8 +25,8 @@ from linkage_ros.bag.metadata import BagSummary, metadata_text
 
 _PREFIX = 'linkage_ros.'
 
-ACCOUNT = f'{_PREFIX}account'
-"""Name of the metadata record at the end of a bag's last file that holds an `Account`."""
+STATS_RECORD = f'{_PREFIX}account'
+"""Name of the metadata record at the end of a bag's last file that holds `RecordingStats`."""
 
 LET_GO = f'{_PREFIX}let_go'
 """Key in the ``custom_data`` of a bag whose first files are gone: a JSON object by topic."""
@@ -42,7 +42,7 @@ UNFINISHED_DATA: Mapping[str, str] = {
 }
 
 
-class Account(NamedTuple):
+class RecordingStats(NamedTuple):
     """
     Messages by topic: ``received == recorded + dropped + let_go``.
 
@@ -66,7 +66,7 @@ class Account(NamedTuple):
 
 
 def custom_data(
-    custom: Mapping[str, str], summary: BagSummary, account: Account | None
+    custom: Mapping[str, str], summary: BagSummary, account: RecordingStats | None
 ) -> dict[str, str]:
     """
     Return the ``custom_data`` of a bag's metadata.
@@ -91,14 +91,14 @@ def custom_data(
 
 
 def last_records(
-    custom: Mapping[str, str], summary: BagSummary, account: Account | None
+    custom: Mapping[str, str], summary: BagSummary, account: RecordingStats | None
 ) -> dict[str, dict[str, str]]:
     """Return by their names the metadata records that end a file; arguments as `custom_data`."""
     text = metadata_text(summary, custom_data(custom, summary, account), root=False)
     records = {'rosbag2': {'serialized_metadata': text}}
     if account:
-        words = zip(Account._fields, account, strict=True)
-        records[ACCOUNT] = {word: _by_topic(counts, summary) for word, counts in words}
+        words = zip(RecordingStats._fields, account, strict=True)
+        records[STATS_RECORD] = {word: _by_topic(counts, summary) for word, counts in words}
     return records
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 import shutil
 from typing import Any, NamedTuple
 
-from linkage_ros import __version__
+from linkage_ros.bag.bag_file import COMPRESSION_TYPES, start
 from linkage_ros.bag.disk import CHUNK_SIZE
 from linkage_ros.bag.mcap_records import Definitions, Found, Message, Source
 from linkage_ros.bag.metadata import (
@@ -41,7 +41,7 @@ from linkage_ros.bag.reader import (
     custom_of,
     files_of,
     information_of,
-    is_being_written,
+    is_in_use,
     serialized_metadata,
     topic_of,
     unreadable,
@@ -132,8 +132,6 @@ def promised_counts(information: Mapping[str, Any]) -> dict[str, int]:
 MOST_CHANNELS = 10_000
 """How many channels a new bag may have: its metadata, 700 bytes for each, must stay readable."""
 
-_COMPRESSIONS = {'lz4': CompressionType.LZ4, 'zstd': CompressionType.ZSTD}
-
 
 class NewBag:
     """
@@ -177,14 +175,14 @@ class NewBag:
         self._numbers: dict[int, int] = {}
         self._start, self._end = NO_START, 0
         self._file = (folder / f'{folder.name}_0.mcap').open('xb')
-        packing = _COMPRESSIONS.get(compression, CompressionType.NONE)
+        packing = COMPRESSION_TYPES.get(compression, CompressionType.NONE)
         try:
             self._mcap = Writer(self._file, chunk_size=CHUNK_SIZE, compression=packing)
         except UnsupportedCompressionError:
             self._mcap = Writer(
                 self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.NONE
             )
-        self._mcap.start(profile=profile, library=f'linkage_ros {__version__}')
+        start(self._mcap, profile)
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -404,7 +402,7 @@ def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> l
     findings.remarks += [
         f'{file.name} is still being written; what comes after this is not in the new bag'
         for file in found
-        if is_being_written(file)
+        if is_in_use(file)
     ]
     return found
 

@@ -34,20 +34,10 @@ import time
 from typing import NamedTuple
 
 from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.recorder import (
-    BATCH,
-    in_places,
-    NAP,
-    Offered,
-    PLACE,
-    POLL,
-    Recorder,
-    RecordingSummary,
-    Tally,
-)
-from linkage_ros.bag.recording_stats import Account
+from linkage_ros.bag.recorder import BATCH, MessageQueue, NAP, POLL, Recorder, RecordingSummary
+from linkage_ros.bag.recording_stats import RecordingStats
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter, TIME_END
 from linkage_ros.errors import RecordingError
 
 _HEAD = Struct('<HqqqI')
@@ -228,7 +218,6 @@ class LastSeconds:
 
 
 _WHERE = 'the memory of the last seconds'
-_TIME_END = 2**63  # rosbag2's times are signed
 _BLOCKS = 16  # 1 MiB
 
 
@@ -289,13 +278,9 @@ class SnapshotMemory:
         self.seconds = seconds
         self.extent = Extent()
         self.failure: RecordingError | None = None
-        self._capacity = capacity
-        self._open = True
-        self._queue: deque[Offered | None] = deque()
-        self._received = [Tally() for _ in topics]
-        self._add_received = [tally.add for tally in self._received]
-        self._dropped = [Tally() for _ in topics]
-        self._add_dropped = [tally.add for tally in self._dropped]
+        self._queue = MessageQueue(len(topics), capacity)
+        self.offer = self._queue.offer
+        """Hands over one message, as `MessageQueue.offer`."""
         # Whose has the lock: the thread's, or for a moment that of who takes a snapshot.
         self._lock = threading.Lock()
         self._last = LastSeconds(len(topics), round(seconds * 1e9), most)
@@ -303,23 +288,13 @@ class SnapshotMemory:
         self._thread = threading.Thread(target=self._run, name='snapshot memory', daemon=True)
         self._thread.start()
 
-    def offer(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
-        """Hand over one message, from any thread; as `Recorder.offer`."""
-        self._add_received[topic]()
-        if not self._open or len(self._queue) >= self._capacity:
-            self._add_dropped[topic]()
-        elif len(data) < PLACE:
-            self._queue.append((topic, log_time, publish_time, data))
-        else:
-            self._queue.extend(in_places((topic, log_time, publish_time, data)))
-
     def inspect(self) -> tuple[KeptCounts, ...]:
         """Return the counts as they are now; what waits for the thread counts as kept."""
         counts = []
         for number, topic in enumerate(self.topics):
-            let_go, dropped = self._last.let_go[number], self._dropped[number].value()
+            let_go, dropped = self._last.let_go[number], self._queue.dropped[number].value()
             # Last, so that a message on its way is kept, and never gone twice.
-            received = self._received[number].value()
+            received = self._queue.received[number].value()
             kept = received - let_go - dropped
             counts.append(KeptCounts(topic.name, received, kept, let_go, dropped))
         return tuple(counts)
@@ -337,7 +312,7 @@ class SnapshotMemory:
         with self._lock:
             if self.failure:
                 raise self.failure
-            if not self._open:
+            if not self._queue.open:
                 raise RecordingError(_WHERE, 'has ended', 'ask while the node is active')
             self._put_away(len(self._queue))
             while self._last.let_old_go(BATCH):
@@ -346,7 +321,7 @@ class SnapshotMemory:
 
     def stop(self) -> tuple[KeptCounts, ...]:
         """End the memory; return the counts as they were then, with what was kept to the end."""
-        self._open = False
+        self._queue.open = False
         self._stopping.set()
         self._thread.join()
         return self.inspect()
@@ -368,25 +343,22 @@ class SnapshotMemory:
     def _work(self) -> bool:
         """Put away a batch of messages, and let as many go; return whether there may be more."""
         with self._lock:
-            self._put_away(min(BATCH, len(self._queue)))
+            self._put_away(BATCH)
             more = self._last.let_old_go(2 * BATCH)
             self.extent = self._last.extent()
         return more or bool(self._queue)
 
     def _put_away(self, count: int) -> None:
-        for _ in range(count):
-            message = self._queue.popleft()
-            if message is None:
-                continue
+        for message in self._queue.take(count):
             topic, log_time, publish_time, _ = message
-            if 0 <= log_time < _TIME_END and 0 <= publish_time < _TIME_END:
+            if 0 <= log_time < TIME_END and 0 <= publish_time < TIME_END:
                 self._last.add(*message)
             else:
-                self._add_dropped[topic]()
+                self._queue.dropped[topic].add()
 
     def _fail(self, error: Exception) -> None:
         """Keep the failure; what was in memory is gone."""
-        self._open = False
+        self._queue.open = False
         self.failure = RecordingError(
             _WHERE, f'has ended early: {type(error).__name__}: {error}', 'please report this'
         )
@@ -490,9 +462,9 @@ class SnapshotWriting:
         """Return how many messages of each topic there are to be written."""
         return list(map(sum, zip(self.kept.counts, writer.opened, strict=True)))
 
-    def _account(self, writer: BagWriter, summary: BagSummary) -> Account:
+    def _account(self, writer: BagWriter, summary: BagSummary) -> RecordingStats:
         received = self._received(writer)
         dropped = [
             there - written for there, written in zip(received, summary.counts, strict=True)
         ]
-        return Account(received, summary.counts, dropped, (0,) * len(dropped))
+        return RecordingStats(received, summary.counts, dropped, (0,) * len(dropped))

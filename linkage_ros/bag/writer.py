@@ -18,7 +18,7 @@ Write a bag, in one file or several, whose every flushed message outlives a kill
 
 ``metadata.yaml`` is there from the first moment and renewed about once a second and with each new
 file: it names all files, and counts what is on the disk. Until the bag is closed its custom data
-has `account.UNFINISHED`; so a killed bag says that it is one, and where it stopped.
+has `recording_stats.UNFINISHED`; so a killed bag says that it is one, and where it stopped.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from linkage_ros.bag.bag_file import BagFile, channels_file, compression_type
 from linkage_ros.bag.disk import FIRST_RESERVE, LostError, NO_ROOM, Reserve
 from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_metadata
 from linkage_ros.bag.recording_stats import (
-    Account,
     custom_data,
     FAILURE,
     last_records,
+    RecordingStats,
     UNFINISHED_DATA,
 )
 from linkage_ros.bag.storage import scarcity, Storage
@@ -48,7 +48,7 @@ _MAKE_ROOM = 'make room there'
 _GO_ON = 'make room there: a run then goes on in a new file'
 _CHECK_DISK = 'check the disk before the next recording'
 _KEEP_OUT = 'let no other process write to the folder of a bag while it is recorded'
-_TIME_END = 2**63  # rosbag2's times are signed
+TIME_END = 2**63  # rosbag2's times are signed
 _SEQUENCE_END = 2**32  # MCAP's sequence numbers; at 10 kHz they start again after five days
 _RENEWAL = 0.8  # [s]; less than is between two flushes of a second
 _ROOM_TO_GO_ON = 4 * FIRST_RESERVE  # lest a disk that stays full get many small files [bytes]
@@ -105,7 +105,7 @@ class BagWriter:
         self.storage = storage or Storage()
         self._compression = compression_type(self.storage.compression, self.folder)
         self.let_go = (0,) * len(self.topics)
-        self.account: Callable[[BagSummary], Account | None] = lambda summary: None
+        self.account: Callable[[BagSummary], RecordingStats | None] = lambda summary: None
         channels = 'application/mcap', channels_file(self.topics)
         self._attachments = {**(attachments or {}), CHANNELS_FILE: channels}
         self._split_time = round(self.storage.split_seconds * 1e9)  # [ns]
@@ -170,7 +170,7 @@ class BagWriter:
         """
         if self._failure:
             raise self._failure
-        if not (0 <= log_time < _TIME_END and 0 <= publish_time < _TIME_END):
+        if not (0 <= log_time < TIME_END and 0 <= publish_time < TIME_END):
             self._refused[topic] += 1
             return False
         if self._splits and self._is_full(log_time):

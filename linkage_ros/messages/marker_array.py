@@ -88,7 +88,7 @@ _STAMP = Struct('<iI')
 _COLOUR = Struct('<4f')
 _XY = _TURN = Struct('<2d')
 
-_MARKER_ARRAY = declared(
+MARKER_ARRAY = declared(
     'Marker[] markers',
     Marker=declared(
         'Time stamp, string frame_id, string ns, int32 id, int32 type, int32 action, Pose pose, '
@@ -137,11 +137,11 @@ class MarkerArrayWriter:
     __slots__ = ('_buffer', '_where')
 
     def __init__(self, frame: str, markers: Sequence[Marker]) -> None:
-        message = packed(_MARKER_ARRAY, {'markers': [_values(frame, one) for one in markers]})
+        message = packed(MARKER_ARRAY, {'markers': [_values(frame, one) for one in markers]})
         self._buffer = bytearray(message)
         self._where = [
             {name: field.first for name, field in marker.items() if isinstance(field, Numbers)}
-            for marker in parsed(message, _MARKER_ARRAY)['markers']
+            for marker in parsed(message, MARKER_ARRAY)['markers']
         ]
 
     def message(self, stamp: int) -> bytes:

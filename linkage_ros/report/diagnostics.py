@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 from linkage_ros.messages.layout import declared, MalformedError, parsed
 
-_DIAGNOSTIC_ARRAY = declared(
+DIAGNOSTIC_ARRAY = declared(
     'Time stamp, string frame_id, DiagnosticStatus[] status',
     DiagnosticStatus=declared(
         'uint8 level, string name, string message, string hardware_id, KeyValue[] values',
@@ -64,7 +64,7 @@ class Status(NamedTuple):
 def statuses(data: bytes) -> list[Status]:
     """Return the statuses of a message; none of one that is damaged."""
     try:
-        found = parsed(data, _DIAGNOSTIC_ARRAY, _MOST)['status']
+        found = parsed(data, DIAGNOSTIC_ARRAY, _MOST)['status']
     except MalformedError:
         return []
     return [

@@ -27,7 +27,7 @@ import sys
 from linkage_ros.bag import bag_file
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.recorder import Recorder
-from linkage_ros.bag.recording_stats import ACCOUNT, UNFINISHED
+from linkage_ros.bag.recording_stats import STATS_RECORD, UNFINISHED
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
@@ -208,7 +208,7 @@ def test_a_ring_keeps_the_last_files_and_counts_what_it_let_go(
 def account_of(file):
     with file.open('rb') as stream:
         found = {m.name: m.metadata for m in make_reader(stream).iter_metadata()}
-    return {word: json.loads(text) for word, text in found.get(ACCOUNT, {}).items()}
+    return {word: json.loads(text) for word, text in found.get(STATS_RECORD, {}).items()}
 
 
 def test_the_account_is_in_the_last_file_and_closes(tmp_path, topics, messages):

@@ -23,7 +23,7 @@ import shutil
 
 from linkage_ros.bag.metadata import BagSummary
 from linkage_ros.bag.reader import Bag, read_bag
-from linkage_ros.bag.recording_stats import Account
+from linkage_ros.bag.recording_stats import RecordingStats
 from linkage_ros.bag.recover import recover
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
@@ -44,9 +44,9 @@ class Recording:
         self._number = 0
 
     @staticmethod
-    def _account(summary: BagSummary) -> Account:
+    def _account(summary: BagSummary) -> RecordingStats:
         none = (0,) * len(summary.counts)
-        return Account(summary.counts, summary.counts, none, none)
+        return RecordingStats(summary.counts, summary.counts, none, none)
 
     def write(self, messages: int) -> None:
         for _ in range(messages):

@@ -13,13 +13,13 @@
 # limitations under the License.
 
 
-"""`TimeOrder`: any bag's messages sorted by time, from any start, without reading all of it."""
+"""`LogTimeOrder`: any bag's messages sorted by time, from any start, without reading all of it."""
 
 from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from linkage_ros.bag.order import TimeOrder, WINDOW
+from linkage_ros.bag.order import LogTimeOrder, WINDOW
 from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.errors import BagError
 from mcap.writer import CompressionType, IndexType, Writer
@@ -59,7 +59,7 @@ PAIRS = st.lists(st.tuples(st.sampled_from(['/a', '/b']), st.integers(1, 12)), m
 def test_messages_come_by_their_times(tmp_path_factory, messages, chunk_size, compression, since):
     file = tmp_path_factory.mktemp('bag') / 'any.mcap'
     write(file, messages, chunk_size, compression)
-    order = TimeOrder(read_bag(file))
+    order = LogTimeOrder(read_bag(file))
     expected = in_order(messages)
     assert list(order.messages()) == expected
     assert list(order.messages(since)) == [m for m in expected if m.log_time >= since]
@@ -73,7 +73,7 @@ def test_a_file_without_an_index_is_put_in_order_within_a_window(
 ):
     file = tmp_path_factory.mktemp('bag') / 'plain.mcap'
     write(file, messages, use_chunking=False)
-    order = TimeOrder(read_bag(file))
+    order = LogTimeOrder(read_bag(file))
     expected = in_order(messages)
     assert list(order.messages(since)) == [m for m in expected if m.log_time >= since]
     assert (order.begin, order.end) == (expected[0].log_time, None)
@@ -83,12 +83,12 @@ def test_what_is_without_an_index_is_held_for_a_window_only(tmp_path):
     second = WINDOW
     times = [3 * second, second, 9 * second, 10 * second + 1, 9 * second + 2]
     write(tmp_path / 'plain.mcap', [('/a', time) for time in times], use_chunking=False)
-    found = [m.log_time for m in TimeOrder(read_bag(tmp_path / 'plain.mcap')).messages()]
+    found = [m.log_time for m in LogTimeOrder(read_bag(tmp_path / 'plain.mcap')).messages()]
     # The second message stands more than a window behind its place; no other does.
     assert found == [second, 3 * second, 9 * second, 9 * second + 2, 10 * second + 1]
     times = [3 * second, 5 * second, second]
     write(tmp_path / 'late.mcap', [('/a', time) for time in times], use_chunking=False)
-    found = [m.log_time for m in TimeOrder(read_bag(tmp_path / 'late.mcap')).messages()]
+    found = [m.log_time for m in LogTimeOrder(read_bag(tmp_path / 'late.mcap')).messages()]
     assert found == [3 * second, second, 5 * second]
 
 
@@ -96,7 +96,7 @@ def test_files_of_a_split_bag_are_one_timeline(tmp_path):
     write(tmp_path / 'run_0.mcap', [('/a', 1), ('/a', 5), ('/b', 9)])
     write(tmp_path / 'run_1.mcap', [('/b', 4), ('/a', 6)])
     write(tmp_path / 'run_2.mcap', [('/a', 5), ('/a', 20)], use_chunking=False)
-    found = [(m.topic, m.log_time) for m in TimeOrder(read_bag(tmp_path)).messages()]
+    found = [(m.topic, m.log_time) for m in LogTimeOrder(read_bag(tmp_path)).messages()]
     expected = [('/a', 1), ('/b', 4), ('/a', 5), ('/a', 5), ('/a', 6), ('/b', 9), ('/a', 20)]
     assert found == expected
 
@@ -107,14 +107,14 @@ def test_a_killed_recording_comes_as_far_as_it_goes(tmp_path):
     content = (tmp_path / 'whole.mcap').read_bytes()
     (tmp_path / 'cut.mcap').write_bytes(content[: len(content) // 2])
     bag = read_bag(tmp_path / 'cut.mcap', allow_truncated=True)
-    found = list(TimeOrder(bag).messages())
+    found = list(LogTimeOrder(bag).messages())
     assert 100 < len(found) < 300
     assert found == in_order(messages[: len(found)])
 
 
 def test_an_empty_bag_has_no_beginning(tmp_path):
     write(tmp_path / 'empty.mcap', [])
-    order = TimeOrder(read_bag(tmp_path / 'empty.mcap'))
+    order = LogTimeOrder(read_bag(tmp_path / 'empty.mcap'))
     assert (order.begin, list(order.messages())) == (None, [])
 
 
@@ -124,7 +124,7 @@ def test_damage_is_met_where_it_is_and_not_before(tmp_path):
     content = bytearray(file.read_bytes())
     content[content.index(b'   500')] ^= 1
     file.write_bytes(content)
-    order = TimeOrder(read_bag(file))
+    order = LogTimeOrder(read_bag(file))
     found = []
     with pytest.raises(
         BagError, match=r'run\.mcap: is damaged: the chunk at byte [\d,]+ its check'
@@ -139,7 +139,7 @@ def test_damage_is_met_where_it_is_and_not_before(tmp_path):
 @pytest.mark.parametrize('options', [{}, {'index_types': IndexType.NONE}], ids=['index', 'none'])
 def test_a_bag_whose_chunks_all_overlap_does_not_fill_memory(tmp_path, monkeypatch, options):
     write(tmp_path / 'a.mcap', [('/a', 1), ('/a', 9)] * 250, 64, CompressionType.NONE, **options)
-    order = TimeOrder(read_bag(tmp_path / 'a.mcap'))
+    order = LogTimeOrder(read_bag(tmp_path / 'a.mcap'))
     assert len(list(order.messages())) == 500
     monkeypatch.setattr('linkage_ros.bag.order.MOST_HELD', 100_000)
     with pytest.raises(BagError, match='more than 100,000 bytes of its messages are not in'):

@@ -13,14 +13,14 @@
 # limitations under the License.
 
 
-"""`is_being_written`: asked of the system, while somebody holds the file and after."""
+"""`is_in_use`: asked of the system, while somebody holds the file and after."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 
-from linkage_ros.bag.reader import is_being_written
+from linkage_ros.bag.reader import is_in_use
 import pytest
 
 WRITES = 'import sys; stream = open(sys.argv[1], "ab"); print(flush=True); sys.stdin.read()'
@@ -33,10 +33,10 @@ def test_it_is_while_another_process_holds_it_open(tmp_path):
         [sys.executable, '-c', WRITES, str(file)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as process:
         process.stdout.readline()
-        if not is_being_written(file):
+        if not is_in_use(file):
             pytest.skip('this file system grants leases to anybody')
         process.stdin.close()
-    assert not is_being_written(file)
+    assert not is_in_use(file)
     assert file.read_bytes() == b'some'
 
 
@@ -44,9 +44,9 @@ def test_who_reads_is_no_writer(tmp_path):
     file = tmp_path / 'run.mcap'
     file.write_bytes(b'some')
     with file.open('rb'):
-        assert not is_being_written(file)
+        assert not is_in_use(file)
 
 
 def test_what_cannot_be_known_is_no_writer(tmp_path):
-    assert not is_being_written(tmp_path / 'missing')
-    assert not is_being_written(tmp_path)
+    assert not is_in_use(tmp_path / 'missing')
+    assert not is_in_use(tmp_path)
