@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a bag holds: messages, sizes and times of its topics, and how its files are laid out."""
+"""The contents of a bag: messages, sizes and times by topic, and the layout of its files."""
 
 from __future__ import annotations
 
@@ -34,21 +34,21 @@ TOLD_EVERY = 4096
 """After how many messages progress is told and a wish to stop is looked for."""
 
 _RECORD_SIZE = 31
-"""What a message takes in an MCAP file beside its own bytes."""
+"""The size of a message record without the bytes of the message."""
 
 
 class TopicContents(NamedTuple):
     """
-    What a bag holds of a topic.
+    The messages of a topic in a bag.
 
     Attributes
     ----------
     topic
         The topic.
     messages
-        How many there are.
+        Number of messages.
     size
-        Their bytes.
+        Their size [bytes].
     first, last
         Least and greatest log time, in [ns]; 0 without messages.
 
@@ -62,25 +62,25 @@ class TopicContents(NamedTuple):
 
     @property
     def rate(self) -> float | None:
-        """Return how many messages there are a second, on average; nothing where there is none."""
+        """Return the mean number of messages per second; None if they take no time."""
         span = self.last - self.first
         return (self.messages - 1) * 1e9 / span if span > 0 else None
 
 
 class Contents(NamedTuple):
     """
-    What a bag holds.
+    The contents of a bag.
 
     Attributes
     ----------
     topics
         In the order of the bag.
     begin, end
-        Least and greatest log time, in [ns]; nothing without messages.
+        Least and greatest log time, in [ns]; None without messages.
     damage
-        What is damaged, on one line, where reading ended there; '' where all was read.
+        The damage at which reading ended, on one line; '' if all was read.
     stopped
-        Whether it was stopped before all was read.
+        Whether reading was stopped early.
 
     """
 
@@ -115,9 +115,9 @@ def contents_of(
     bag
         The bag. Where it is damaged, what lies before the damage is counted.
     told
-        Takes how many bytes have been read, now and then.
+        Called now and then with the number of bytes read.
     stopped
-        Whether to stop.
+        Returns whether to stop.
 
     """
     tallies = {topic.name: _Tally(topic) for topic in bag.topics}
@@ -157,20 +157,19 @@ def contents_of(
 
 class Layout(NamedTuple):
     """
-    How a file is laid out.
+    The layout of an MCAP file.
 
     Attributes
     ----------
     library
-        What wrote it; '' where it does not say.
+        The library that wrote it; '' if the file does not name one.
     compressions
-        Of each compression of its chunks how many bytes are stored, and how many they make when
-        decompressed, as the file says; 'none' is one of them.
+        For each compression of its chunks ('none' is one): stored bytes, and bytes after
+        decompression as the file states them.
     content
         Bytes of all its records when decompressed.
     rosbag2
-        What rosbag2 says of the bag in the file itself, the last that it says; nothing where it
-        does not.
+        The last metadata record of rosbag2; None if there is none.
 
     """
 
@@ -182,12 +181,12 @@ class Layout(NamedTuple):
 
 def layout_of(file: Path) -> Layout:
     """
-    Return how a file is laid out, as far as its records are whole.
+    Return the layout of a file, up to the first record that is not whole.
 
     Raises
     ------
     BagError
-        Where it cannot be read.
+        The file cannot be opened.
 
     """
     library = ''

@@ -116,7 +116,7 @@ _UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {'lz4': _lz4, 'zstd': _zs
 
 
 HEAD = Struct('<BQ')
-"""What each record begins with: its kind, and the length of what follows."""
+"""The head of each record: its kind, and the length of its content."""
 
 _CHUNK = Struct('<QQQII')
 """First and last time, size when unpacked, its checksum, length of the name of its packing."""
@@ -192,7 +192,7 @@ class Chunk(NamedTuple):
 
 
 class Definitions:
-    """The schemas and channels of a file by their numbers; none ever means two things."""
+    """The schemas and channels of a file by their numbers; a number never means two of them."""
 
     def __init__(self) -> None:
         self.schemas: dict[int, Schema] = {}
@@ -211,17 +211,17 @@ class Definitions:
             raise DamagedError(f'describes more than {MOST_CHANNELS:,} channels or schemas')
 
     def complete(self, others: Definitions) -> None:
-        """Take over what is not known yet."""
+        """Add the schemas and channels that are not known yet."""
         self.schemas = others.schemas | self.schemas
         self.channels = others.channels | self.channels
 
     def schema_of(self, channel: Channel) -> Schema | None:
-        """Return a channel's schema; nothing where it has none, or it is lost."""
+        """Return a channel's schema; None if it has none, or if it is lost."""
         return self.schemas.get(channel.schema_id)
 
 
 def strict(kind: Any, content: bytes) -> Any:
-    """Return a record of this kind; what it means fills it to the byte."""
+    """Return a record of this kind; its fields fill the content to the last byte."""
     if len(content) > _LONGEST_RECORD:
         raise DamagedError(
             f'is a {kind.__name__} of {len(content):,} bytes; no more than {_LONGEST_RECORD:,} '
@@ -260,7 +260,7 @@ def chunk_at(source: Source, at: int) -> Chunk:
 
 
 def content_of(chunk: Chunk) -> bytes:
-    """Return what a chunk holds; its checksum fits, if it has one."""
+    """Return the content of a chunk; its CRC agrees, if it has one."""
     content = unpacked(chunk.data, chunk.compression, chunk.size)
     if chunk.crc and crc32(content) != chunk.crc:
         raise DamagedError('its checksum does not fit')
@@ -268,7 +268,7 @@ def content_of(chunk: Chunk) -> bytes:
 
 
 def attachment_at(source: Source, at: int) -> tuple[Attachment, int, int]:
-    """Return the attachment whose record begins there, where its content ends, its checksum."""
+    """Return the attachment whose record begins there, where its content ends, and its CRC."""
     begin = end = at + HEAD.size + 16
     for _ in ('name', 'media type'):
         (letters,) = _INT.unpack(source.read(end, _INT.size))
@@ -290,7 +290,7 @@ def attachment_at(source: Source, at: int) -> tuple[Attachment, int, int]:
 
 
 def is_whole_chunk(source: Source, at: int) -> bool:
-    """Return whether a chunk is there, whatever its record calls itself; its checksum fits."""
+    """Return whether a chunk with a matching CRC begins there, whatever kind its record states."""
     try:
         chunk = chunk_at(source, at)
         return chunk.end == source.head(at)[1] and chunk.crc != 0 and bool(content_of(chunk))
@@ -299,7 +299,7 @@ def is_whole_chunk(source: Source, at: int) -> bool:
 
 
 def is_whole_attachment(source: Source, at: int) -> bool:
-    """Return whether an attachment is there, as `is_whole_chunk` does."""
+    """Return whether an attachment with a matching CRC begins there, whatever its kind."""
     try:
         _, end, crc = attachment_at(source, at)
         return end == source.head(at)[1] and crc != 0
@@ -365,7 +365,7 @@ _ELSEWHERE = {
 
 class DataSection:
     """
-    Takes the records of a file, each where it is asked to; remembers what rules the next ones.
+    Takes records of a file from given places; remembers what decides about the next ones.
 
     What has a checksum is given only where that fits. Messages outside of chunks, and chunks
     without a checksum, are given where the whole data section has one that fits, or nothing in
@@ -378,7 +378,7 @@ class DataSection:
     definitions
         Schemas and channels that are known already.
     index_start
-        Where the file's index begins, 0 if that is not known: in front of it the data end.
+        Where the index of the file begins, just behind the data section; 0 if not known.
 
     """
 
@@ -578,7 +578,7 @@ class FileIndex(NamedTuple):
     chunks, attachments, metadata
         Where they are.
     statistics
-        What the file holds; nothing where it does not say.
+        The counts that the file states; None if it states none.
 
     """
 

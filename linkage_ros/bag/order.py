@@ -14,12 +14,12 @@
 
 
 """
-A bag's messages in the order of their log times, those of one time in that of the file.
+The messages of a bag in the order of their log times; equal times in the order of the file.
 
-Files with an index are read chunk by chunk, each when its time has come, so that no more is held
-than the chunks whose times overlap, and what lies before a start is not read at all. What has no
-index (its recording was killed, or wrote none) is read from its beginning, and put in order within
-a window.
+A file with an index is read chunk by chunk, each chunk when its time has come: memory holds only
+the chunks whose times overlap, and chunks before a given start are not read. A file without an
+index (its recording was killed, or wrote none) is read from its beginning, and sorted within a
+window.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ from linkage_ros.bag.reader import Bag, BagMessage, unreadable
 from linkage_ros.errors import BagError
 
 WINDOW = 1_000_000_000
-"""How much later than it should a message may stand in a file without an index, in [ns]."""
+"""How far out of order messages may stand in a file without an index, in [ns]."""
 
 MOST_HELD = 2**30
-"""How much may wait for its turn [bytes]: of chunks whose times overlap, or of a window."""
+"""How many bytes may be held: of chunks whose times overlap, or of a window."""
 
 _BESIDE = 400
-"""What a message takes in memory beside its own bytes."""
+"""The memory that a message takes beside its own bytes."""
 
 _Entry = tuple[int, int, int, int, BagMessage | None]
 """Time, number of the file, place of the chunk, number in it from 1; a whole chunk has none."""
@@ -69,9 +69,9 @@ class LogTimeOrder:
     Attributes
     ----------
     begin
-        The least log time, in [ns]; nothing without messages.
+        The least log time, in [ns]; None without messages.
     end
-        The greatest, in [ns]; nothing where the bag must be read to know it.
+        The greatest, in [ns]; None if the whole bag must be read to know it.
 
     Raises
     ------
@@ -150,7 +150,7 @@ class LogTimeOrder:
             yield heappop(heap)[2]
 
     def _hold(self, held: int, message: BagMessage) -> int:
-        """Return how much waits with one message more."""
+        """Return how many bytes are held with one message more."""
         held += len(message.data) + _BESIDE
         if held > MOST_HELD:
             raise BagError(
@@ -182,7 +182,7 @@ class LogTimeOrder:
 
 
 def _index(file: Path) -> FileIndex | None:
-    """Return a file's index; nothing where it has none to go by."""
+    """Return the index of a file; None if it has none, or one without chunks or channels."""
     try:
         with file.open('rb') as stream:
             index = index_of(Source(stream))

@@ -64,7 +64,7 @@ def custom_of(information: Mapping[str, Any]) -> dict[str, str]:
 
 
 def information_of(folder: Path) -> dict[str, Any]:
-    """Return what ``metadata.yaml`` says, nothing if it is missing: the files can do without."""
+    """Return the content of ``metadata.yaml``; empty if it is missing, which is no error."""
     file = folder / METADATA_FILE
     try:
         text = read_regular(file, MOST_METADATA)
@@ -87,7 +87,7 @@ def information_of(folder: Path) -> dict[str, Any]:
 
 
 def serialized_metadata(record: Metadata) -> dict[str, Any]:
-    """Return what rosbag2's record in an MCAP file says; nothing where it is damaged."""
+    """Return the content of rosbag2's metadata record; empty if it is damaged."""
     text = record.metadata.get('serialized_metadata', '')
     try:
         said = bounded_yaml(text if len(text) <= MOST_METADATA else '')
@@ -120,7 +120,7 @@ def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
 
 
 def by_number(file: Path) -> tuple[int, str]:
-    """Return what files are sorted by: NAME_2.mcap stands before NAME_10.mcap."""
+    """Return the key to sort files by: NAME_2.mcap stands before NAME_10.mcap."""
     return len(file.name), file.name
 
 
@@ -164,14 +164,14 @@ def is_finished(file: Path) -> bool:
 
 
 def unreadable(file: Path, error: OSError) -> BagError:
-    """Return what a user reads of a file that the system does not give."""
+    """Return the error for a file that the system cannot read."""
     reason = f'cannot be read: {error.strerror or error}'
     return BagError(file, reason, 'check its permissions and the disk')
 
 
 def is_in_use(file: Path) -> bool:
     """
-    Return whether some process has a file open for writing; not if that cannot be known.
+    Return whether some process has a file open for writing; False if that cannot be known.
 
     A lease for reading is granted where nobody has. It is asked of the system and given back at
     once; nothing is locked. Only a file's owner may ask, and not of every file system.
@@ -196,14 +196,14 @@ def is_in_use(file: Path) -> bool:
 
 class FooterMetadata(NamedTuple):
     """
-    What the end of a file says.
+    The metadata that our writer puts at the end of a file.
 
     Attributes
     ----------
     custom
         ``custom_data`` of the bag, as it was when the file was ended.
     accounted
-        Whether the account is there, the last record of a recording.
+        Whether the statistics are there, the last record of a recording.
 
     """
 
@@ -212,7 +212,7 @@ class FooterMetadata(NamedTuple):
 
 
 def footer_metadata(file: Path) -> FooterMetadata:
-    """Return what the end of a file says; nothing where it has no end, or a damaged one."""
+    """Return the metadata at the end of a file; empty if the end is missing or damaged."""
     custom: Mapping[str, str] = {}
     accounted = False
     try:
@@ -400,7 +400,7 @@ def _description(
 
 
 def _kept(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str]]:
-    """Return what is kept in memory, and the names of what does not fit: no run of ours has it."""
+    """Return the attachments that are kept in memory, and the names of those that do not fit."""
     kept, beyond, left = [], [], MOST_ATTACHED
     for attachment in attachments:
         if len(attachment.data) <= left:

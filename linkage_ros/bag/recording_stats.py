@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a bag says of itself: what became of its messages, and whether it is finished."""
+"""Statistics of a recording, written into the bag: counts of messages, and how it ended."""
 
 from __future__ import annotations
 
@@ -49,13 +49,13 @@ class RecordingStats(NamedTuple):
     Attributes
     ----------
     received
-        What the recording was given.
+        Messages that were offered to the recorder.
     recorded
-        What is in the bag.
+        Messages in the bag.
     dropped
-        What the disk was too slow or too full for, or what no bag can hold.
+        Messages for which the disk was too slow or too full, or that no bag can hold.
     let_go
-        What was in files that made way for newer ones.
+        Messages in files that were removed to keep newer ones.
 
     """
 
@@ -74,11 +74,11 @@ def custom_data(
     Parameters
     ----------
     custom
-        What else it says.
+        Its other entries.
     summary
-        What the bag holds.
+        The contents of the bag.
     account
-        What became of all messages; None while that is not known.
+        The statistics; None while they are not known.
 
     """
     entries = dict(custom)
@@ -104,14 +104,14 @@ def last_records(
 
 def counts_in(custom: Mapping[str, str], word: str) -> dict[str, int]:
     """
-    Return what a bag's ``custom_data`` counts by topic; nothing where it does not, or is damaged.
+    Return the counts by topic in a bag's ``custom_data``; empty if missing or damaged.
 
     Parameters
     ----------
     custom
         The ``custom_data``.
     word
-        What is counted: 'received', 'dropped' or 'let_go'.
+        Which counts: 'received', 'dropped' or 'let_go'.
 
     """
     try:

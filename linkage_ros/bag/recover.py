@@ -287,7 +287,7 @@ Stopped = Callable[[], bool]
 
 
 class _Findings:
-    """What comes to light on the way."""
+    """Losses, repairs and remarks, collected on the way."""
 
     def __init__(self) -> None:
         self.losses: list[tuple[str, Loss]] = []

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What happened in a run, put together from its bag: samples, faults, resets, what ticks made."""
+"""The events of a run, in the order of its bag: samples, faults, resets, results of ticks."""
 
 from __future__ import annotations
 

@@ -14,12 +14,12 @@
 
 
 """
-What a damaged MCAP file holds that is whole.
+Find the records of a damaged MCAP file that are whole.
 
 The file is taken record by record, as a reader takes it. Where a record is not what it says, the
 index says where to go on, if its own checksum fits; else the records around do, or the file is
-searched for the next chunk or attachment whose checksum fits. What has a checksum is never given
-on trust, and what has none never behind a damage.
+searched for the next chunk or attachment whose checksum fits. A record with a checksum is given
+only if it fits; a record without one is never given behind a damage.
 """
 
 from __future__ import annotations

@@ -14,10 +14,10 @@
 
 
 """
-The numbers of messages about joints, each under what it tells: CDR of three types, of any joints.
+The numbers in messages about joints, by joint and quantity: three message types, any joints.
 
-A message is parsed where its layout differs from the last one's only; else it is unpacked at known
-places in one call. ``sensor_msgs/msg/JointState`` is read as it is. A message of
+A message is parsed only if its layout differs from that of the last one; else it is unpacked at
+known places in one call. ``sensor_msgs/msg/JointState`` is read as it is. A message of
 ``trajectory_msgs/msg/JointTrajectory`` is read where it has one point, as ``~/motion`` has: the
 state at an instant. One of ``sensor_msgs/msg/MultiDOFJointState`` is where it has wrenches alone,
 as ``~/pin_forces``; of these what acts in the plane: forces in x and y, moment about z.
@@ -74,7 +74,7 @@ Key = tuple[str, str]
 
 class Values(NamedTuple):
     """
-    What a message tells.
+    The values in a message.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class MessageValues:
     Parameters
     ----------
     message_type
-        One of `JOINT_STATE`, `TRAJECTORY` and `WRENCHES`; messages of others tell nothing.
+        One of `JOINT_STATE`, `TRAJECTORY` and `WRENCHES`; messages of other types have no values.
     dependent
         Names of joints that nobody can command. A JointState may name them without a number, as
         `JointEffortReader` takes it.

@@ -14,7 +14,7 @@
 
 
 """
-MarkerArray messages as bytes (CDR): packed once, and of each message only what moves written anew.
+MarkerArray messages as bytes (CDR): packed once; each next message changes only what moves.
 
 ``visualization_msgs/msg/MarkerArray`` is what RViz and Foxglove draw. Of its fields those stay
 empty that hold textures, meshes and colours of single points.
@@ -34,7 +34,7 @@ TEXT_VIEW_FACING, TRIANGLE_LIST = 9, 11
 """Types of markers, as Marker.msg numbers them."""
 
 ADD, DELETE = 0, 2
-"""What is to be done with a marker."""
+"""Actions on a marker."""
 
 Colour = tuple[float, float, float, float]
 """Red, green, blue and opacity, from 0 to 1."""
@@ -50,7 +50,7 @@ class Marker(NamedTuple):
     Attributes
     ----------
     ns, number
-        What tells it from the others.
+        Together they identify the marker.
     kind
         Its type.
     scale
@@ -62,7 +62,7 @@ class Marker(NamedTuple):
     at, z
         Where its frame's origin is, in [m].
     text
-        What a text says.
+        The text, of a text marker.
     action
         `ADD` or `DELETE`.
     lifetime

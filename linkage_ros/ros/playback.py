@@ -43,7 +43,7 @@ _LOOK = 0.1
 
 class Part(NamedTuple):
     """
-    What of a bag is played.
+    The part of a bag that is played.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Cue(NamedTuple):
     Attributes
     ----------
     base
-        What the passes before this one took, in [ns] of the bag's time.
+        Duration of the passes before this one, in [ns] of the bag's time.
     log_time
         In [ns].
     topic, data
@@ -227,7 +227,7 @@ class Playback:
     steady
         By which it goes.
     ticks
-        Tell the bag's time; nothing where nobody asks for it.
+        Publish the bag's time; None if ``/clock`` is not wanted.
     told
         Takes the log time, in [ns], now and then.
 
