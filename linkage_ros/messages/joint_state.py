@@ -178,11 +178,16 @@ class JointStateWriter(ArrayWriter):
         arrays = {'positions': 'position', 'rates': 'velocity', 'efforts': 'effort'}
         super().__init__(JOINT_STATE, {'name': names}, arrays)
 
-    def straight(self, stamp: str, positions: Sequence[str], rates: Sequence[str]) -> Lines:
+    def straight(
+        self,
+        stamp: str,
+        positions: Sequence[str],
+        rates: Sequence[str],
+        efforts: Sequence[str] = (),
+    ) -> Lines:
         """Return `write` as lines that make ``message`` of expressions; they are short."""
-        call = self.call(
-            {'positions': ', '.join(positions), **({'rates': ', '.join(rates)} if rates else {})}
-        )
+        arrays = {'positions': positions, 'rates': rates, 'efforts': efforts}
+        call = self.call({name: ', '.join(given) for name, given in arrays.items() if given})
         lines = [f'seconds, nanoseconds = divmod({stamp}, {NANOSECONDS})']
         return Lines([*lines, f'message = {call.lines[0]}'], call.bound)
 
