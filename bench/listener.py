@@ -34,7 +34,7 @@ from typing import Any
 
 from bench.raw_node import keep_last, node, subscription, taker
 from diagnostic_msgs.msg import DiagnosticArray
-from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.stop import stop_on_signals
 
 _POLL = 0.005

@@ -79,10 +79,10 @@ __version__ = '0.1.0'
 
 # A name is imported when it is used, so that nothing else is; type checkers read __init__.pyi.
 _HOMES = {
-    'linkage_ros.bag.reading.reader': 'Bag BagMessage read_bag',
+    'linkage_ros.bag.reader': 'Bag BagMessage read_bag',
     'linkage_ros.drawing.svg': 'svg',
     'linkage_ros.errors': 'BagError DefinitionError FileError LinkageError SynthesisError',
-    'linkage_ros.joint_state': 'JointStateReader Rejection',
+    'linkage_ros.messages.joint_state': 'JointStateReader Rejection',
     'linkage_ros.kinematics.batch': 'Batch',
     'linkage_ros.kinematics.closure': 'Acceleration Closure Position Velocity',
     'linkage_ros.kinematics.linkage': 'Input Limits Linkage Mass RevoluteJoint SlideJoint Slider',

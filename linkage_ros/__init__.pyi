@@ -14,11 +14,7 @@
 
 # What `linkage_ros` exports, for type checkers: at run time a name is imported when it is used.
 
-from linkage_ros.bag.reading.reader import (
-    Bag as Bag,
-    BagMessage as BagMessage,
-    read_bag as read_bag,
-)
+from linkage_ros.bag.reader import Bag as Bag, BagMessage as BagMessage, read_bag as read_bag
 from linkage_ros.drawing.svg import svg as svg
 from linkage_ros.errors import (
     BagError as BagError,
@@ -27,7 +23,10 @@ from linkage_ros.errors import (
     LinkageError as LinkageError,
     SynthesisError as SynthesisError,
 )
-from linkage_ros.joint_state import JointStateReader as JointStateReader, Rejection as Rejection
+from linkage_ros.messages.joint_state import (
+    JointStateReader as JointStateReader,
+    Rejection as Rejection,
+)
 from linkage_ros.kinematics.batch import Batch as Batch
 from linkage_ros.kinematics.closure import (
     Acceleration as Acceleration,

@@ -45,10 +45,10 @@ from linkage_ros.effects.stage import (
 )
 from linkage_ros.effects.turns import all_wrapped, beginnings, Continuous
 from linkage_ros.errors import DefinitionError, listed, quoted
-from linkage_ros.joint_state import JointStateWriter, Rejection
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.routes import Routes
 from linkage_ros.scene.scene import Member, Scene
 from linkage_ros.solvers.registry import SOLVERS

@@ -31,8 +31,8 @@ import platform
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros import __version__
-from linkage_ros.bag.reading.reader import Bag, BagMessage, RUN_FILE
-from linkage_ros.bag.reading.run_events import (
+from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
+from linkage_ros.bag.run_events import (
     Made,
     recorded_events,
     Reset,
@@ -40,9 +40,9 @@ from linkage_ros.bag.reading.run_events import (
     Taken,
     VERSIONS,
 )
-from linkage_ros.cdr import text_of, TIME_END
 from linkage_ros.errors import BagError, listed
-from linkage_ros.joint_state import OwnJointStates
+from linkage_ros.messages.joint_state import OwnJointStates
+from linkage_ros.messages.single_values import text_of, TIME_END
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene

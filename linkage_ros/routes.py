@@ -20,8 +20,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Generic, TypeVar
 
-from linkage_ros.cdr import STAMP_END
-from linkage_ros.joint_state import head_of
+from linkage_ros.messages.joint_state import head_of
+from linkage_ros.messages.layout import STAMP_END
 
 _MOST = 1000
 """How many kinds of messages are remembered; a bound against one who sends ever new names."""

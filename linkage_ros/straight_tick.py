@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from linkage_ros.drives.drive import Drive
     from linkage_ros.effects.stage import DriveStage, WriterStage
     from linkage_ros.effects.turns import Continuous
-    from linkage_ros.joint_state import JointStateWriter
     from linkage_ros.kinematics.compiled.linkage import Compiled
+    from linkage_ros.messages.joint_state import JointStateWriter
 
 _CRANK = ', '.join(CrankState._fields)
 

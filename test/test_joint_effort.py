@@ -25,8 +25,8 @@ from math import isnan
 
 from hypothesis import example, given
 from hypothesis import strategies as st
-from linkage_ros.joint_effort import EffortCommand, JointEffortReader
-from linkage_ros.joint_state import Rejection
+from linkage_ros.messages.joint_effort import EffortCommand, JointEffortReader
+from linkage_ros.messages.joint_state import Rejection
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores

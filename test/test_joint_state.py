@@ -27,7 +27,7 @@ import struct
 
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from linkage_ros.joint_state import (
+from linkage_ros.messages.joint_state import (
     CrankSample,
     JointStateReader,
     JointStateWriter,

@@ -21,7 +21,7 @@ from array import array
 
 from hypothesis import example, given
 from hypothesis import strategies as st
-from linkage_ros.joint_trajectory import JointTrajectoryWriter
+from linkage_ros.messages.joint_trajectory import JointTrajectoryWriter
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores

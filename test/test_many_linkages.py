@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from linkage_ros.errors import FileError
-from linkage_ros.joint_state import JointStateWriter, Rejection
+from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
 import pytest

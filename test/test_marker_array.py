@@ -21,7 +21,7 @@ from math import cos, sin
 
 from hypothesis import example, given
 from hypothesis import strategies as st
-from linkage_ros.marker_array import ADD, DELETE, Marker, MarkerArrayWriter
+from linkage_ros.messages.marker_array import ADD, DELETE, Marker, MarkerArrayWriter
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores

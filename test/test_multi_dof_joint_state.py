@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from hypothesis import example, given
 from hypothesis import strategies as st
-from linkage_ros.multi_dof_joint_state import PlanarWrenchWriter
+from linkage_ros.messages.multi_dof_joint_state import PlanarWrenchWriter
 import pytest
 from rosbags.typesys import get_typestore, Stores
 

@@ -38,11 +38,11 @@ ROOT = Path(__file__).parents[1]
 BARE = 'drive: {constant_rate: {rate: 2.0}}\n'
 KINEMATICS = {'effects.velocity', 'effects.acceleration'}
 FORCES = {*KINEMATICS, 'dynamics.mechanics', 'dynamics.reactions', 'effects.pin_forces'}
-PINS = {'multi_dof_joint_state'}
+PINS = {'messages.multi_dof_joint_state'}
 DRAWN = {
     'effects.marker_arrows',
     'effects.marker_shapes',
-    'marker_array',
+    'messages.marker_array',
     'drawing.curves',
     'drawing.figure',
     'drawing.labels',
@@ -57,7 +57,7 @@ SCENES = {
     'velocity': ('effects: {velocity: {}}', set()),
     'acceleration': (
         'effects: {acceleration: {}}',
-        {'effects.velocity', 'joint_trajectory'},
+        {'effects.velocity', 'messages.joint_trajectory'},
     ),
     'friction': (
         'effects: {effort: {}, friction: {joints: {A: {viscous: 0.1}}}}',
@@ -165,9 +165,9 @@ OPTIONAL = {
     *PINS,
     *DRAWN,
     'effects.history',
-    'joint_trajectory',
+    'messages.joint_trajectory',
     'faults.injection',
-    'joint_effort',
+    'messages.joint_effort',
 }
 """Modules that a scene may or may not have; the rest is always there."""
 
@@ -226,7 +226,11 @@ def test_a_scene_with_one_drive_has_no_other(tmp_path, drive):
     assert modules & drives == {f'drives.{drive}'}
     # The lines of the topic drive stand in the tick that is written for the scene.
     assert passed & drives == ({f'drives.{drive}'} - {'drives.topic'})
-    assert ('dynamics.mechanics' in modules) == ('joint_effort' in modules) == (drive == 'torque')
+    assert (
+        ('dynamics.mechanics' in modules)
+        == ('messages.joint_effort' in modules)
+        == (drive == 'torque')
+    )
     assert 'numpy' not in everything
 
 

@@ -25,8 +25,8 @@ import subprocess
 import sys
 
 from linkage_ros.errors import FileError
-from linkage_ros.joint_state import JointStateWriter, Rejection
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.pipeline import Look, Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
@@ -118,7 +118,10 @@ def test_without_velocity_the_array_is_empty():
     [
         ('{}', set()),
         ('{velocity: {}}', {'effects.velocity'}),
-        ('{acceleration: {}}', {'effects.velocity', 'effects.acceleration', 'joint_trajectory'}),
+        (
+            '{acceleration: {}}',
+            {'effects.velocity', 'effects.acceleration', 'messages.joint_trajectory'},
+        ),
     ],
 )
 def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
@@ -139,7 +142,7 @@ def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
         check=True,
     )
     modules = set(done.stdout.split())
-    optional = {'effects.velocity', 'effects.acceleration', 'joint_trajectory'}
+    optional = {'effects.velocity', 'effects.acceleration', 'messages.joint_trajectory'}
     assert {name for name in optional if f'linkage_ros.{name}' in modules} == imported
     assert not modules & {'rclpy', 'trajectory_msgs'}
 

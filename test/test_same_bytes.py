@@ -31,7 +31,7 @@ SCENES = sorted((ROOT / 'config' / 'scenes').glob('*.yaml'))
 PROGRAM = """
 import hashlib, sys
 from math import cos, sin
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 scene = load_scene(sys.argv[1])

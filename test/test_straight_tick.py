@@ -19,9 +19,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.groups import find_groups
 from linkage_ros.kinematics.linkage import GROUND, Mass
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Look, Pipeline
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.linkage_text import linkage_text

@@ -35,10 +35,10 @@ from campaigns.campaign import tried_in_parts
 from campaigns.damage.run import KINDS, make
 from campaigns.in_process import confined, Ended, in_process
 from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reading.reader import RUN_FILE
+from linkage_ros.bag.reader import RUN_FILE
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from mcap.opcode import Opcode

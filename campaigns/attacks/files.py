@@ -37,8 +37,8 @@ import warnings
 from campaigns.campaign import tried_in_parts
 from campaigns.in_process import confined, in_process
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml
 from linkage_ros.shipped import shipped

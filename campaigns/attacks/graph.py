@@ -39,8 +39,8 @@ from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from linkage_ros.joint_state import JointStateReader, JointStateWriter
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter
 from linkage_ros.processes import Graph, MeasurementError
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml

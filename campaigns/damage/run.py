@@ -32,11 +32,11 @@ import tempfile
 from typing import NamedTuple
 
 from campaigns.campaign import results_of
-from linkage_ros.bag.reading.reader import BagMessage, read_bag, topic_of
-from linkage_ros.bag.reading.records import Message, Source
-from linkage_ros.bag.recovering.salvage import Salvage
+from linkage_ros.bag.mcap_records import Message, Source
+from linkage_ros.bag.reader import BagMessage, read_bag, topic_of
+from linkage_ros.bag.salvage import Salvage
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 from mcap.reader import make_reader
 from mcap.records import Attachment

@@ -43,7 +43,7 @@ from campaigns.disk.judge import (
     Outcome,
     Recorded,
 )
-from linkage_ros.bag.writing.storage import Storage
+from linkage_ros.bag.storage import Storage
 
 _NOBODY = 65534
 

@@ -26,13 +26,13 @@ from time import monotonic_ns, sleep
 from typing import Any
 
 from campaigns.kills.plan import ATTACHMENTS, expected, message, TOPICS
-from linkage_ros.bag.account import FAILURE, UNFINISHED
 from linkage_ros.bag.metadata import BagSummary, METADATA_FILE, ROOT_KEY
-from linkage_ros.bag.reading.reader import Bag, BagMessage, read_bag
-from linkage_ros.bag.recovering.recover import recover
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import Bag, BagMessage, read_bag
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.recording_stats import FAILURE, UNFINISHED
+from linkage_ros.bag.recover import recover
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError, RecordingError
 from rosbags.highlevel import AnyReader
 import yaml

@@ -36,11 +36,12 @@ from typing import Any, NamedTuple
 from bench.report import say
 from campaigns.campaign import progress_lines
 from campaigns.endurance.memory import shortcomings, Usage, usage
+from linkage_ros.bag.recorder import Recorder, RecordingSummary
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.recorder import Recorder, RecordingSummary
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros.tick_loop import TickLoop
 from linkage_ros.scene.load import load_scene

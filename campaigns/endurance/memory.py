@@ -26,8 +26,8 @@ import re
 from statistics import median
 from typing import NamedTuple
 
-from linkage_ros.bag.account import ACCOUNT
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recording_stats import STATS_RECORD
 from linkage_ros.errors import BagError
 from mcap.reader import make_reader
 
@@ -38,7 +38,7 @@ def account_of(folder: Path) -> Account:
     """Return what the bag's last file says of each topic: received, recorded, dropped, let go."""
     with read_bag(folder).files[-1].open('rb') as stream:
         said = {record.name: record.metadata for record in make_reader(stream).iter_metadata()}
-    return {word: json.loads(text) for word, text in said.get(ACCOUNT, {}).items()}
+    return {word: json.loads(text) for word, text in said.get(STATS_RECORD, {}).items()}
 
 
 def shortcomings(folder: Path) -> list[str]:

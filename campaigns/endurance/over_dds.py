@@ -30,7 +30,7 @@ from typing import Any
 from campaigns.campaign import progress_lines
 from campaigns.endurance.accelerated import SCENES
 from campaigns.endurance.memory import Account, account_of, shortcomings, Usage, usage
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.processes import Graph, MeasurementError
 from rosbags.typesys import get_typestore, Stores
 

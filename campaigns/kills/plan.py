@@ -32,10 +32,10 @@ from random import Random
 from time import monotonic_ns
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.reader import BagMessage
+from linkage_ros.bag.reader import BagMessage
+from linkage_ros.bag.storage import COMPRESSIONS, Storage
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writing.storage import COMPRESSIONS, Storage
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 
 PERIOD_NS = 1_000_000
 """Of the ticks: 1 kHz."""

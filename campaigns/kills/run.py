@@ -33,10 +33,10 @@ from typing import Any
 
 from campaigns.campaign import results_of
 from campaigns.kills.plan import expected, Marks, PERIOD_NS, Phase, Plan, TOPICS
-from linkage_ros.bag.account import LET_GO, UNFINISHED
 from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
-from linkage_ros.bag.reading.reader import BagMessage, read_bag
-from linkage_ros.bag.recovering.recover import recover
+from linkage_ros.bag.reader import BagMessage, read_bag
+from linkage_ros.bag.recording_stats import LET_GO, UNFINISHED
+from linkage_ros.bag.recover import recover
 from linkage_ros.errors import BagError
 from rosbags.highlevel import AnyReader
 import yaml

@@ -26,9 +26,9 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.effects.stage import Reading
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Look, Pipeline
 from linkage_ros.scene.load import load_scene
 import numpy as np

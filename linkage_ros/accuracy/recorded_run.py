@@ -27,10 +27,10 @@ from time import monotonic_ns, sleep, thread_time_ns
 from typing import NamedTuple
 
 from linkage_ros.bag.metadata import BagSummary
+from linkage_ros.bag.recorder import Recorder, RecordingSummary
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.recorder import Recorder, RecordingSummary
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cost import feed
 from linkage_ros.errors import RecordingError
 from linkage_ros.kinematics.closure import Closure

@@ -30,8 +30,8 @@ from typing import NamedTuple
 
 from linkage_ros.accuracy.recorded_run import FASTEST, record_run, Recorded
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
-from linkage_ros.bag.writing.packing import compression_type
-from linkage_ros.bag.writing.storage import COMPRESSIONS, FLUSH_AFTER, NONE, Storage
+from linkage_ros.bag.bag_file import compression_type
+from linkage_ros.bag.storage import COMPRESSIONS, FLUSH_AFTER, NONE, Storage
 from linkage_ros.errors import RecordingError
 from linkage_ros.measuring import alternating, Progress, Spread, spread_of
 from linkage_ros.pipeline import Pipeline

@@ -38,11 +38,11 @@ from typing import NamedTuple
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
 from linkage_ros.drives.chirp import Chirp, curve
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.survey import usual_inputs, Way
 from linkage_ros.measuring import Progress, Spread, spread_of
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.processes import Graph, MeasurementError
 from linkage_ros.scene.linkage_text import linkage_text
 from linkage_ros.scene.scene import Scene

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a bag says about a topic: its type, the type's text and hash, and the offered QoS."""
+"""The description of a topic in a bag: type, definition and hash of the type, offered QoS."""
 
 from __future__ import annotations
 

@@ -22,13 +22,10 @@ from datetime import datetime
 from math import isfinite
 from typing import Any
 
-from linkage_ros.bag.account import counts_in, FAILURE
-from linkage_ros.bag.reading.beginning import lost_beginning
-from linkage_ros.bag.reading.contents import Contents
-from linkage_ros.bag.reading.folder import information_of, serialized_metadata
-from linkage_ros.bag.reading.layout import Layout
-from linkage_ros.bag.reading.reader import Bag
-from linkage_ros.bag.reading.run_events import run_said
+from linkage_ros.bag.contents import Contents, Layout
+from linkage_ros.bag.reader import Bag, information_of, serialized_metadata
+from linkage_ros.bag.recording_stats import counts_in, FAILURE
+from linkage_ros.bag.run_events import lost_beginning, run_said
 from linkage_ros.cli.bag_reading import run_or_blank, unfinished_text
 from linkage_ros.cli.worst_states import Examined, WorstStates
 from linkage_ros.kinematics.four_bars import four_bars

@@ -25,12 +25,11 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.bag.account import counts_in
-from linkage_ros.bag.reading.contents import TOLD_EVERY
-from linkage_ros.bag.reading.layout import layout_of
-from linkage_ros.bag.reading.reader import Bag, BagMessage, MOST_ATTACHED, read_bag
-from linkage_ros.bag.reading.run_events import run_account, run_said, RunAccount
-from linkage_ros.bag.recovering.recovery import NOTHING_LOST, RECOVERED
+from linkage_ros.bag.contents import layout_of, TOLD_EVERY
+from linkage_ros.bag.reader import Bag, BagMessage, MOST_ATTACHED, read_bag
+from linkage_ros.bag.recording_stats import counts_in
+from linkage_ros.bag.recover import NOTHING_LOST, RECOVERED
+from linkage_ros.bag.run_events import run_account, run_said, RunAccount
 from linkage_ros.cli.progress import progress
 from linkage_ros.errors import BagError, clean, listed
 from linkage_ros.replay import recorded_scene

@@ -19,11 +19,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from linkage_ros.bag.reading.reader import Bag, BagMessage
-from linkage_ros.bag.reading.run_events import RunAccount
-from linkage_ros.cli.message_values import JOINT_STATE
+from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.bag.run_events import RunAccount
 from linkage_ros.errors import BagError, did_you_mean, listed
-from linkage_ros.joint_state import head_of, JointStateReader, Rejection
+from linkage_ros.messages.joint_state import head_of, JointStateReader, Rejection
+from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.scene.scene import Scene
 
 DEFAULT = '/crank_states'

@@ -33,9 +33,8 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reading.contents import contents_of
-from linkage_ros.bag.reading.layout import layout_of
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.contents import contents_of, layout_of
+from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.bag_account import (
     account_of,
     replay_account,

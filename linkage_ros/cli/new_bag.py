@@ -22,8 +22,8 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.reader import Bag, RUN_FILE
-from linkage_ros.bag.reading.run_events import (
+from linkage_ros.bag.reader import Bag, RUN_FILE
+from linkage_ros.bag.run_events import (
     BEGUN,
     OWN_EFFECTS,
     Reset,
@@ -35,11 +35,11 @@ from linkage_ros.bag.reading.run_events import (
     WITH_THE_RUN,
 )
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cdr import time_message
-from linkage_ros.cli.message_values import JOINT_STATE
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.what_if import Done, WhatIf
 from linkage_ros.errors import LinkageError
+from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import own_effects_here, versions_here
 from linkage_ros.scene.scene import Scene

@@ -30,17 +30,15 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.bag.reading.being_written import is_being_written
-from linkage_ros.bag.reading.in_time import TimeOrder
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.order import LogTimeOrder
+from linkage_ros.bag.reader import Bag, is_in_use
 from linkage_ros.bag.topic import Topic
 from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.progress import progress, Told
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
-from linkage_ros.joint_state import NANOSECONDS
-from linkage_ros.ros.bag_publishers import offer
-from linkage_ros.ros.cues import Part
-from linkage_ros.ros.playback import LATE, Playback
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.ros.bag_topics import offer
+from linkage_ros.ros.playback import LATE, Part, Playback
 from linkage_ros.ros.player import CLOCK, play, player_node, Wishes
 from linkage_ros.stop import heeded
 
@@ -103,7 +101,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     topics = _topics(bag, arguments.topics)
     if arguments.clock:
         topics = _without_clock(topics)
-    order = TimeOrder(bag)
+    order = LogTimeOrder(bag)
     begin = order.begin
     if begin is None:
         raise BagError(bag.path, 'holds no messages', 'there is nothing to play')
@@ -137,7 +135,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 def _say_truncated(bag: Bag) -> None:
     """Say that a bag has no end; raise where that is because it still grows."""
     for file in bag.files:
-        if is_being_written(file):
+        if is_in_use(file):
             raise BagError(file, 'is being written', 'end its recording first')
     print(
         f'linkage play: {bag.path}: unfinished: its recording was killed; what it holds is played',

@@ -28,8 +28,8 @@ from linkage_ros.cli.bag_reading import add_trust, beside, opened, scene_of
 from linkage_ros.drawing.painting import save
 from linkage_ros.effects.turns import wrapped
 from linkage_ros.errors import BagError, LinkageError, shortened
-from linkage_ros.joint_state import JointStateReader, Rejection
 from linkage_ros.kinematics.linkage import Input, RevoluteJoint
+from linkage_ros.messages.joint_state import JointStateReader, Rejection
 from linkage_ros.replay import replay
 from linkage_ros.stop import StoppedError
 

@@ -27,12 +27,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.beginning import lost_beginning
-from linkage_ros.bag.reading.reader import Bag, BagMessage
-from linkage_ros.bag.reading.run_events import run_account
-from linkage_ros.cli.message_values import JOINT_STATE
+from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.bag.run_events import lost_beginning, run_account
 from linkage_ros.cli.replay_comparison import At, Comparison, First
 from linkage_ros.kinematics.linkage import RevoluteJoint
+from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import replay_all, ReplayedTick
 from linkage_ros.scene.scene import Scene

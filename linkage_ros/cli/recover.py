@@ -22,8 +22,7 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.bag.recovering.recover import recover
-from linkage_ros.bag.recovering.recovery import Recovery
+from linkage_ros.bag.recover import recover, Recovery
 from linkage_ros.cli.progress import progress
 from linkage_ros.cli.tables import show, Table
 from linkage_ros.errors import clean

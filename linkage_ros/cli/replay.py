@@ -35,8 +35,8 @@ import sys
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reading.reader import Bag, RUN_FILE
-from linkage_ros.bag.reading.run_events import run_account
+from linkage_ros.bag.reader import Bag, RUN_FILE
+from linkage_ros.bag.run_events import run_account
 from linkage_ros.cli.bag_reading import add_trust, BagReading, opened, scene_of
 from linkage_ros.cli.proof import DIFFERENT, IDENTICAL, prove, turning_joints
 from linkage_ros.cli.replay_account import (

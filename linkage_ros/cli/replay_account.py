@@ -21,13 +21,13 @@ from collections.abc import Iterator, Mapping
 from math import isfinite
 from typing import Any
 
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.bag_reading import BagReading, gaps, unfinished_text
-from linkage_ros.cli.message_values import UNITS
 from linkage_ros.cli.proof import beginning_text, Proof
 from linkage_ros.cli.replay_comparison import At, Comparison, First, TopicComparison, ulps
 from linkage_ros.cli.tables import Table
 from linkage_ros.errors import clean
+from linkage_ros.messages.joint_values import UNITS
 from linkage_ros.scene.scene import Scene
 
 

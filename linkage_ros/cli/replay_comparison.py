@@ -28,7 +28,7 @@ from math import copysign, isfinite, isnan, sqrt, tau, ulp
 from struct import Struct
 from typing import NamedTuple
 
-from linkage_ros.cli.message_values import Key, MessageValues, POSITION, Values
+from linkage_ros.messages.joint_values import Key, MessageValues, POSITION, Values
 
 _DOUBLE, _BITS = Struct('<d'), Struct('<q')
 

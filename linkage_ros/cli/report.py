@@ -33,8 +33,8 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reading.layout import layout_of
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.contents import layout_of
+from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.bag_account import account_of, scene_account
 from linkage_ros.cli.bag_reading import add_trust, beside, gaps, opened, scene_of
 from linkage_ros.cli.info import tables

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.cli.bag_reading import gaps
 from linkage_ros.cli.proof import beginning_text, DIFFERENT, prove, UNTOLD
 from linkage_ros.errors import LinkageError

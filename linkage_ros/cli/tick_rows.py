@@ -27,10 +27,10 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.contents import TOLD_EVERY
-from linkage_ros.bag.reading.reader import Bag
-from linkage_ros.cli.message_values import FORCE_X, Key, MessageValues, QUANTITIES, Values
+from linkage_ros.bag.contents import TOLD_EVERY
+from linkage_ros.bag.reader import Bag
 from linkage_ros.errors import BagError
+from linkage_ros.messages.joint_values import FORCE_X, Key, MessageValues, QUANTITIES, Values
 
 TIME, STAMP, PUBLISHED, LOGGED = 'time [s]', 'stamp [ns]', 'publish time [ns]', 'log time [ns]'
 """

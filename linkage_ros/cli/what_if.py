@@ -32,9 +32,9 @@ from collections.abc import Generator, Iterable, Iterator
 from dataclasses import replace
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.bag.reading.run_events import Event, Made, Reset, Taken, Turned
-from linkage_ros.cdr import text_message, TIME_END
+from linkage_ros.bag.run_events import Event, Made, Reset, Taken, Turned
 from linkage_ros.errors import LinkageError
+from linkage_ros.messages.single_values import text_message, TIME_END
 from linkage_ros.pipeline import Pipeline, Tick
 from linkage_ros.replay import change_text, read_change
 from linkage_ros.scene.scene import Scene

@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from math import inf
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.reader import Bag
 from linkage_ros.errors import BagError
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.nearness import Nearness

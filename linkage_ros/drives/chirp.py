@@ -39,7 +39,7 @@ from typing import NamedTuple
 
 from linkage_ros.drives.clocked import as_integers, build_clocked, ClockedDrive, Curve, LARGEST
 from linkage_ros.drives.drive import Context
-from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.parameters import choice, each, flag, number
 
 

@@ -28,7 +28,7 @@ from math import cos, sin, tau
 
 from linkage_ros.drives.clocked import as_integers, build_clocked, ClockedDrive, Curve, LARGEST
 from linkage_ros.drives.drive import Context
-from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.parameters import each, number
 
 

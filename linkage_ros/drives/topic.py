@@ -21,7 +21,8 @@ from dataclasses import dataclass
 from math import isfinite
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
-from linkage_ros.joint_state import CrankSample, JointStateReader, NANOSECONDS, Rejection
+from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.parameters import flag, number
 from linkage_ros.written import Lines
 

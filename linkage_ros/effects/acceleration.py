@@ -62,9 +62,9 @@ def stage(_parameters: AccelerationParameters, context: Context) -> Stage:
 
 def writer(_parameters: AccelerationParameters, context: Context) -> Writer:
     """Build what writes the message: what is read, as a trajectory of one point."""
-    from linkage_ros.joint_trajectory import JointTrajectoryWriter  # local import: if published
+    from linkage_ros.messages import joint_trajectory  # local import: if published
 
-    write = JointTrajectoryWriter(context.joints_in_messages).write
+    write = joint_trajectory.JointTrajectoryWriter(context.joints_in_messages).write
 
     def write_motion(_now: int, _motion: Motion | None, reading: Reading) -> bytes:
         return write(reading.stamp, reading.joints, reading.rates, reading.accelerations)

@@ -35,7 +35,7 @@ from linkage_ros.drawing.shapes import carried_shapes, Circle, Polygon, Segment,
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.survey import usual_inputs
-from linkage_ros.marker_array import (
+from linkage_ros.messages.marker_array import (
     ARROW,
     Colour,
     LINE_LIST,

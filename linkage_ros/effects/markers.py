@@ -43,13 +43,13 @@ from linkage_ros.drives.drive import Context
 from linkage_ros.effects.marker_arrows import Arrows
 from linkage_ros.effects.marker_shapes import ALARM, Key, marker_shapes
 from linkage_ros.effects.stage import Motion, Reading, Writer
-from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Driven, Dyad, Group
 from linkage_ros.kinematics.survey import usual_inputs
-from linkage_ros.marker_array import DELETE, MarkerArrayWriter
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages.marker_array import DELETE, MarkerArrayWriter
 from linkage_ros.parameters import number, text
 
 TOPIC = '~/markers'

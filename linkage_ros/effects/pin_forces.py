@@ -60,9 +60,11 @@ def stage(_parameters: PinForcesParameters, context: Context) -> Stage:
 
 def writer(_parameters: PinForcesParameters, context: Context) -> Writer:
     """Build what writes the message; nothing where there are no forces."""
-    from linkage_ros.multi_dof_joint_state import PlanarWrenchWriter  # local import: if published
+    from linkage_ros.messages import multi_dof_joint_state  # local import: if published
 
-    write = PlanarWrenchWriter([context.prefix + name for name in context.reactions.names]).write
+    write = multi_dof_joint_state.PlanarWrenchWriter(
+        [context.prefix + name for name in context.reactions.names]
+    ).write
 
     def write_forces(now: int, motion: Motion, _reading: Reading) -> bytes:
         return write(now, motion.reactions) if motion.reactions else b''

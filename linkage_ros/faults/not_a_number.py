@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from math import nan
 
 from linkage_ros.faults.fault import Switch
-from linkage_ros.joint_state import with_every_number
+from linkage_ros.messages.joint_state import with_every_number
 
 
 @dataclass(frozen=True, slots=True)

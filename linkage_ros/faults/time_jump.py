@@ -25,8 +25,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from linkage_ros.cdr import TIME_END
 from linkage_ros.faults.fault import Switch
+from linkage_ros.messages.single_values import TIME_END
 from linkage_ros.parameters import number
 
 

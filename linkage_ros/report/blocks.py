@@ -26,8 +26,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.contents import Contents, TopicContents
-from linkage_ros.bag.reading.reader import Bag, BagMessage
+from linkage_ros.bag.contents import Contents, TopicContents
+from linkage_ros.bag.reader import Bag, BagMessage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import BagError
 from linkage_ros.report.decimation import Times

@@ -23,13 +23,19 @@ the messages of a bag may have been written by any program.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from struct import error as StructError
-from struct import Struct
 from typing import NamedTuple
 
-from linkage_ros.cdr import aligned, STAMP_END
+from linkage_ros.messages.layout import declared, MalformedError, parsed
 from linkage_ros.report.labels import short
 from linkage_ros.report.run import Lane
+
+DIAGNOSTIC_ARRAY = declared(
+    'Time stamp, string frame_id, DiagnosticStatus[] status',
+    DiagnosticStatus=declared(
+        'uint8 level, string name, string message, string hardware_id, KeyValue[] values',
+        KeyValue=declared('string key, string value'),
+    ),
+)
 
 _MOST_ITEMS = 10_000
 """Statuses of a message, and values of a status; what says to have more is damaged."""
@@ -59,50 +65,24 @@ class Status(NamedTuple):
 
 
 def statuses(data: bytes) -> list[Status]:
-    """Return what a message says; nothing of one that is damaged."""
-    order = {b'\x00\x00': '>', b'\x00\x01': '<'}.get(data[:2])
-    if order is None:
-        return []
+    """Return the statuses of a message; none of one that is damaged."""
     try:
-        return _Cursor(data, Struct(f'{order}I')).statuses()
-    except (StructError, IndexError):
+        found = parsed(data, DIAGNOSTIC_ARRAY, _MOST_ITEMS)['status']
+    except MalformedError:
         return []
+    return [
+        Status(
+            data[status['level'].first],
+            _text(status['name']),
+            _text(status['message']),
+            {_text(value['key']): _text(value['value']) for value in status['values']},
+        )
+        for status in found
+    ]
 
 
-class _Cursor:
-    """Goes through a message from its header on."""
-
-    def __init__(self, data: bytes, count: Struct) -> None:
-        self._data, self._count, self._at = data, count, STAMP_END
-        self._text()
-
-    def statuses(self) -> list[Status]:
-        return [self._status() for _ in range(self._size())]
-
-    def _status(self) -> Status:
-        level = self._data[self._at]
-        self._at += 1
-        name, message, _ = self._text(), self._text(), self._text()
-        pairs = [(self._text(), self._text()) for _ in range(self._size())]
-        return Status(level, name, message, dict(pairs))
-
-    def _size(self) -> int:
-        at = aligned(self._at, 4)
-        self._at = at + 4
-        (number,) = self._count.unpack_from(self._data, at)
-        if number > _MOST_ITEMS:
-            raise StructError
-        return int(number)
-
-    def _text(self) -> str:
-        at = aligned(self._at, 4)
-        (length,) = self._count.unpack_from(self._data, at)
-        start = at + 4
-        self._at = start + length
-        if self._at > len(self._data):
-            raise StructError
-        end = self._at - 1
-        return self._data[start:end].decode('utf-8', 'backslashreplace')
+def _text(text: bytes) -> str:
+    return text.decode('utf-8', 'backslashreplace')
 
 
 _LEVELS = {1: 'warning', 2: 'error', 3: 'stale'}

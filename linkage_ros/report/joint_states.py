@@ -27,7 +27,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from linkage_ros.joint_state import arrays_of, NANOSECONDS, Rejection
+from linkage_ros.messages.joint_state import arrays_of, Rejection
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.report.decimation import Flags, Numbers, Times
 import numpy as np
 from numpy.typing import NDArray
@@ -172,7 +173,7 @@ class JointStates:
         return len(self.joints) - 1
 
 
-def _unequal(found: tuple[str, list[bytes], list[tuple[int, int, int]]]) -> str:
+def _unequal(found: tuple[str, list[bytes], Sequence[tuple[int, int, int]]]) -> str:
     """Return why a message is left out whose arrays do not fit its names; '' where they do."""
     _, names, arrays = found
     counts = {n for _, n, _ in arrays} - {0}

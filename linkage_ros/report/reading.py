@@ -24,9 +24,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from linkage_ros.bag.reading.contents import Contents
-from linkage_ros.bag.reading.reader import Bag
-from linkage_ros.bag.reading.run_events import run_account
+from linkage_ros.bag.contents import Contents
+from linkage_ros.bag.reader import Bag
+from linkage_ros.bag.run_events import run_account
 from linkage_ros.errors import LinkageError
 from linkage_ros.replay import recorded_scene
 from linkage_ros.report.blocks import Blocks, Entry, Progress, RunClock, times_of

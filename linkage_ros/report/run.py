@@ -28,7 +28,7 @@ from itertools import pairwise
 from operator import attrgetter
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.contents import Contents
+from linkage_ros.bag.contents import Contents
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.report.decimation import Histogram, Intervals, Numbers, Times
 from linkage_ros.report.labels import short, size_in_json

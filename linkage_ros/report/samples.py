@@ -25,9 +25,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from linkage_ros.bag.reading.reader import Bag
+from linkage_ros.bag.reader import Bag
 from linkage_ros.errors import BagError
-from linkage_ros.joint_state import Rejection
+from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import read_change, turn
 from linkage_ros.report.blocks import Rows

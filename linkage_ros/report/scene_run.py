@@ -19,10 +19,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from linkage_ros.bag.reading.beginning import lost_beginning
-from linkage_ros.bag.reading.contents import Contents
-from linkage_ros.bag.reading.reader import Bag
-from linkage_ros.bag.reading.run_events import run_said, RunAccount
+from linkage_ros.bag.contents import Contents
+from linkage_ros.bag.reader import Bag
+from linkage_ros.bag.run_events import lost_beginning, run_said, RunAccount
 from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.status import Status
 from linkage_ros.replay import own_joint_states

@@ -13,11 +13,12 @@
 # limitations under the License.
 
 
-"""What a bag needs to know of a topic, from the installed message packages and the graph."""
+"""A bag's topics and the graph: how a bag describes a topic, and a bag's topics published."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
 from importlib import import_module
 import json
 from pathlib import Path
@@ -25,9 +26,11 @@ import re
 from typing import Any
 
 from linkage_ros.bag.topic import INFINITE, QosProfile, Topic
-from linkage_ros.errors import LinkageError, RecordingError
+from linkage_ros.errors import LinkageError, quoted, RecordingError
 from linkage_ros.shipped import share_folders
-from rclpy.qos import QoSProfile
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 _FIELD = re.compile(r'^\s*(?P<type>[A-Za-z]\w*(?:/\w+)*)(?:<=\d+)?(?:\[[^\]]*\])?\s+[a-z]\w*')
 _PRIMITIVES = frozenset(
@@ -155,3 +158,110 @@ def _qos(profile: QoSProfile) -> QosProfile:
         liveliness_lease_duration=profile.liveliness_lease_duration.nanoseconds or INFINITE,
         avoid_ros_namespace_conventions=bool(profile.avoid_ros_namespace_conventions),
     )
+
+
+_TYPE = re.compile(r'([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)')
+_MOST_DEPTH = 2**31 - 1  # as DDS counts it
+
+
+def offer(
+    node: Node, topics: Collection[Topic], left_out: Callable[[LinkageError], None]
+) -> dict[str, Publisher]:
+    """
+    Offer a bag's topics on the graph.
+
+    Parameters
+    ----------
+    node
+        The node.
+    topics
+        The topics.
+    left_out
+        Takes why a topic cannot be offered.
+
+    Returns
+    -------
+    publishers : dict of str to Publisher
+        By the names in the bag.
+
+    """
+    publishers = {}
+    for topic in topics:
+        try:
+            publishers[topic.name] = _publisher(node, topic)
+        except LinkageError as error:  # noqa: PERF203 (a bag has a few topics)
+            left_out(error)
+    return publishers
+
+
+def offered(qos: QosProfile) -> QoSProfile:
+    """
+    Return what is offered where this was recorded.
+
+    Deadline, lifespan and liveliness are promises about the recorded publisher's life, which
+    playing at another rate would break.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_ALL if qos.history == 'keep_all' else HistoryPolicy.KEEP_LAST,
+        depth=min(max(1, qos.depth), _MOST_DEPTH),
+        reliability=(
+            ReliabilityPolicy.BEST_EFFORT
+            if qos.reliability == 'best_effort'
+            else ReliabilityPolicy.RELIABLE
+        ),
+        durability=(
+            DurabilityPolicy.TRANSIENT_LOCAL
+            if qos.durability == 'transient_local'
+            else DurabilityPolicy.VOLATILE
+        ),
+    )
+
+
+def _publisher(node: Node, topic: Topic) -> Publisher:
+    """Return what publishes a topic; raises LinkageError where that cannot be."""
+    kind = _class_of(topic)
+    unfit = LinkageError(
+        quoted(topic.name)[1:-1] or "''", 'is no name of a ROS 2 topic', 'convert the bag'
+    )
+    if '\0' in topic.name:  # rclpy would publish on what stands before it
+        raise unfit
+    try:
+        return node.create_publisher(kind, topic.name, offered(topic.qos))
+    except Exception:  # noqa: BLE001 (a space, a {word}, a name too long: each has its own)
+        raise unfit from None
+
+
+def _class_of(topic: Topic) -> Any:
+    """
+    Return the class of a topic's messages.
+
+    Raises
+    ------
+    LinkageError
+        There is none, or it is not what was recorded.
+
+    """
+    matched = _TYPE.fullmatch(topic.type)
+    if matched is None:
+        raise LinkageError(
+            topic.name,
+            f'its type {quoted(topic.type)} is none of a ROS 2 message',
+            'convert the bag',
+        )
+    package, kind = matched.groups()
+    # A bag comes from anywhere: nothing is imported by a name in it that is no message package.
+    if not any((folder / 'msg' / f'{kind}.idl').is_file() for folder in share_folders(package)):
+        raise LinkageError(
+            topic.name, f'{topic.type} is not installed', f'install the ROS package {package}'
+        )
+    found = message_type(topic.type, topic.name)
+    installed = ''
+    with suppress(LinkageError):
+        installed = bag_topic(topic.name, found, QoSProfile(depth=1)).type_hash
+    if topic.type_hash and installed and topic.type_hash != installed:
+        raise LinkageError(
+            topic.name,
+            f'{topic.type} was another when it was recorded',
+            f'install the ROS package {package} of that time',
+        )
+    return found

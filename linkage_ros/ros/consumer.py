@@ -37,8 +37,9 @@ from typing import Any, NamedTuple
 
 from linkage_ros.accuracy.ticking import CrankAt, motions_of
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import JointStateReader, JointStateWriter, NANOSECONDS, Rejection
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.ros.companion import Companion, run_companion
 from linkage_ros.ros.scene_topics import OUTPUT_QOS
 from linkage_ros.scene.load import load_scene

@@ -27,7 +27,8 @@ from math import cos, sin, tau
 from threading import Event
 from time import monotonic_ns, sleep, time_ns
 
-from linkage_ros.joint_state import JointStateWriter, NANOSECONDS
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.ros.companion import Companion, run_companion
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState

@@ -24,11 +24,11 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.linkage import Input
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline import Line, Look
 from linkage_ros.ros.run_snapshots import RunSnapshots
 from linkage_ros.ros.tick_loop import Counts, TickLoop

@@ -33,8 +33,8 @@ from typing import Any, TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticArray
 from linkage_ros.bag.topic import Topic
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import NANOSECONDS
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import own_joint_states
 from linkage_ros.ros import pacing

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from threading import Event
 from time import monotonic_ns, sleep, time_ns
 
-from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.ros.simulated_time import nanoseconds_of
 from linkage_ros.ros.tick_loop import Pace, TickLoop
 from rclpy.context import Context

@@ -14,7 +14,7 @@
 
 
 """
-A bag's messages at their times.
+A bag's messages, read before they are due and sent at their times.
 
 The time of the bag runs on the steady clock from the first message on, at a rate. Each message is
 due at a time that follows from its log time alone, so that a late one delays no other. The clock
@@ -23,13 +23,150 @@ for ``/clock`` ticks on the same thread: it never is ahead of a message that has
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
 from math import inf
-from threading import Event
+from queue import Empty, Full, Queue
+from threading import Event, Thread
 from time import monotonic_ns, sleep
 from typing import NamedTuple, Protocol
 
-from linkage_ros.ros.cues import Cue
+from linkage_ros.bag.order import LogTimeOrder
+from linkage_ros.errors import LinkageError
+
+_BATCH = 256
+_BATCH_SIZE = 2**20
+_BATCHES = 8
+"""How many batches of how many messages, or bytes, are read ahead."""
+
+_LOOK = 0.1
+
+
+class Part(NamedTuple):
+    """
+    The part of a bag that is played.
+
+    Attributes
+    ----------
+    first, last
+        Log times between which messages are played, in [ns].
+    topics
+        Their topics.
+    loop
+        Whether it begins again at its end.
+
+    """
+
+    first: int
+    last: float
+    topics: Collection[str]
+    loop: bool
+
+
+class Cue(NamedTuple):
+    """
+    A message and its time.
+
+    Attributes
+    ----------
+    base
+        Duration of the passes before this one, in [ns] of the bag's time.
+    log_time
+        In [ns].
+    topic, data
+        The message.
+
+    """
+
+    base: int
+    log_time: int
+    topic: str
+    data: bytes
+
+
+def cues(order: LogTimeOrder, part: Part) -> Iterator[Cue]:
+    """
+    Yield the messages that are played.
+
+    Raises
+    ------
+    BagError
+        The bag is damaged; what lies before the damage has been given by then.
+    LinkageError
+        A loop would take no time.
+
+    """
+    base = 0
+    while True:
+        newest = part.first
+        for topic, log_time, _, data in order.messages(part.first):
+            if log_time > part.last:
+                break
+            if topic in part.topics:
+                newest = max(newest, log_time)
+                yield Cue(base, log_time, topic, data)
+        if not part.loop:
+            return
+        if newest == part.first:
+            raise LinkageError(
+                '--loop', 'all that is played is of one instant', 'play it without --loop'
+            )
+        base += newest - part.first
+
+
+def read_ahead(messages: Iterator[Cue], stop: Event) -> Generator[Cue, None, None]:
+    """
+    Yield messages that a thread of its own has read before they are asked for, until the event.
+
+    It reads some batches ahead and no further. What is raised while reading is raised here, behind
+    the messages that were read before.
+    """
+    batches: Queue[list[Cue] | Exception] = Queue(_BATCHES)
+    ended = Event()
+
+    def hand_over(batch: list[Cue] | Exception) -> bool:
+        while not ended.is_set():
+            try:
+                batches.put(batch, timeout=_LOOK)
+            except Full:
+                continue
+            return True
+        return False
+
+    def read() -> None:
+        batch: list[Cue] = []
+        size = 0
+        error: Exception | None = None
+        try:
+            for cue in messages:
+                batch.append(cue)
+                size += len(cue.data)
+                if len(batch) == _BATCH or size > _BATCH_SIZE:
+                    if not hand_over(batch):
+                        return
+                    batch, size = [], 0
+        except Exception as raised:  # noqa: BLE001 (it goes to who reads)
+            error = raised
+        if batch and not hand_over(batch):
+            return
+        hand_over(error or [])
+
+    reader = Thread(target=read, name='read ahead', daemon=True)
+    reader.start()
+    try:
+        while not stop.is_set():
+            try:
+                batch = batches.get(timeout=_LOOK)
+            except Empty:
+                continue
+            if isinstance(batch, Exception):
+                raise batch
+            if not batch:
+                return
+            yield from batch
+    finally:
+        # The reader is not waited for: what it passes over on its way to a start may be long.
+        ended.set()
+
 
 LATE = 10_000_000
 """How long after it was due a message is sent that counts as late, in [ns]."""
@@ -90,7 +227,7 @@ class Playback:
     steady
         By which it goes.
     ticks
-        Tell the bag's time; nothing where nobody asks for it.
+        Publish the bag's time; None if ``/clock`` is not wanted.
     told
         Takes the log time, in [ns], now and then.
 

@@ -24,12 +24,11 @@ import sys
 from threading import Event
 from time import monotonic
 
-from linkage_ros.bag.reading.in_time import TimeOrder
-from linkage_ros.cdr import TIME_END, time_message
+from linkage_ros.bag.order import LogTimeOrder
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import NANOSECONDS
-from linkage_ros.ros.cues import cues, Part, read_ahead
-from linkage_ros.ros.playback import Playback, SteadyClock, Ticks
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages.single_values import TIME_END, time_message
+from linkage_ros.ros.playback import cues, Part, Playback, read_ahead, SteadyClock, Ticks
 from linkage_ros.ros.transports import leave_out_shared_memory
 from linkage_ros.stop import bounded_end
 import rclpy
@@ -110,7 +109,7 @@ def player_node(arguments: Sequence[str]) -> Iterator[Node]:
 def play(
     node: Node,
     publishers: Mapping[str, Publisher],
-    order: TimeOrder,
+    order: LogTimeOrder,
     part: Part,
     wishes: Wishes,
     stop: Event,

@@ -26,8 +26,10 @@ import platform
 from typing import cast
 
 from linkage_ros import __version__
-from linkage_ros.bag.reading.reader import RUN_FILE
-from linkage_ros.bag.reading.run_events import (
+from linkage_ros.bag.bag_file import compression_type
+from linkage_ros.bag.reader import RUN_FILE
+from linkage_ros.bag.recorder import Recorder, RecordingSummary
+from linkage_ros.bag.run_events import (
     BEGUN,
     CHOSEN,
     MID_RUN,
@@ -35,12 +37,10 @@ from linkage_ros.bag.reading.run_events import (
     SEED,
     WITH_THE_RUN,
 )
+from linkage_ros.bag.snapshot import SnapshotMemory
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.packing import compression_type
-from linkage_ros.bag.writing.recorder import Recorder, RecordingSummary
-from linkage_ros.bag.writing.snapshot import SnapshotMemory
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 from linkage_ros.pipeline import Line
 from linkage_ros.replay import own_effects_here

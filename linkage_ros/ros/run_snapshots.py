@@ -21,10 +21,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from linkage_ros.bag.writing.recorder import RecordingSummary, TopicCounts
-from linkage_ros.bag.writing.snapshot import KeptCounts, SnapshotMemory
-from linkage_ros.bag.writing.snapshot_bag import SnapshotWriting
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.recorder import RecordingSummary, TopicCounts
+from linkage_ros.bag.snapshot import KeptCounts, SnapshotMemory, SnapshotWriting
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 
 Answer = Callable[[bool, str], None]

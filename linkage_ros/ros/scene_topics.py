@@ -22,7 +22,7 @@ from functools import partial
 from typing import Any, TYPE_CHECKING
 
 from linkage_ros.bag.topic import Topic
-from linkage_ros.cdr import text_message
+from linkage_ros.messages.single_values import text_message
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import change_text
 from linkage_ros.ros.bag_topics import bag_topic, message_type

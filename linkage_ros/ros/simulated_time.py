@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from time import monotonic_ns
 
-from linkage_ros.joint_state import NANOSECONDS
+from linkage_ros.messages.layout import NANOSECONDS
 from rclpy.time_source import TimeSource
 from rosgraph_msgs.msg import Clock as ClockMessage
 

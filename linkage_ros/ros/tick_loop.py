@@ -29,11 +29,11 @@ from threading import Event, Thread
 from time import monotonic_ns
 from typing import Any, TYPE_CHECKING
 
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.cdr import time_message
-from linkage_ros.joint_state import Rejection
+from linkage_ros.bag.recorder import Recorder
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import Rejection
+from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline import Look, Pipeline, Tick
 from linkage_ros.ros.duration_histogram import DurationHistogram
 from linkage_ros.ros.recorded_topics import recorded_topics

@@ -26,10 +26,10 @@ from math import inf
 from time import monotonic
 
 from linkage_ros.errors import listed
-from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.ros.tick_loop import Counts
 from rclpy.impl.rcutils_logger import RcutilsLogger
 

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from linkage_ros.bag.writing.storage import COMPRESSIONS, Storage
+from linkage_ros.bag.storage import COMPRESSIONS, Storage
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.faults.fault import Fault
 from linkage_ros.files.section import Section

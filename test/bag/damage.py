@@ -19,8 +19,8 @@ from __future__ import annotations
 from io import BytesIO
 from pathlib import Path
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.writer import BagWriter
 from mcap.reader import make_reader
 
 ATTACHMENTS = {

@@ -19,9 +19,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.bag.reading.contents import contents_of
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.contents import contents_of
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.writer import BagWriter
 import pytest
 
 

@@ -19,9 +19,9 @@ from __future__ import annotations
 
 import os
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.recovering.recover import recover
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recover import recover
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 from mcap.writer import CompressionType, IndexType, Writer
 import pytest

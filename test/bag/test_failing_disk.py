@@ -26,10 +26,10 @@ import os
 from pathlib import Path
 
 from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 import pytest
 import yaml
@@ -75,7 +75,7 @@ def data(messages):
 @pytest.fixture
 def ages(monkeypatch):
     """Let the metadata be due for renewal at every flush."""
-    monkeypatch.setattr('linkage_ros.bag.writing.writer._RENEWAL', -1e9)
+    monkeypatch.setattr('linkage_ros.bag.writer._RENEWAL', -1e9)
 
 
 @pytest.mark.parametrize(

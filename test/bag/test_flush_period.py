@@ -22,9 +22,9 @@ import threading
 import time
 from types import SimpleNamespace
 
+from linkage_ros.bag.recorder import Recorder
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 import pytest
 
 PERIOD = 0.1
@@ -82,7 +82,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
             Event=clock.event, Thread=threading.Thread, Lock=threading.Lock
         ),
     }.items():
-        monkeypatch.setattr(f'linkage_ros.bag.writing.recorder.{name}', stand_in)
+        monkeypatch.setattr(f'linkage_ros.bag.recorder.{name}', stand_in)
     return clock
 
 

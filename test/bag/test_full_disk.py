@@ -32,11 +32,11 @@ import subprocess
 import sys
 import time
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.disk import Reserve
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.disk import Reserve
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError, RecordingError
 import pytest
 import yaml
@@ -110,7 +110,7 @@ def test_a_disk_that_is_full_at_the_end_still_gets_an_index(small_disk, topics, 
 
 LIMITED = """
 import json, pickle, resource, signal, sys
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 folder, limit, flush_every, pickled = sys.argv[1:]
 topics, messages = pickle.load(open(pickled, 'rb'))
@@ -259,8 +259,8 @@ def test_a_disk_that_dies_leaves_the_part_that_it_took(
 
 KILLED = """
 import pickle, sys, time
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.writer import BagWriter
 kind, folder, pickled = sys.argv[1:]
 topics, messages = pickle.load(open(pickled, 'rb'))
 writer = BagWriter(folder, topics, {'scene.yaml': ('text/yaml', b'linkage: four_bar')})

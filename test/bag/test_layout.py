@@ -19,9 +19,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.bag.reading.folder import serialized_metadata
-from linkage_ros.bag.reading.layout import layout_of
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.contents import layout_of
+from linkage_ros.bag.reader import serialized_metadata
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader

@@ -21,12 +21,11 @@ import errno
 import os
 import threading
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.snapshot import SnapshotMemory
-from linkage_ros.bag.writing.snapshot_bag import SnapshotWriting
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.snapshot import SnapshotMemory, SnapshotWriting
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 import pytest
 
 MODEL = b'\0\1\0\0\6\0\0\0model\0'

@@ -17,9 +17,9 @@
 
 from __future__ import annotations
 
-from linkage_ros.bag.reading.reader import BagMessage, read_bag
+from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.bag.topic import QosProfile
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 from mcap.writer import MCAP0_MAGIC, Writer
 import pytest

@@ -22,11 +22,10 @@ import json
 import os
 import threading
 
-from linkage_ros.bag.account import UNFINISHED
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.handover import PLACE
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recorder import PLACE, Recorder
+from linkage_ros.bag.recording_stats import UNFINISHED
+from linkage_ros.bag.writer import BagWriter
 import pytest
 import yaml
 
@@ -277,7 +276,7 @@ def test_threads_that_offer_at_once_lose_no_count(tmp_path, topics, messages, re
 def test_while_a_bag_is_recorded_its_metadata_says_so_and_counts_what_is_safe(
     tmp_path, topics, messages, monkeypatch
 ):
-    monkeypatch.setattr('linkage_ros.bag.writing.writer._RENEWAL', 0.0)
+    monkeypatch.setattr('linkage_ros.bag.writer._RENEWAL', 0.0)
 
     def information():
         text = (tmp_path / 'run' / 'metadata.yaml').read_text()

@@ -22,9 +22,9 @@ the damaged bag stays as it was.
 
 from __future__ import annotations
 
-from linkage_ros.bag.account import UNFINISHED, UNFINISHED_DATA
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.recovering.recover import recover
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recording_stats import UNFINISHED, UNFINISHED_DATA
+from linkage_ros.bag.recover import recover
 from mcap.reader import make_reader
 import pytest
 import yaml

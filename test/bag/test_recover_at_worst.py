@@ -21,10 +21,10 @@ from io import BytesIO
 
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
-from linkage_ros.bag.reading.records import Message, Source
-from linkage_ros.bag.recovering.recover import recover
-from linkage_ros.bag.recovering.salvage import Salvage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.mcap_records import Message, Source
+from linkage_ros.bag.recover import recover
+from linkage_ros.bag.salvage import Salvage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError, RecordingError
 import pytest
 

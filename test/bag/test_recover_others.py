@@ -22,10 +22,9 @@ import struct
 import sys
 import tracemalloc
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.recovering.new_bag import MOST_CHANNELS
-from linkage_ros.bag.recovering.recover import recover
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recover import MOST_CHANNELS, recover
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.main import main
 from linkage_ros.errors import BagError
 from mcap.data_stream import RecordBuilder
@@ -87,7 +86,7 @@ def test_too_many_channels_are_refused_in_a_line(tmp_path, count, capsys):
 
 
 def test_as_many_channels_as_may_be_are_saved_over_all_files(tmp_path, monkeypatch):
-    monkeypatch.setattr('linkage_ros.bag.recovering.new_bag.MOST_CHANNELS', 20)
+    monkeypatch.setattr('linkage_ros.bag.recover.MOST_CHANNELS', 20)
     for number, count in enumerate((15, 20)):
         with_channels(tmp_path / 'bag' / f'bag_{number}.mcap', count)
     recovery = recover(tmp_path / 'bag')

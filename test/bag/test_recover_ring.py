@@ -17,11 +17,11 @@
 
 from __future__ import annotations
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.recovering.recover import recover
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recover import recover
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 
 
 def test_a_file_that_made_way_is_recovered_before_those_that_are_kept(tmp_path, monkeypatch):

@@ -21,13 +21,13 @@ import json
 from math import sin, tau
 from pathlib import Path
 
-from linkage_ros.bag.reading.reader import read_bag, RUN_FILE
+from linkage_ros.bag.reader import read_bag, RUN_FILE
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import recorded_scene, replay
 import pytest

@@ -27,13 +27,11 @@ import json
 import threading
 
 from hypothesis import given, strategies
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.handover import PLACE
-from linkage_ros.bag.writing.last_seconds import LastSeconds
-from linkage_ros.bag.writing.snapshot import SnapshotMemory
-from linkage_ros.bag.writing.snapshot_bag import SnapshotWriting
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recorder import PLACE
+from linkage_ros.bag.snapshot import LastSeconds, SnapshotMemory, SnapshotWriting
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 import pytest
 import yaml
@@ -409,7 +407,7 @@ def test_a_disk_that_stalls_stalls_nobody(tmp_path, topics, messages, memory, re
 
 
 def test_a_disk_that_never_answers_is_given_up(tmp_path, topics, messages, memory, monkeypatch):
-    monkeypatch.setattr('linkage_ros.bag.writing.snapshot_bag._PATIENCE', 0.1)
+    monkeypatch.setattr('linkage_ros.bag.snapshot._PATIENCE', 0.1)
     memory = memory()
     for message in messages:  # more than a recorder is handed at once
         memory.offer(*message)
@@ -424,7 +422,7 @@ def test_a_disk_that_never_answers_is_given_up(tmp_path, topics, messages, memor
 def test_a_disk_that_does_not_even_make_a_folder_is_given_up(
     topics, messages, memory, monkeypatch
 ):
-    monkeypatch.setattr('linkage_ros.bag.writing.snapshot_bag._PATIENCE', 0.05)
+    monkeypatch.setattr('linkage_ros.bag.snapshot._PATIENCE', 0.05)
     memory = memory()
     memory.offer(*messages[0])
     answer = threading.Event()

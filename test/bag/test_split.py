@@ -24,12 +24,12 @@ import pickle
 import subprocess
 import sys
 
-from linkage_ros.bag.account import ACCOUNT, UNFINISHED
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing import packing
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag import bag_file
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.recording_stats import STATS_RECORD, UNFINISHED
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 from mcap.exceptions import UnsupportedCompressionError
 from mcap.reader import make_reader
@@ -208,7 +208,7 @@ def test_a_ring_keeps_the_last_files_and_counts_what_it_let_go(
 def account_of(file):
     with file.open('rb') as stream:
         found = {m.name: m.metadata for m in make_reader(stream).iter_metadata()}
-    return {word: json.loads(text) for word, text in found.get(ACCOUNT, {}).items()}
+    return {word: json.loads(text) for word, text in found.get(STATS_RECORD, {}).items()}
 
 
 def test_the_account_is_in_the_last_file_and_closes(tmp_path, topics, messages):
@@ -238,7 +238,7 @@ def test_a_missing_library_is_said_before_anything_is_made(
     def missing(*_, **__):
         raise UnsupportedCompressionError(compression)
 
-    monkeypatch.setattr(packing, 'Writer', missing)
+    monkeypatch.setattr(bag_file, 'Writer', missing)
     library = {'lz4': 'lz4', 'zstd': 'zstandard'}[compression]
     with pytest.raises(RecordingError, match=f'the Python package {library} is missing; install'):
         BagWriter(tmp_path / 'run', topics, storage=Storage(compression=compression))
@@ -264,8 +264,8 @@ def test_packed_chunks_are_smaller_and_checked(tmp_path, topics, messages, compr
 # A process that is killed at its n-th call to the system that changes something on the disk.
 KILLED = """
 import os, pathlib, pickle, signal, sys
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 folder, pickled = sys.argv[1:]
 topics, messages, storage = pickle.load(open(pickled, 'rb'))
 

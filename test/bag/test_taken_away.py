@@ -25,11 +25,11 @@ import os
 import shutil
 import time
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.recovering.recover import recover
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.recover import recover
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 import pytest
 

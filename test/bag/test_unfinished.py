@@ -21,12 +21,12 @@ from collections.abc import Callable
 from pathlib import Path
 import shutil
 
-from linkage_ros.bag.account import Account
 from linkage_ros.bag.metadata import BagSummary
-from linkage_ros.bag.reading.reader import Bag, read_bag
-from linkage_ros.bag.recovering.recover import recover
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import Bag, read_bag
+from linkage_ros.bag.recording_stats import RecordingStats
+from linkage_ros.bag.recover import recover
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 import pytest
 
@@ -44,9 +44,9 @@ class Recording:
         self._number = 0
 
     @staticmethod
-    def _account(summary: BagSummary) -> Account:
+    def _account(summary: BagSummary) -> RecordingStats:
         none = (0,) * len(summary.counts)
-        return Account(summary.counts, summary.counts, none, none)
+        return RecordingStats(summary.counts, summary.counts, none, none)
 
     def write(self, messages: int) -> None:
         for _ in range(messages):

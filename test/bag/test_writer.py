@@ -24,7 +24,7 @@ import subprocess
 
 from linkage_ros import __version__
 from linkage_ros.bag.metadata import qos_text
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, Schema

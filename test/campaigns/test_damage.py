@@ -33,7 +33,7 @@ from campaigns.damage.run import (
     run,
     Tally,
 )
-from linkage_ros.bag.reading.reader import Bag, BagMessage
+from linkage_ros.bag.reader import Bag, BagMessage
 import pytest
 
 SEED = 20261121

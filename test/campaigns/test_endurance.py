@@ -26,9 +26,9 @@ import sys
 from campaigns.endurance import over_dds
 from campaigns.endurance.accelerated import Plan, run_all
 from campaigns.endurance.memory import flatness, MOST_GROWTH, shortcomings, Usage, usage
-from linkage_ros.bag.account import Account
+from linkage_ros.bag.recording_stats import RecordingStats
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 import pytest
 
 MINUTES = 15.0 / 60.0  # h
@@ -130,7 +130,7 @@ def test_memory_that_is_held_is_seen_and_so_are_files_and_threads() -> None:
     assert after.threads == before.threads == 1
 
 
-def write_bag(folder: Path, account: Account | None) -> Path:
+def write_bag(folder: Path, account: RecordingStats | None) -> Path:
     """Write three messages of one topic, with this account of it."""
     writer = BagWriter(folder, [Topic('/a', 'std_msgs/msg/Empty', '', '')])
     writer.account = lambda summary: account
@@ -141,13 +141,13 @@ def write_bag(folder: Path, account: Account | None) -> Path:
 
 
 ACCOUNTS = {
-    'whole': (Account([3], [3], [0], [0]), []),
-    'let go': (Account([9], [3], [0], [6]), []),
+    'whole': (RecordingStats([3], [3], [0], [0]), []),
+    'let go': (RecordingStats([9], [3], [0], [6]), []),
     'none': (None, ['the bag has no account']),
-    'open': (Account([4], [3], [0], [0]), ['/a: the account does not close']),
-    'dropped': (Account([5], [3], [2], [0]), ['/a: 2 dropped']),
+    'open': (RecordingStats([4], [3], [0], [0]), ['/a: the account does not close']),
+    'dropped': (RecordingStats([5], [3], [2], [0]), ['/a: 2 dropped']),
     'more than is there': (
-        Account([4], [4], [0], [0]),
+        RecordingStats([4], [4], [0], [0]),
         ['/a: 4 recorded by the account, 3 in the bag'],
     ),
 }

@@ -25,9 +25,9 @@ from campaigns.kills import run as judge_module
 from campaigns.kills.plan import Marks, message, PERIOD_NS, Phase, Plan, plans, TOPICS
 from campaigns.kills.run import FAULT, judge, NO_FILE, NO_FOLDER, Outcome, run
 from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reading.reader import Bag, BagMessage
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 import pytest
 
 SEED = 20261121

@@ -25,11 +25,11 @@ from threading import Event
 from types import ModuleType
 from typing import Any
 
-from linkage_ros.bag.reading.reader import RUN_FILE
+from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.topic import QosProfile, Topic
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cdr import time_message
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 from rosbags.highlevel import AnyReader

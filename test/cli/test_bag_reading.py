@@ -20,7 +20,7 @@ from __future__ import annotations
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.bag_reading import beside, opened
 import pytest
 

@@ -32,7 +32,7 @@ from typing import Any
 from zlib import crc32
 
 from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.bounded_yaml import bounded_yaml, DEEPEST, MOST_VALUES
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType, Writer

@@ -32,13 +32,13 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.bag.reading.reader import RUN_FILE
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import RUN_FILE
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import export, table_files
-from linkage_ros.cli.message_values import JOINT_STATE, MessageValues, TRAJECTORY, WRENCHES
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import JointStateWriter
-from linkage_ros.joint_trajectory import JointTrajectoryWriter
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages.joint_trajectory import JointTrajectoryWriter
+from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues, TRAJECTORY, WRENCHES
 from linkage_ros.shipped import shipped
 import numpy as np
 import pytest

@@ -23,11 +23,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from linkage_ros.bag.reading.reader import BagMessage, read_bag, RUN_FILE
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cdr import text_message
+from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import export, info, plot, replay, report
 from linkage_ros.errors import BagError, LinkageError
+from linkage_ros.messages.single_values import text_message
 from linkage_ros.replay import read_change
 import pytest
 

@@ -27,8 +27,8 @@ from threading import Event
 from typing import Any
 
 from linkage_ros.bag.metadata import METADATA_FILE
-from linkage_ros.bag.reading.reader import read_bag, RUN_FILE
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag, RUN_FILE
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import info
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure

@@ -25,9 +25,9 @@ from threading import Event
 from types import SimpleNamespace
 from typing import Any
 
-from linkage_ros.bag.reading.reader import BagMessage, read_bag, RUN_FILE
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import replay
 from linkage_ros.errors import LinkageError
 from linkage_ros.replay import versions_here

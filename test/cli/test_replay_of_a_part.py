@@ -21,9 +21,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from linkage_ros.bag.reading.reader import BagMessage, read_bag
-from linkage_ros.bag.recovering.recover import recover
-from linkage_ros.bag.writing.storage import Storage
+from linkage_ros.bag.reader import BagMessage, read_bag
+from linkage_ros.bag.recover import recover
+from linkage_ros.bag.storage import Storage
 from linkage_ros.cli import info, replay
 import pytest
 

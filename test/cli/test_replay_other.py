@@ -24,11 +24,11 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reading.reader import BagMessage, read_bag, RUN_FILE
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import replay
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.scene.load import load_scene
 from linkage_ros.stop import StoppedError
 import pytest

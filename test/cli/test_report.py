@@ -24,8 +24,8 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import report as command
 from linkage_ros.errors import LinkageError
 from linkage_ros.stop import StoppedError

@@ -22,9 +22,9 @@ import re
 import subprocess
 import sys
 
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.replay import recorded_scene
 import pytest
 

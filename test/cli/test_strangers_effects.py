@@ -29,8 +29,8 @@ from pathlib import Path
 import subprocess
 import sys
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.main import COMMANDS, module_of
 from linkage_ros.errors import FileError
 from linkage_ros.pipeline import Pipeline

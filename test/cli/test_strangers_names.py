@@ -25,13 +25,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from linkage_ros.bag.reading.reader import read_bag, RUN_FILE
+from linkage_ros.bag.reader import read_bag, RUN_FILE
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cdr import text_message
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.outlet import Outlet
 from linkage_ros.errors import clean, LinkageError
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages.single_values import text_message
 import pytest
 
 from .recorded import BEGIN, JOINT_STATE, MS

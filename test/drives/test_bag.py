@@ -23,12 +23,12 @@ from math import inf, nan
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.drives.bag import BagParameters, build
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import BagError, DefinitionError, FileError
-from linkage_ros.joint_state import CrankSample, JointStateWriter, Rejection
+from linkage_ros.messages.joint_state import CrankSample, JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest

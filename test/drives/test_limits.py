@@ -21,8 +21,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from linkage_ros.drives.profile import curve, extent, ProfileParameters
 from linkage_ros.errors import FileError
-from linkage_ros.joint_effort import EffortCommand
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_effort import EffortCommand
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest

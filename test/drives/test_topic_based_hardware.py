@@ -28,7 +28,7 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
 
-from linkage_ros.joint_state import Rejection
+from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest

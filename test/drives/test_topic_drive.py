@@ -28,7 +28,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
-from linkage_ros.joint_state import CrankSample, Rejection
+from linkage_ros.messages.joint_state import CrankSample, Rejection
 import pytest
 
 MS = 1_000_000

@@ -32,11 +32,11 @@ from linkage_ros.drives.drive import Context
 from linkage_ros.drives.torque import build, reader, TOPIC, TorqueParameters
 from linkage_ros.dynamics.loads import Friction, JointFriction, Loads
 from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.joint_effort import EffortCommand
-from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Mass
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_effort import EffortCommand
+from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest

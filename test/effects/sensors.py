@@ -19,8 +19,8 @@ from __future__ import annotations
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading
-from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.parameters import read_parameters
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.linkage_file import read_linkage

@@ -26,7 +26,7 @@ from math import pi, sin
 from pathlib import Path
 
 from linkage_ros.effects.delay import Delay, DelayParameters
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 from linkage_ros.shipped import shipped

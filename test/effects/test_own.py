@@ -25,15 +25,15 @@ from pathlib import Path
 import subprocess
 import sys
 
-from linkage_ros.bag.reading.reader import RUN_FILE
+from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cdr import time_message
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.violations import violations
 from linkage_ros.effects.own import FUNCTIONS
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import FileError
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import own_effects_here
 from linkage_ros.scene.load import load_scene
@@ -106,7 +106,7 @@ def alter(parameters, linkage, random):
     return replace(linkage, links={**linkage.links, 'crank': crank})
 """
 TELL = """
-from linkage_ros.cdr import time_message
+from linkage_ros.messages.single_values import time_message
 
 AFTER = 'delay'
 TOPIC, MESSAGE = '~/mine', 'builtin_interfaces/msg/Time'

@@ -28,8 +28,8 @@ from linkage_ros.errors import FileError
 from linkage_ros.faults.fault import Fault
 from linkage_ros.faults.freeze import FreezeParameters
 from linkage_ros.faults.injection import Change, Injection
-from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest

@@ -22,7 +22,7 @@ came, and not those of stamps.
 
 from __future__ import annotations
 
-from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
+from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros.tick_loop import TickLoop
 from linkage_ros.scene.load import parse_scene

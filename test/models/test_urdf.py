@@ -23,9 +23,9 @@ from xml.etree import ElementTree as ET
 
 from linkage_ros.cli.model_file import model_of
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import samples, usual_inputs, Way
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.models.part import Part, PartError
 from linkage_ros.models.urdf import urdf
 from linkage_ros.pipeline import Pipeline

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import io
 
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
 from rosbags.typesys import get_typestore, Stores

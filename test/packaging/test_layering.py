@@ -29,9 +29,8 @@ PACKAGE = 'linkage_ros'
 HEIGHTS = (
     ('errors', 'stop', 'regular_file', 'written', 'files', 'bounded_yaml'),
     ('whole_file', 'parameters', 'measuring', 'processes'),
-    ('kinematics', 'shipped', 'cdr', 'bag', 'pages'),
-    ('joint_state', 'synthesis', 'dynamics', 'drawing', 'solvers', 'models'),
-    ('joint_trajectory', 'multi_dof_joint_state', 'joint_effort', 'marker_array'),
+    ('kinematics', 'shipped', 'messages', 'bag', 'pages'),
+    ('synthesis', 'dynamics', 'drawing', 'solvers', 'models'),
     ('drives',),
     ('effects',),
     ('faults',),

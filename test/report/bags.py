@@ -24,10 +24,10 @@ from math import acos, cos, nan, pi, sin
 from pathlib import Path
 from struct import unpack_from
 
-from linkage_ros.bag.reading.reader import RUN_FILE
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cdr import time_message
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.bag.reader import RUN_FILE
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages.single_values import time_message
 from linkage_ros.scene.load import load_scene
 from mcap.reader import make_reader
 import numpy as np

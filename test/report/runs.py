@@ -20,9 +20,9 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.reader import Bag, BagMessage, read_bag
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.bag.reader import Bag, BagMessage, read_bag
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.report.blocks import Progress
 from linkage_ros.report.data import lanes
 from linkage_ros.report.reading import read_run

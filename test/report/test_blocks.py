@@ -22,8 +22,8 @@ from types import SimpleNamespace
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.bag.reading.contents import contents_of
-from linkage_ros.bag.reading.reader import BagMessage, read_bag
+from linkage_ros.bag.contents import contents_of
+from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.bag.topic import Topic
 from linkage_ros.report import blocks as blocks_module
 from linkage_ros.report.blocks import Blocks, Progress

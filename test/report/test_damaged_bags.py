@@ -22,8 +22,8 @@ from threading import Event
 
 from hypothesis import given
 from hypothesis import strategies as st
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
 from linkage_ros.report.diagnostics_summary import statuses

@@ -16,10 +16,10 @@
 
 from __future__ import annotations
 
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.report.blocks import Progress
 from linkage_ros.report.html import ReportHeader, run_html
 from linkage_ros.report.reading import read_run

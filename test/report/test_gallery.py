@@ -20,9 +20,9 @@ from base64 import b64decode
 from cmath import rect
 import json
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.kinematics.survey import samples, usual_inputs, Way
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.report.data import page_data
 from linkage_ros.scene.load import load_scene

@@ -19,7 +19,7 @@ from __future__ import annotations
 import json
 from math import inf, nan
 
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.report.html import ReportHeader, run_html
 import numpy as np
 import pytest

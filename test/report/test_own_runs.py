@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from math import acos, cos, sqrt
 
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.report.run import Window
 import numpy as np
 import pytest

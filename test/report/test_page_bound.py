@@ -20,15 +20,15 @@ from dataclasses import replace
 import json
 from threading import Event
 
-from linkage_ros.bag.reading.contents import Contents
-from linkage_ros.bag.reading.reader import BagMessage
-from linkage_ros.bag.reading.run_events import run_account
+from linkage_ros.bag.contents import Contents
+from linkage_ros.bag.reader import BagMessage
+from linkage_ros.bag.run_events import run_account
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
-from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pages.document import plotting_library
 from linkage_ros.replay import recorded_scene
 from linkage_ros.report.blocks import Blocks, Progress
@@ -46,6 +46,7 @@ from linkage_ros.report.decimation import (  # fmt: skip
     TABLE_BYTES,
 )
 from linkage_ros.report.html import ReportHeader, run_html, TableOf
+from linkage_ros.report.labels import LANES
 from linkage_ros.report.run import (
     Column,
     Frames,
@@ -56,7 +57,7 @@ from linkage_ros.report.run import (
     Run,
     Window,
 )
-from linkage_ros.report.scene_run import LANES, SceneRun
+from linkage_ros.report.scene_run import SceneRun
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 from linkage_ros.shipped import shipped

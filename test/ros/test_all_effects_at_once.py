@@ -36,11 +36,11 @@ import subprocess
 import sys
 
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.faults.fault import FAULTS
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.replay import recorded_scene, replay
 from linkage_ros.scene.load import load_scene
 import pytest
@@ -196,7 +196,7 @@ def test_they_replay_to_the_last_bit(recorded, name):
 
 PROGRAM = """
 import hashlib, sys
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.replay import recorded_scene, replay
 bag = read_bag(sys.argv[1])
 digest = hashlib.sha256()

@@ -32,8 +32,8 @@ from typing import NamedTuple
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.replay import recorded_scene, replay_all
 import pytest
 

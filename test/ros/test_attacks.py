@@ -16,7 +16,7 @@
 """Floods of messages and storms of calls, from `campaigns.attacks.graph`, bounded in time."""
 
 from campaigns.attacks.graph import attack
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.routes import Routes
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters

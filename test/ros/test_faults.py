@@ -26,7 +26,7 @@ import time
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.replay import recorded_scene, replay
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile

@@ -20,8 +20,8 @@ from __future__ import annotations
 from collections import Counter
 from math import pi, tau
 
-from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros.diagnostics import Health, Snapshot
 from linkage_ros.ros.tick_loop import TickLoop

@@ -22,7 +22,7 @@ from math import cos, sin
 from pathlib import Path
 import re
 
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.replay import recorded_scene, replay
 import pytest
 from rosbags.highlevel import AnyReader

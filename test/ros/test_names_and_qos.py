@@ -22,7 +22,7 @@ import json
 import subprocess
 import sys
 
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger

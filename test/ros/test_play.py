@@ -27,11 +27,10 @@ import subprocess
 import sys
 import time
 
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.topic import QosProfile
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.ros.bag_publishers import offered
-from linkage_ros.ros.bag_topics import bag_topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.ros.bag_topics import bag_topic, offered
 from mcap.writer import Writer
 import pytest
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy

@@ -19,11 +19,10 @@ from __future__ import annotations
 
 from threading import Event
 
-from linkage_ros.bag.reading.in_time import TimeOrder
-from linkage_ros.bag.reading.reader import BagMessage
+from linkage_ros.bag.order import LogTimeOrder
+from linkage_ros.bag.reader import BagMessage
 from linkage_ros.errors import BagError, LinkageError
-from linkage_ros.ros.cues import Cue, cues, Part, read_ahead
-from linkage_ros.ros.playback import LATE, Playback, Ticks
+from linkage_ros.ros.playback import Cue, cues, LATE, Part, Playback, read_ahead, Ticks
 import pytest
 
 from .graph import wait_for
@@ -171,7 +170,7 @@ def test_a_stop_ends_it_between_two_messages(clock_period):
     assert playback.played == 10 * MS
 
 
-class Order(TimeOrder):
+class Order(LogTimeOrder):
     """The order of a bag that is a list."""
 
     def __init__(self, messages, error=None):

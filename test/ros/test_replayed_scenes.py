@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.replay import recorded_scene, replay
 from linkage_ros.scene.load import load_scene
 import pytest

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.cli.proof import IDENTICAL, prove
 from linkage_ros.replay import recorded_scene
 from rclpy.node import Node

@@ -26,7 +26,7 @@ from types import SimpleNamespace
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from linkage_ros.bag.writing.writer import BagWriter
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.ros.bag_topics import bag_topic
 from linkage_ros.ros.run_recording import RunRecording
 from linkage_ros.scene.load import load_scene

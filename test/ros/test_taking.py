@@ -22,7 +22,8 @@ The queue is the test's, and its clock goes on by a step with every look at it.
 from functools import partial
 from itertools import count
 
-from linkage_ros.joint_state import JointStateWriter, NANOSECONDS, Rejection
+from linkage_ros.messages.joint_state import JointStateWriter, Rejection
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import own_joint_states
 from linkage_ros.ros.tick_loop import TickLoop

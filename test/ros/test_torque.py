@@ -32,7 +32,7 @@ import sys
 import time
 
 from builtin_interfaces.msg import Time
-from linkage_ros.bag.reading.reader import read_bag
+from linkage_ros.bag.reader import read_bag
 from linkage_ros.replay import recorded_scene, replay
 import pytest
 from rosgraph_msgs.msg import Clock

@@ -23,11 +23,11 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from linkage_ros.bag.reading.reader import Bag, read_bag
+from linkage_ros.bag.reader import Bag, read_bag
+from linkage_ros.bag.recorder import Recorder
 from linkage_ros.bag.topic import Topic
-from linkage_ros.bag.writing.recorder import Recorder
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cdr import text_message
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.messages.single_values import text_message
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import change_text
 from linkage_ros.ros.tick_loop import TickLoop

@@ -23,8 +23,8 @@ from pathlib import Path
 from linkage_ros.drives.constant_rate import ConstantRateParameters
 from linkage_ros.drives.topic import TopicParameters
 from linkage_ros.errors import FileError
-from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
 import pytest

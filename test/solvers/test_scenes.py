@@ -19,12 +19,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.reading.run_events import CHOSEN, run_account
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.run_events import CHOSEN, run_account
 from linkage_ros.cli.violations import violations
 from linkage_ros.errors import FileError
-from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import replay
 from linkage_ros.scene.load import load_scene, parse_scene

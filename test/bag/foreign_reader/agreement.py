@@ -37,8 +37,8 @@ import subprocess
 from typing import Any
 import warnings
 
-from linkage_ros.bag.account import LET_GO
-from linkage_ros.bag.reading.reader import Bag, read_bag
+from linkage_ros.bag.reader import Bag, read_bag
+from linkage_ros.bag.recording_stats import LET_GO
 from linkage_ros.bag.topic import CHANNELS_FILE
 import numpy as np
 import pytest

@@ -30,13 +30,13 @@ from textwrap import dedent
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from linkage_ros.bag.account import UNFINISHED_DATA
-from linkage_ros.bag.reading.reader import read_bag
-from linkage_ros.bag.writing.storage import Storage
-from linkage_ros.bag.writing.writer import BagWriter
-from linkage_ros.cdr import text_message
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.bag.recording_stats import UNFINISHED_DATA
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.main import main
 from linkage_ros.cost import feed
+from linkage_ros.messages.single_values import text_message
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.replay import change_text
 from linkage_ros.ros.bag_topics import bag_topic, message_type

@@ -1,0 +1,322 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+One file of a bag, complete in itself: attachments, types, messages, index.
+
+From the first error of the disk on, mcap's ``Writer`` goes on into memory (`disk.RecordFile`), and
+`BagFile.finish` ends the file with the records and indexes that it makes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from io import BytesIO
+from pathlib import Path
+import time
+from typing import cast, IO
+
+from linkage_ros import __version__
+from linkage_ros.bag.disk import CHUNK_SIZE, FIRST_RESERVE, RecordFile, Reserve
+from linkage_ros.bag.metadata import BagSummary, NO_START, qos_text
+from linkage_ros.bag.storage import NONE
+from linkage_ros.bag.topic import Topic
+from linkage_ros.errors import RecordingError
+from mcap.exceptions import UnsupportedCompressionError
+from mcap.records import Statistics
+from mcap.writer import CompressionType, IndexType, Writer
+
+COMPRESSION_TYPES: Mapping[str, CompressionType] = {
+    NONE: CompressionType.NONE,
+    'lz4': CompressionType.LZ4,
+    'zstd': CompressionType.ZSTD,
+}
+_LIBRARIES = {'lz4': 'lz4', 'zstd': 'zstandard'}
+
+
+def compression_type(name: str, folder: Path) -> CompressionType:
+    """
+    Return mcap's compression of a name.
+
+    Raises
+    ------
+    RecordingError
+        Its library is missing here; ``folder`` is what was to be recorded to.
+
+    """
+    kind = COMPRESSION_TYPES[name]
+    try:
+        Writer(BytesIO(), compression=kind)
+    except UnsupportedCompressionError:
+        library = _LIBRARIES[name]
+        raise RecordingError(
+            folder,
+            f'cannot be packed with {name}: the Python package {library} is missing',
+            f'install {library}, or set record.compression: {NONE}',
+        ) from None
+    return kind
+
+
+def start(mcap: Writer, profile: str = 'ros2') -> None:
+    """Begin a file, as all of ours begin."""
+    mcap.start(profile=profile, library=f'linkage_ros {__version__}')
+
+
+def register(mcap: Writer, topics: Sequence[Topic]) -> list[int]:
+    """Tell a writer of topics; return their channels' numbers, the same for the same topics."""
+    schemas: dict[str, int] = {}
+    channels = []
+    for topic in topics:
+        if topic.type not in schemas:
+            definition = topic.definition.encode()
+            schemas[topic.type] = mcap.register_schema(topic.type, 'ros2msg', definition)
+        description = {
+            'offered_qos_profiles': qos_text(topic.qos),
+            'topic_type_hash': topic.type_hash,
+        }
+        channels.append(mcap.register_channel(topic.name, 'cdr', schemas[topic.type], description))
+    return channels
+
+
+def channels_file(topics: Sequence[Topic]) -> bytes:
+    """Return an MCAP file that has these topics, and no messages."""
+    file = BytesIO()
+    mcap = Writer(
+        file,
+        compression=CompressionType.NONE,
+        index_types=IndexType.NONE,
+        repeat_channels=False,
+        repeat_schemas=False,
+        use_chunking=False,
+        use_statistics=False,
+        use_summary_offsets=False,
+    )
+    start(mcap)
+    register(mcap, topics)
+    mcap.finish()  # type: ignore[no-untyped-call]
+    return file.getvalue()
+
+
+class BagFile:
+    """
+    An MCAP file, open for writing.
+
+    Parameters
+    ----------
+    path
+        Where it goes; nothing is there yet.
+    topics
+        What will be written; a topic's number is its place in this sequence.
+    attachments
+        Name to (media type, content), written first, so that a killed bag still explains itself.
+    compression
+        How chunks are packed.
+
+    Attributes
+    ----------
+    counts
+        Messages by topic.
+    first
+        Log time of the first message [ns]; None before it.
+    finished
+        Whether it has been ended.
+    forgotten
+        Whether another process has taken it away.
+
+    Raises
+    ------
+    OSError
+        It cannot be made or written to. Nothing is left behind.
+
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        topics: Sequence[Topic],
+        attachments: Mapping[str, tuple[str, bytes]],
+        compression: CompressionType,
+    ) -> None:
+        self.path = path
+        self.counts = [0] * len(topics)
+        self.first: int | None = None
+        self.finished = self.forgotten = False
+        self._start, self._end = NO_START, 0
+        self._flushes, self._flushed = 0, 0
+        self._safe = (tuple(self.counts), self._start, self._end)
+        with ExitStack() as undo:
+            self._file = RecordFile(path)
+            undo.callback(path.unlink)
+            undo.callback(self._file.close)
+            self._reserve = Reserve(path.parent)
+            undo.callback(self._reserve.release)
+            self._begin(topics, attachments, compression)
+            undo.pop_all()
+
+    @property
+    def error(self) -> OSError | None:
+        """Return what the disk said first; from then on records wait in memory."""
+        return self._file.error
+
+    @property
+    def in_doubt(self) -> bool:
+        """Return whether the disk has ever failed to keep what it had taken."""
+        return self._file.in_doubt
+
+    @property
+    def ended(self) -> bool:
+        """Return whether its end is on the disk, so that others find all that is counted."""
+        return self._file.ended
+
+    @property
+    def size(self) -> int:
+        """Return the size of the file by now [bytes]."""
+        return self._file.size
+
+    @property
+    def has_chunks(self) -> bool:
+        """Return whether messages have been handed to the system by now."""
+        return self._file.position > self._begun
+
+    def add(
+        self, topic: int, log_time: int, publish_time: int, data: bytes, sequence: int
+    ) -> None:
+        """Add a message, whose times fit into 63 bits; never raises, but look at `error`."""
+        self._mcap.add_message(self._channels[topic], log_time, data, publish_time, sequence)
+        self.counts[topic] += 1
+        self._start, self._end = min(self._start, log_time), max(self._end, log_time)
+        if self.first is None:
+            self.first = log_time
+
+    def flush(self) -> bool:
+        """
+        Bring to the disk what was added; return whether there was anything; OSError if not.
+
+        mcap before 1.6 cannot close a chunk early: there, whole chunks only are safe.
+        """
+        self._file.look()
+        if hasattr(self._mcap, 'flush'):
+            self._mcap.flush()  # type: ignore[no-untyped-call]
+        if self._file.position == self._flushed:
+            return False
+        self._flushed = self._file.position
+        self._flushes += 1
+        chunks = self._flushes + self._file.position // CHUNK_SIZE
+        if self._file.error:
+            raise self._file.error
+        self._file.sync()
+        if hasattr(self._mcap, 'flush'):
+            self._safe = (tuple(self.counts), self._start, self._end)
+        # The index at the end grows by about this much with each chunk.
+        self._reserve.grow(FIRST_RESERVE + chunks * (90 + 10 * len(self.counts)))
+        return True
+
+    def finish(self, records: Mapping[str, Mapping[str, str]]) -> OSError | None:
+        """
+        End the file as well as the disk allows; return what went wrong, now or before.
+
+        What the disk does not keep in the end is counted no longer, although it may be there.
+
+        Parameters
+        ----------
+        records
+            Metadata records that come last, by name.
+
+        """
+        self.finished = True
+        self._file.keep_tail()
+        for name, content in records.items():
+            self._mcap.add_metadata(name, dict(content))
+        self._mcap.finish()  # type: ignore[no-untyped-call]
+        self._reserve.release()
+        with suppress(OSError):
+            self._file.look()
+        error = self._file.error
+        try:
+            try:
+                self._file.drain()
+            except OSError as full:
+                error = error or full
+                self._count_only(self._file.cut_back())
+            self._file.sync()
+        except OSError as worse:
+            error = error or worse
+            try:
+                self._file.sync()
+            except OSError:
+                self._count_safe()
+        try:
+            self._file.close()
+        except OSError as worse:
+            error = error or worse
+        return error
+
+    def forget(self) -> None:
+        """Count none of its messages: another process has taken it away."""
+        self.forgotten = True
+        self.counts = [0] * len(self.counts)
+        self._start, self._end = NO_START, 0
+
+    def abandon(self) -> None:
+        """Let go of the file, of which nothing is wanted."""
+        self._reserve.release()
+        self._file.close()
+
+    def summary(self, topics: tuple[Topic, ...]) -> BagSummary:
+        """Return what the file holds by now."""
+        return BagSummary(
+            folder=self.path.parent,
+            file=self.path.name,
+            topics=topics,
+            counts=tuple(self.counts),
+            refused=(0,) * len(topics),
+            start=self._start,
+            duration=max(0, self._end - self._start),
+            size=self._file.size,
+        )
+
+    def _begin(
+        self,
+        topics: Sequence[Topic],
+        attachments: Mapping[str, tuple[str, bytes]],
+        compression: CompressionType,
+    ) -> None:
+        # Our stream stands in for a binary file: mcap asks it for write, tell and flush only.
+        self._mcap = Writer(
+            cast('IO[bytes]', self._file), chunk_size=CHUNK_SIZE, compression=compression
+        )
+        start(self._mcap)
+        for name, (media_type, content) in attachments.items():
+            self._mcap.add_attachment(0, time.time_ns(), name, media_type, content)
+        self._channels = register(self._mcap, topics)
+        if self._file.error:
+            raise self._file.error
+        self._begun = self._file.position
+        self._file.sync()
+
+    def _count_only(self, kept: Statistics) -> None:
+        """Forget the messages that did not reach the file."""
+        self.counts = [kept.channel_message_counts.get(channel, 0) for channel in self._channels]
+        if kept.message_count:
+            self._start, self._end = kept.message_start_time, kept.message_end_time
+        else:
+            self._start, self._end = NO_START, 0
+
+    def _count_safe(self) -> None:
+        """Forget the messages that came after the last flush that succeeded."""
+        if sum(self._safe[0]) < sum(self.counts):
+            counts, self._start, self._end = self._safe
+            self.counts = list(counts)

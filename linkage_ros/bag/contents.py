@@ -1,0 +1,222 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The contents of a bag: messages, sizes and times by topic, and the layout of its files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from linkage_ros.bag.mcap_records import chunk_head, DamagedError, HEAD, Source, strict
+from linkage_ros.bag.reader import Bag, MOST_METADATA, unreadable
+from linkage_ros.bag.topic import Topic
+from linkage_ros.errors import BagError
+from mcap.opcode import Opcode
+from mcap.records import Header, Metadata
+from mcap.writer import MCAP0_MAGIC
+
+TOLD_EVERY = 4096
+"""After how many messages progress is told and a wish to stop is looked for."""
+
+_RECORD_SIZE = 31
+"""The size of a message record without the bytes of the message."""
+
+
+class TopicContents(NamedTuple):
+    """
+    The messages of a topic in a bag.
+
+    Attributes
+    ----------
+    topic
+        The topic.
+    messages
+        Number of messages.
+    size
+        Their size [bytes].
+    first, last
+        Least and greatest log time, in [ns]; 0 without messages.
+
+    """
+
+    topic: Topic
+    messages: int
+    size: int
+    first: int
+    last: int
+
+    @property
+    def rate(self) -> float | None:
+        """Return the mean number of messages per second; None if they take no time."""
+        span = self.last - self.first
+        return (self.messages - 1) * 1e9 / span if span > 0 else None
+
+
+class Contents(NamedTuple):
+    """
+    The contents of a bag.
+
+    Attributes
+    ----------
+    topics
+        In the order of the bag.
+    begin, end
+        Least and greatest log time, in [ns]; None without messages.
+    damage
+        The damage at which reading ended, on one line; '' if all was read.
+    stopped
+        Whether reading was stopped early.
+
+    """
+
+    topics: tuple[TopicContents, ...]
+    begin: int | None
+    end: int | None
+    damage: str
+    stopped: bool
+
+
+class _Tally:
+    """Counts the messages of a topic."""
+
+    __slots__ = ('count', 'first', 'last', 'size', 'topic')
+
+    def __init__(self, topic: Topic) -> None:
+        self.topic = topic
+        self.count = self.size = self.last = 0
+        self.first = 2**64
+
+
+def contents_of(
+    bag: Bag,
+    told: Callable[[int], None] = lambda _: None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Contents:
+    """
+    Read all messages of a bag and count them; memory does not grow with them.
+
+    Parameters
+    ----------
+    bag
+        The bag. Where it is damaged, what lies before the damage is counted.
+    told
+        Called now and then with the number of bytes read.
+    stopped
+        Returns whether to stop.
+
+    """
+    tallies = {topic.name: _Tally(topic) for topic in bag.topics}
+    damage, halted = '', False
+    number = read = 0
+    try:
+        for number, (name, log_time, _, data) in enumerate(bag.messages(), 1):
+            tally = tallies.get(name)
+            if tally is None:  # its channel is not in the index
+                tally = tallies[name] = _Tally(Topic(name, '', '', ''))
+            size = len(data)
+            tally.count += 1
+            tally.size += size
+            tally.first = min(tally.first, log_time)
+            tally.last = max(tally.last, log_time)
+            read += size + _RECORD_SIZE
+            if not number % TOLD_EVERY:
+                told(read)
+                if stopped():
+                    halted = True
+                    break
+    except BagError as error:
+        damage = f'{error.where}: {error.reason}'
+    topics = tuple(
+        TopicContents(t.topic, t.count, t.size, t.first if t.count else 0, t.last)
+        for t in tallies.values()
+    )
+    held = [topic for topic in topics if topic.messages]
+    return Contents(
+        topics,
+        min((topic.first for topic in held), default=None),
+        max((topic.last for topic in held), default=None),
+        damage,
+        halted,
+    )
+
+
+class Layout(NamedTuple):
+    """
+    The layout of an MCAP file.
+
+    Attributes
+    ----------
+    library
+        The library that wrote it; '' if the file does not name one.
+    compressions
+        For each compression of its chunks ('none' is one): stored bytes, and bytes after
+        decompression as the file states them.
+    content
+        Bytes of all its records when decompressed.
+    rosbag2
+        The last metadata record of rosbag2; None if there is none.
+
+    """
+
+    library: str
+    compressions: Mapping[str, tuple[int, int]]
+    content: int
+    rosbag2: Metadata | None
+
+
+def layout_of(file: Path) -> Layout:
+    """
+    Return the layout of a file, up to the first record that is not whole.
+
+    Raises
+    ------
+    BagError
+        The file cannot be opened.
+
+    """
+    library = ''
+    compressions: dict[str, tuple[int, int]] = {}
+    content = 0
+    rosbag2: Metadata | None = None
+    at = len(MCAP0_MAGIC)
+    try:
+        with file.open('rb') as stream, suppress(DamagedError):
+            source = Source(stream)
+            while True:
+                opcode, end = source.head(at)
+                if end > source.size or opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                    break
+                length = unpacked = end - at - HEAD.size
+                # What is damaged is passed over; reading the messages says so.
+                with suppress(DamagedError):
+                    if opcode == Opcode.CHUNK:
+                        head = chunk_head(source, at)
+                        unpacked, name = head.size, head.compression or 'none'
+                        stored, made = compressions.get(name, (0, 0))
+                        compressions[name] = stored + length, made + unpacked
+                    elif opcode in (Opcode.HEADER, Opcode.METADATA) and length <= MOST_METADATA:
+                        data = source.read(at + HEAD.size, length)
+                        if opcode == Opcode.HEADER:
+                            library = strict(Header, data).library
+                        elif (record := strict(Metadata, data)).name == 'rosbag2':
+                            rosbag2 = record
+                content += unpacked
+                at = end
+    except OSError as error:
+        raise unreadable(file, error) from None
+    return Layout(library, compressions, content, rosbag2)

@@ -1,0 +1,639 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The records of an MCAP file: a record is accepted only if length, content and CRC agree.
+
+mcap's own reader accepts what is left of a record in a file that was cut, and checks the CRC of
+chunks only. Here a record ends where its length says, its content fills it, and every CRC is
+checked. `DataSection` reads the part of a file that holds the messages, `index_of` its index.
+No record, packed or unpacked, may take more memory than `LARGEST`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from importlib import import_module
+from io import BytesIO, SEEK_END
+from struct import error as StructError
+from struct import Struct
+from typing import Any, BinaryIO, NamedTuple
+from zlib import crc32
+
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+from mcap.writer import MCAP0_MAGIC
+
+LARGEST = 256 * 2**20
+"""
+What one record may take in memory, packed or unpacked [bytes].
+
+rosbag2 makes chunks of less than 1 MiB. A few kilobytes that claim to be gigabytes are no bag.
+"""
+
+
+class DamagedError(Exception):
+    """A record that is not whole, or not what it says; the text says why."""
+
+
+def unpacked(data: bytes, compression: str, size: int) -> bytes:
+    """
+    Return the content of a chunk.
+
+    Parameters
+    ----------
+    data
+        As it stands in the file.
+    compression
+        '', 'lz4' or 'zstd'.
+    size
+        What it says to be when unpacked [bytes]; no byte more is unpacked to find out.
+
+    Raises
+    ------
+    DamagedError
+        It is of another size, or one that is not allowed, or cannot be unpacked.
+
+    """
+    if size > LARGEST:
+        raise DamagedError(f'would be {size:,} bytes unpacked; no more than {LARGEST:,} are taken')
+    if compression == '':
+        content = data
+    elif compression in _UNPACKERS:
+        try:
+            content = _UNPACKERS[compression](data, size + 1)
+        except ImportError:
+            raise DamagedError(
+                f'is packed with {compression}, and Python knows no {compression} here'
+            ) from None
+        except Exception as error:  # noqa: BLE001 (each library has its own)
+            raise DamagedError(f'cannot be unpacked: {error}') from None
+    else:
+        raise DamagedError(f'is packed in an unknown way, {compression!r}')
+    if len(content) != size:
+        raise DamagedError(f'is not of the {size:,} bytes that it says to be')
+    return content
+
+
+def _lz4(data: bytes, most: int) -> bytes:
+    lz4: Any = import_module('lz4.frame')
+    content: bytes = lz4.LZ4FrameDecompressor().decompress(data, max_length=most)
+    return content
+
+
+def _zstd(data: bytes, most: int) -> bytes:
+    zstandard: Any = import_module('zstandard')
+    with zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True) as stream:
+        content: bytes = stream.read(most)
+    return content
+
+
+_UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {'lz4': _lz4, 'zstd': _zstd}
+
+
+HEAD = Struct('<BQ')
+"""The head of each record: its kind, and the length of its content."""
+
+_CHUNK = Struct('<QQQII')
+"""First and last time, size when unpacked, its checksum, length of the name of its packing."""
+
+_MESSAGE = Struct('<HIQQ')
+_LONG = Struct('<Q')
+_INT = Struct('<I')
+_LONGEST_NAME = 16
+_LONGEST_RECORD = 8 * 2**20
+"""Of those that are made of parts, each of which takes many times its bytes [bytes]."""
+
+MOST_CHANNELS = 10_000
+"""How many a file may describe, and how many schemas; MCAP has numbers for 65,535."""
+
+
+class Source:
+    """A file that is open for reading, as large as it was when it was opened."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self.size = stream.seek(0, SEEK_END)
+
+    def read(self, at: int, length: int) -> bytes:
+        """Return so many bytes from there on; raises DamagedError where they are not there."""
+        if length > LARGEST:
+            raise DamagedError(f'would be {length:,} bytes; no more than {LARGEST:,} are taken')
+        if not 0 <= at <= self.size - length:
+            raise DamagedError('goes beyond the end of the file')
+        try:
+            self._stream.seek(at)
+            data = self._stream.read(length)
+        except OSError as error:
+            # A disk that cannot read one place may well read the others.
+            raise DamagedError(f'cannot be read: {error.strerror or error}') from None
+        if len(data) < length:
+            raise DamagedError('goes beyond the end of the file')
+        return data
+
+    def head(self, at: int) -> tuple[int, int]:
+        """Return a record's kind and the place of its end, which may be beyond the file's."""
+        opcode, length = HEAD.unpack(self.read(at, HEAD.size))
+        return opcode, at + HEAD.size + length
+
+
+class Message(NamedTuple):
+    """A message as its record has it; times in [ns]."""
+
+    channel: Channel
+    sequence: int
+    log_time: int
+    publish_time: int
+    data: bytes
+
+
+class ChunkHead(NamedTuple):
+    """The head of a chunk: size [bytes] and CRC (0: none) of what it holds, where its data are."""
+
+    size: int
+    crc: int
+    compression: str
+    begin: int
+    length: int
+
+
+class Chunk(NamedTuple):
+    """A chunk: as in its head, its data, and where they end, whatever its record's length is."""
+
+    size: int
+    crc: int
+    compression: str
+    data: bytes
+    end: int
+
+
+class Definitions:
+    """The schemas and channels of a file by their numbers; a number never means two of them."""
+
+    def __init__(self) -> None:
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, Channel] = {}
+
+    def add(self, opcode: int, content: bytes) -> None:
+        if opcode == Opcode.SCHEMA:
+            schema = strict(Schema, content)
+            if self.schemas.setdefault(schema.id, schema) != schema:
+                raise DamagedError(f'makes schema {schema.id} another one')
+        else:
+            channel = strict(Channel, content)
+            if self.channels.setdefault(channel.id, channel) != channel:
+                raise DamagedError(f'makes channel {channel.id} another one')
+        if max(len(self.schemas), len(self.channels)) > MOST_CHANNELS:
+            raise DamagedError(f'describes more than {MOST_CHANNELS:,} channels or schemas')
+
+    def complete(self, others: Definitions) -> None:
+        """Add the schemas and channels that are not known yet."""
+        self.schemas = others.schemas | self.schemas
+        self.channels = others.channels | self.channels
+
+    def schema_of(self, channel: Channel) -> Schema | None:
+        """Return a channel's schema; None if it has none, or if it is lost."""
+        return self.schemas.get(channel.schema_id)
+
+
+def strict(kind: Any, content: bytes) -> Any:
+    """Return a record of this kind; its fields fill the content to the last byte."""
+    if len(content) > _LONGEST_RECORD:
+        raise DamagedError(
+            f'is a {kind.__name__} of {len(content):,} bytes; no more than {_LONGEST_RECORD:,} '
+            'are taken'
+        )
+    try:
+        record = kind.read(ReadDataStream(BytesIO(content)))
+        builder = RecordBuilder()
+        record.write(builder)
+        again: bytes = builder.end()  # type: ignore[no-untyped-call]
+    except Exception as error:  # noqa: BLE001 (mcap raises a dozen kinds, as the damage has it)
+        raise DamagedError(f'is no {kind.__name__}: {error}') from None
+    # mcap reads a string that is cut as what is left of it; written again, it is another.
+    if again != HEAD.pack(again[0], len(content)) + content:
+        raise DamagedError(f'is no {kind.__name__}')
+    return record
+
+
+def chunk_head(source: Source, at: int) -> ChunkHead:
+    """Return the head of the chunk whose record begins there."""
+    begin = at + HEAD.size
+    _, _, size, crc, letters = _CHUNK.unpack(source.read(begin, _CHUNK.size))
+    if letters > _LONGEST_NAME:
+        raise DamagedError(f'has {letters:,} letters for how it is packed')
+    begin += _CHUNK.size
+    name = source.read(begin, letters + _LONG.size)
+    (length,) = _LONG.unpack_from(name, letters)
+    compression = name[:letters].decode('ascii', 'backslashreplace')
+    return ChunkHead(size, crc, compression, begin + len(name), length)
+
+
+def chunk_at(source: Source, at: int) -> Chunk:
+    """Return the chunk whose record begins there; its content is not looked at."""
+    size, crc, compression, begin, length = chunk_head(source, at)
+    return Chunk(size, crc, compression, source.read(begin, length), begin + length)
+
+
+def content_of(chunk: Chunk) -> bytes:
+    """Return the content of a chunk; its CRC agrees, if it has one."""
+    content = unpacked(chunk.data, chunk.compression, chunk.size)
+    if chunk.crc and crc32(content) != chunk.crc:
+        raise DamagedError('its checksum does not fit')
+    return content
+
+
+def attachment_at(source: Source, at: int) -> tuple[Attachment, int, int]:
+    """Return the attachment whose record begins there, where its content ends, and its CRC."""
+    begin = end = at + HEAD.size + 16
+    for _ in ('name', 'media type'):
+        (letters,) = _INT.unpack(source.read(end, _INT.size))
+        end += _INT.size + letters
+    (length,) = _LONG.unpack(source.read(end, _LONG.size))
+    end += _LONG.size + length
+    content = source.read(begin - 16, end - begin + 16)
+    (crc,) = _INT.unpack(source.read(end, _INT.size))
+    if crc and crc32(content) != crc:
+        raise DamagedError('its checksum does not fit')
+    # Zeros of its content may stand where a damaged length looks for the checksum.
+    if not crc and source.head(at)[1] != end + _INT.size:
+        raise DamagedError('is not as long as it says')
+    try:
+        attachment = Attachment.read(ReadDataStream(BytesIO(content + _INT.pack(crc))))
+    except UnicodeDecodeError:
+        raise DamagedError('has a name that is no text') from None
+    return attachment, end + _INT.size, crc
+
+
+def is_whole_chunk(source: Source, at: int) -> bool:
+    """Return whether a chunk with a matching CRC begins there, whatever kind its record states."""
+    try:
+        chunk = chunk_at(source, at)
+        return chunk.end == source.head(at)[1] and chunk.crc != 0 and bool(content_of(chunk))
+    except DamagedError:
+        return False
+
+
+def is_whole_attachment(source: Source, at: int) -> bool:
+    """Return whether an attachment with a matching CRC begins there, whatever its kind."""
+    try:
+        _, end, crc = attachment_at(source, at)
+        return end == source.head(at)[1] and crc != 0
+    except DamagedError:
+        return False
+
+
+def messages_in(content: bytes, definitions: Definitions) -> Iterator[Message]:
+    """Yield the messages of a chunk's content; its schemas and channels go to the definitions."""
+    at, size = 0, len(content)
+    while at < size:
+        try:
+            opcode, length = HEAD.unpack_from(content, at)
+        except StructError:
+            raise DamagedError('ends in the middle of a record') from None
+        at += HEAD.size
+        end = at + length
+        if end > size:
+            raise DamagedError('ends in the middle of a record')
+        if opcode == Opcode.MESSAGE:
+            yield message_of(content, at, end, definitions)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            definitions.add(opcode, content[at:end])
+        elif not opcode:  # millions of them fit into what was zeros
+            raise DamagedError('holds a record of no kind')
+        at = end
+
+
+def message_of(content: bytes, at: int, end: int, definitions: Definitions) -> Message:
+    """Return the message that fills these bytes."""
+    if end - at < _MESSAGE.size:
+        raise DamagedError('holds a message without its times')
+    number, sequence, log_time, publish_time = _MESSAGE.unpack_from(content, at)
+    channel = definitions.channels.get(number)
+    if channel is None:
+        raise DamagedError(f'holds a message of channel {number}, which is nowhere described')
+    begin = at + _MESSAGE.size
+    return Message(channel, sequence, log_time, publish_time, content[begin:end])
+
+
+Found = Message | Attachment | Metadata
+
+_INDEX = Struct('<HI')
+_CRC = Struct('<I')
+_WINDOW = 2**20
+
+MOST_UNPACKED, MOST_TIMES = 2**30, 1000
+"""
+What the chunks of a file may make together when unpacked: so many bytes, or so many times the
+file's. A megabyte of zstd can hold fifty gigabytes of zeros.
+"""
+_ELSEWHERE = {
+    0,
+    Opcode.FOOTER,
+    Opcode.STATISTICS,
+    Opcode.CHUNK_INDEX,
+    Opcode.ATTACHMENT_INDEX,
+    Opcode.METADATA_INDEX,
+    Opcode.SUMMARY_OFFSET,
+}
+"""Kinds that no data section holds."""
+
+
+class DataSection:
+    """
+    Takes records of a file from given places; remembers what decides about the next ones.
+
+    What has a checksum is given only where that fits. Messages outside of chunks, and chunks
+    without a checksum, are given where the whole data section has one that fits, or nothing in
+    the file has any: then they are counted in `unchecked`.
+
+    Parameters
+    ----------
+    source
+        The file.
+    definitions
+        Schemas and channels that are known already.
+    index_start
+        Where the index of the file begins, just behind the data section; 0 if not known.
+
+    """
+
+    def __init__(self, source: Source, definitions: Definitions, index_start: int = 0) -> None:
+        self.source = source
+        self.definitions = definitions
+        self.finished = False
+        self.loose = True  # whether messages may stand outside of chunks
+        self.unchecked = 0
+        self.unknown: list[tuple[int, int]] = []
+        self.misfits: list[int] = []
+        self.profile = ''
+        self.compression = ''
+        self._crc_seen = False
+        self._end = max(index_start - HEAD.size - _CRC.size, 0)
+        self._unpacked = 0
+        self._covered: bool | None = None
+        self._misfit: DamagedError | None = None
+
+    def take(self, at: int) -> tuple[Iterable[Found], int]:
+        """
+        Take the record that begins there.
+
+        Returns
+        -------
+        found
+            What it holds, to be looked at before the next one is taken: channels are among it.
+        end
+            Where the next one begins.
+
+        Raises
+        ------
+        DamagedError
+            It is not whole, or not what it says; also when what was found is looked at.
+
+        """
+        opcode, end = self.source.head(at)
+        if opcode == Opcode.CHUNK:
+            chunk = chunk_at(self.source, at)
+            return self.chunk(chunk, fits=self._fits(at, chunk.end, end, chunk.crc)), chunk.end
+        if opcode == Opcode.ATTACHMENT:
+            attachment, inner, crc = attachment_at(self.source, at)
+            if not crc and self._crc_seen and not self.covered():
+                raise DamagedError('has no checksum, others have')
+            self._crc_seen |= bool(crc)
+            self._fits(at, inner, end, crc)
+            return (attachment,), inner
+        if opcode == Opcode.MESSAGE and not self.loose:
+            raise DamagedError('is a message outside of the chunks')
+        if opcode in _ELSEWHERE:
+            raise DamagedError('is of a kind that is not for this place')
+        content = self.source.read(at + HEAD.size, end - at - HEAD.size)
+        found: tuple[Found, ...] = ()
+        if opcode == Opcode.MESSAGE:
+            found = (message_of(content, 0, len(content), self.definitions),)
+            self.unchecked += not self.covered()
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            self.definitions.add(opcode, content)
+        elif opcode == Opcode.HEADER:
+            self.profile = strict(Header, content).profile
+        elif opcode == Opcode.METADATA:
+            found = (strict(Metadata, content),)
+        elif opcode == Opcode.MESSAGE_INDEX:
+            if (
+                len(content) < _INDEX.size
+                or len(content) % 16 != _INDEX.size
+                or (_INDEX.unpack_from(content)[1] != len(content) - _INDEX.size)
+            ):
+                raise DamagedError('is no index of messages')
+        elif opcode == Opcode.DATA_END:
+            if len(content) != _CRC.size:
+                raise DamagedError('is no end of the data')
+            self.finished, self._end = True, at
+        elif is_whole_chunk(self.source, at) or is_whole_attachment(self.source, at):
+            raise DamagedError('is a chunk or an attachment that calls itself something else')
+        else:
+            self.unknown.append((at, end))
+        return found, end
+
+    def chunk(self, chunk: Chunk, *, fits: bool = True) -> Iterable[Message]:
+        """Return a chunk's messages; it begins and ends where its record does, if it fits."""
+        if self._unpacked > max(MOST_UNPACKED, MOST_TIMES * self.source.size):
+            raise DamagedError(
+                f'would make more than {self._unpacked:,} bytes of a file of '
+                f'{self.source.size:,}: no recording packs so well'
+            )
+        content = content_of(chunk)
+        self._unpacked += len(content)
+        if not chunk.crc and content:
+            if not fits:
+                raise DamagedError('is not as long as it says')
+            # No writer gives a checksum to some chunks only.
+            if self._crc_seen and not self.covered():
+                raise DamagedError('has no checksum, others have')
+            known = Definitions()
+            known.schemas |= self.definitions.schemas
+            known.channels |= self.definitions.channels
+            count = sum(1 for _ in messages_in(content, known))
+            self.unchecked += 0 if self.covered() else count
+        self._crc_seen |= bool(chunk.crc)
+        self.loose = False
+        self.compression = self.compression or chunk.compression
+        return messages_in(content, self.definitions)
+
+    def covered(self) -> bool:
+        """
+        Return whether the whole data section has a checksum.
+
+        Raises
+        ------
+        DamagedError
+            It does not fit.
+
+        """
+        if self._misfit:
+            raise self._misfit
+        if self._covered is None:
+            try:
+                end = self._end or self._find_end()
+                if self.source.head(end) != (Opcode.DATA_END, end + HEAD.size + _CRC.size):
+                    raise DamagedError('is no end of the data')
+                (crc,) = _CRC.unpack(self.source.read(end + HEAD.size, _CRC.size))
+            except DamagedError:
+                crc = 0
+            self._covered = bool(crc)
+            if crc and crc != self._crc_to(end):
+                self._misfit = DamagedError('the checksum of all data does not fit')
+                raise self._misfit
+        return self._covered
+
+    def _find_end(self) -> int:
+        at = len(MCAP0_MAGIC)
+        while True:
+            opcode, end = self.source.head(at)
+            if opcode == Opcode.DATA_END:
+                return at
+            at = end
+
+    def _crc_to(self, end: int) -> int:
+        found = 0
+        for place in range(0, end, _WINDOW):
+            found = crc32(self.source.read(place, min(_WINDOW, end - place)), found)
+        return found
+
+    def _fits(self, at: int, inner: int, end: int, crc: int) -> bool:
+        """Say whether a record ends where its content does; without a checksum it has to."""
+        if inner == end:
+            return True
+        if not crc:
+            raise DamagedError('is not as long as it says')
+        self.misfits.append(at)
+        return False
+
+
+def definitions_in(content: bytes) -> Definitions:
+    """Return the schemas and channels that stand in a small MCAP file, as far as it is one."""
+    definitions = Definitions()
+    data, at = DataSection(Source(BytesIO(content)), definitions), len(MCAP0_MAGIC)
+    with suppress(DamagedError):
+        while not data.finished:
+            _, at = data.take(at)
+    return definitions
+
+
+_FOOTER = Struct('<BQQQI')
+"""Kind, length, where the index begins and its second part, its checksum."""
+
+_KINDS: dict[int, Any] = {
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+    Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.STATISTICS: Statistics,
+}
+
+_PLACES = {
+    Opcode.CHUNK_INDEX: 'chunk_start_offset',
+    Opcode.ATTACHMENT_INDEX: 'offset',
+    Opcode.METADATA_INDEX: 'offset',
+}
+
+MOST_RECORDS = 1_000_000
+"""How many an index may hold: of a terabyte in rosbag2's chunks it has that many."""
+
+
+class FileIndex(NamedTuple):
+    """
+    The index of a file.
+
+    Attributes
+    ----------
+    start
+        Where it begins, and the data end.
+    checked
+        Whether it has a checksum. It fits then.
+    definitions
+        All schemas and channels, where it repeats them.
+    chunks, attachments, metadata
+        Where they are.
+    statistics
+        The counts that the file states; None if it states none.
+
+    """
+
+    start: int
+    checked: bool
+    definitions: Definitions
+    chunks: tuple[ChunkIndex, ...]
+    attachments: tuple[AttachmentIndex, ...]
+    metadata: tuple[MetadataIndex, ...]
+    statistics: Statistics | None
+
+
+def index_of(source: Source) -> FileIndex:
+    """Return a file's index, an empty one where it was written without; or DamagedError."""
+    footer_at = source.size - _FOOTER.size - len(MCAP0_MAGIC)
+    footer = source.read(footer_at, _FOOTER.size)
+    opcode, length, start, _, crc = _FOOTER.unpack(footer)
+    if (opcode, length) != (Opcode.FOOTER, _FOOTER.size - HEAD.size):
+        raise DamagedError('its last record is no footer')
+    start = start or footer_at
+    if start > footer_at:
+        raise DamagedError('its index begins behind the end')
+    content = source.read(start, footer_at - start)
+    if crc and crc32(footer[:-4], crc32(content)) != crc:
+        raise DamagedError("its index's checksum does not fit")
+    definitions = Definitions()
+    found: dict[Any, list[Any]] = {kind: [] for kind in _KINDS.values()}
+    places = set()
+    at = number = 0
+    while at < len(content):
+        number += 1
+        if number > MOST_RECORDS:
+            raise DamagedError(f'its index holds more than {MOST_RECORDS:,} records')
+        if at + HEAD.size > len(content):
+            raise DamagedError('its index ends in the middle of a record')
+        opcode, length = HEAD.unpack_from(content, at)
+        at += HEAD.size
+        end = at + length
+        if opcode in _KINDS:
+            record = strict(_KINDS[opcode], content[at:end])
+            if opcode in _PLACES:
+                place = getattr(record, _PLACES[opcode])
+                if place in places:
+                    raise DamagedError(f'its index names the record at byte {place:,} twice')
+                places.add(place)
+            found[_KINDS[opcode]].append(record)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            definitions.add(opcode, content[at:end])
+        at = end
+    return FileIndex(
+        start=start,
+        checked=bool(crc),
+        definitions=definitions,
+        chunks=tuple(found[ChunkIndex]),
+        attachments=tuple(found[AttachmentIndex]),
+        metadata=tuple(found[MetadataIndex]),
+        statistics=found[Statistics][-1] if found[Statistics] else None,
+    )

@@ -1,0 +1,490 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Open a bag: its files, topics and attachments, and its messages in the order of the files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fcntl import F_RDLCK, F_SETLEASE, F_SETSIG, F_UNLCK, fcntl
+from functools import lru_cache
+from io import SEEK_END
+import os
+from pathlib import Path, PurePosixPath
+from signal import SIGURG
+from typing import Any, NamedTuple
+
+from linkage_ros.bag.mcap_records import (
+    attachment_at,
+    DamagedError,
+    DataSection,
+    Definitions,
+    Found,
+    HEAD,
+    index_of,
+    Message,
+    Source,
+    strict,
+)
+from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
+from linkage_ros.bag.recording_stats import STATS_RECORD, UNFINISHED
+from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
+from linkage_ros.bounded_yaml import bounded_yaml
+from linkage_ros.errors import BagError, quoted
+from linkage_ros.regular_file import read_regular
+from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.writer import MCAP0_MAGIC
+
+MOST_METADATA = 8 * 2**20
+"""How long metadata may be; of a bag with thousands of topics rosbag2 writes some megabytes."""
+
+_WITHOUT = 'move metadata.yaml away to read the folder without it'
+
+
+def custom_of(information: Mapping[str, Any]) -> dict[str, str]:
+    """Return the ``custom_data`` of a bag's metadata: of what is there, what is plain text."""
+    custom = information.get('custom_data')
+    entries = custom.items() if isinstance(custom, dict) else ()
+    # Not of lists: aliases make a small file's text as long as memory.
+    return {str(k): str(v) for k, v in entries if not isinstance(v, dict | list | set | tuple)}
+
+
+def information_of(folder: Path) -> dict[str, Any]:
+    """Return the content of ``metadata.yaml``; empty if it is missing, which is no error."""
+    file = folder / METADATA_FILE
+    try:
+        text = read_regular(file, MOST_METADATA)
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise unreadable(file, error) from None
+    try:
+        if len(text) > MOST_METADATA:
+            raise ValueError(f'it is larger than {MOST_METADATA:,} bytes')
+        information = bounded_yaml(text.decode())
+        information = information.get(ROOT_KEY) if isinstance(information, dict) else None
+        if not isinstance(information, dict):
+            raise ValueError(f'no mapping {ROOT_KEY}')
+    except ValueError as error:
+        raise BagError(
+            file, f"is not a bag's metadata ({error})", 'read the MCAP file by itself'
+        ) from None
+    return information
+
+
+def serialized_metadata(record: Metadata) -> dict[str, Any]:
+    """Return the content of rosbag2's metadata record; empty if it is damaged."""
+    text = record.metadata.get('serialized_metadata', '')
+    try:
+        said = bounded_yaml(text if len(text) <= MOST_METADATA else '')
+    except ValueError:
+        return {}
+    return said if isinstance(said, dict) else {}
+
+
+def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
+    """Return the MCAP files of a bag, in the order of recording, if all lie in its folder."""
+    if not path.is_dir():
+        return [path]
+    named = information.get('relative_file_paths')
+    if isinstance(named, list) and named:
+        # By name only, as rosbag2 does: old bags carry the folder too, which may have moved.
+        names = [_name_of(path, PurePosixPath(str(name))) for name in named]
+    else:
+        names = [file.name for file in sorted(path.glob('*.mcap'), key=by_number)]
+    if not names:
+        raise BagError(path, 'holds no .mcap file', "name a bag's folder")
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise BagError(path / METADATA_FILE, f'names {quoted(name)} twice', _WITHOUT)
+        within = os.path.realpath(path)
+        if os.path.commonpath([within, os.path.realpath(path / name)]) != within:
+            raise BagError(
+                path / name, "leads out of the bag's folder", 'name the file that it leads to'
+            )
+    return [path / name for name in names]
+
+
+def by_number(file: Path) -> tuple[int, str]:
+    """Return the key to sort files by: NAME_2.mcap stands before NAME_10.mcap."""
+    return len(file.name), file.name
+
+
+def _name_of(folder: Path, path: PurePosixPath) -> str:
+    if '..' in path.parts or not path.name or not path.name.isprintable():
+        raise BagError(folder / METADATA_FILE, f'names {quoted(str(path))} as a file', _WITHOUT)
+    return path.name
+
+
+def is_empty(file: Path) -> bool:
+    """Return whether a file is there, and nothing in it."""
+    try:
+        return file.stat().st_size == 0
+    except OSError:
+        return False
+
+
+def is_finished(file: Path) -> bool:
+    """Return whether the file is MCAP to its end; raise if not even its beginning is."""
+    length = len(MCAP0_MAGIC)
+    try:
+        if file.exists() and not file.is_file():
+            # To open a pipe would wait for somebody to write to it.
+            raise BagError(file, 'is no file', "name a bag's folder, or its file")
+        with file.open('rb') as stream:
+            start = stream.read(length)
+            size = stream.seek(0, SEEK_END)
+            stream.seek(max(0, size - length))
+            end = stream.read()
+    except FileNotFoundError:
+        raise BagError(file, 'does not exist', 'name the folder of a bag, or its file') from None
+    except OSError as error:
+        raise unreadable(file, error) from None
+    if not start:
+        raise BagError(file, 'is empty', 'its recording never began, or the power failed in it')
+    if start != MCAP0_MAGIC:
+        raise BagError(
+            file, f'starts with {quoted(start)}, as no MCAP file does', 'name an MCAP file'
+        )
+    return size > length and end == MCAP0_MAGIC
+
+
+def unreadable(file: Path, error: OSError) -> BagError:
+    """Return the error for a file that the system cannot read."""
+    reason = f'cannot be read: {error.strerror or error}'
+    return BagError(file, reason, 'check its permissions and the disk')
+
+
+def is_in_use(file: Path) -> bool:
+    """
+    Return whether some process has a file open for writing; False if that cannot be known.
+
+    A lease for reading is granted where nobody has. It is asked of the system and given back at
+    once; nothing is locked. Only a file's owner may ask, and not of every file system.
+    """
+    try:
+        descriptor = os.open(file, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        # Who opens the file between the two lines has us told, by default with a deadly signal.
+        fcntl(descriptor, F_SETSIG, SIGURG)
+        fcntl(descriptor, F_SETLEASE, F_RDLCK)
+        fcntl(descriptor, F_SETLEASE, F_UNLCK)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return False
+
+
+class FooterMetadata(NamedTuple):
+    """
+    The metadata that our writer puts at the end of a file.
+
+    Attributes
+    ----------
+    custom
+        ``custom_data`` of the bag, as it was when the file was ended.
+    accounted
+        Whether the statistics are there, the last record of a recording.
+
+    """
+
+    custom: Mapping[str, str]
+    accounted: bool
+
+
+def footer_metadata(file: Path) -> FooterMetadata:
+    """Return the metadata at the end of a file; empty if the end is missing or damaged."""
+    custom: Mapping[str, str] = {}
+    accounted = False
+    try:
+        with file.open('rb') as stream:
+            source = Source(stream)
+            records = index_of(source).metadata
+            accounted = any(each.name == STATS_RECORD for each in records)
+            # Where there are several, the last says what came of it in the end.
+            said = [each for each in records if each.name == 'rosbag2'][-1:]
+            for each in said:
+                content = source.read(each.offset, each.length)
+                # What others say there may take seconds to understand, and tells us nothing.
+                if b'linkage_ros.' in content:
+                    head = HEAD.size
+                    record = strict(Metadata, content[head:])
+                    custom = custom_of(serialized_metadata(record))
+    except (DamagedError, OSError):
+        pass  # to be met, and told, when the messages are read
+    return FooterMetadata(custom, accounted)
+
+
+RUN_FILE = 'run.json'
+"""Name of the attachment in which a run names its scene, topics and versions."""
+
+_RECOVER = 'linkage recover makes a whole bag of what is there'
+
+MOST_ATTACHED = 64 * 2**20
+"""How many bytes of the attachments of a file are kept in memory."""
+
+_LONGEST_QOS, _MOST_QOS = 1024, 64
+"""Of one profile: letters, and values; rosbag2 writes some 320 and 33."""
+
+Told = Callable[[int], None]
+"""Takes how many bytes of a file have been read, now and then; what it raises ends the reading."""
+
+
+class BagMessage(NamedTuple):
+    """One message: the topic's name, when it was received and made [ns], and its CDR bytes."""
+
+    topic: str
+    log_time: int
+    publish_time: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Bag:
+    """
+    A bag that can be read.
+
+    Parameters
+    ----------
+    path
+        As it was named.
+    files
+        Its MCAP files, in the order of recording.
+    topics
+        Its topics.
+    attachments
+        Name to content, up to 64 MiB of them.
+    passed_over
+        Names of the attachments that are not read, since they are beyond that.
+    custom
+        ``custom_data`` of its metadata, or where these are missing of its last file.
+    truncated
+        Whether an end is missing, since its recording was killed or still runs: of a file, or of
+        the bag, where all of its files are whole and the next one never came.
+
+    """
+
+    path: Path
+    files: tuple[Path, ...]
+    topics: tuple[Topic, ...]
+    attachments: Mapping[str, bytes]
+    passed_over: tuple[str, ...]
+    custom: Mapping[str, str]
+    truncated: bool
+
+    def messages(self) -> Iterator[BagMessage]:
+        """
+        Iterate over the messages in the order in which they were written.
+
+        That is the order of the file, not of the log times: a replay wants to see what the
+        recorder saw. A truncated bag ends with its last whole chunk.
+
+        Raises
+        ------
+        BagError
+            The file is damaged; the messages before the damage have been given by then.
+
+        """
+        for file in self.files:
+            until_damage = self.truncated and file == self.files[-1]
+            for found in _contents(file, Definitions(), _untold, until_damage=until_damage):
+                if isinstance(found, Message):
+                    yield BagMessage(
+                        found.channel.topic, found.log_time, found.publish_time, found.data
+                    )
+
+
+def read_bag(
+    path: str | Path, *, allow_truncated: bool = False, told: Told = lambda read: None
+) -> Bag:
+    """
+    Open a bag for reading.
+
+    Parameters
+    ----------
+    path
+        The bag's folder, or an MCAP file.
+    allow_truncated
+        Whether a bag whose recording was killed will do, as far as it goes.
+    told
+        Is told of the reading of files without an index, which are read to their end.
+
+    Raises
+    ------
+    BagError
+        It is missing, empty, not an MCAP file, damaged, or truncated and that will not do.
+
+    """
+    path = Path(path)
+    information = information_of(path) if path.is_dir() else {}
+    files = files_of(path, information)
+    begun = allow_truncated and len(files) > 1 and is_empty(files[-1])
+    if begun:
+        # Killed between making the next file and writing to it.
+        files.pop()
+    whole = [is_finished(file) for file in files]
+    if not all(whole) and not allow_truncated:
+        raise BagError(
+            files[whole.index(False)],
+            'has no end: its recording was killed, or still runs',
+            _RECOVER,
+        )
+    topics: dict[str, Topic] = {}
+    attachments: dict[str, bytes] = {}
+    passed_over: dict[str, None] = {}
+    for file, finished in zip(files, whole, strict=True):
+        definitions, attached, beyond = _description(file, told, finished=finished)
+        passed_over |= dict.fromkeys(beyond)
+        for channel in definitions.channels.values():
+            topic = topic_of(channel, definitions.schema_of(channel))
+            topics.setdefault(topic.name, topic)
+        for attachment in attached:
+            if attachment.name != CHANNELS_FILE:
+                attachments.setdefault(attachment.name, attachment.data)
+    ending = footer_metadata(files[-1])
+    custom = custom_of(information) if information else ending.custom
+    # Where the account is there, nothing is missing but the last words of the metadata.
+    unfinished = UNFINISHED in custom and not ending.accounted
+    # A file that was named by itself is whole, wherever its recording went on.
+    if unfinished and path.is_dir() and not allow_truncated:
+        raise BagError(path, 'is not finished: its recording was killed, or still runs', _RECOVER)
+    return Bag(
+        path=path,
+        files=tuple(files),
+        topics=tuple(topics.values()),
+        attachments=attachments,
+        passed_over=tuple(name for name in passed_over if name not in attachments),
+        custom=custom,
+        truncated=begun or not all(whole) or unfinished,
+    )
+
+
+def _description(
+    file: Path, told: Told, *, finished: bool
+) -> tuple[Definitions, list[Attachment], list[str]]:
+    """
+    Return schemas and channels, attachments, and names of those that are not kept in memory.
+
+    They come from the file's index, if it has one.
+    """
+    if finished:
+        with _translated(file), file.open('rb') as stream:
+            source = Source(stream)
+            index = index_of(source)
+            if index.definitions.channels:
+                return index.definitions, *_kept(
+                    attachment_at(source, each.offset)[0] for each in index.attachments
+                )
+    definitions = Definitions()
+    contents = _contents(file, definitions, told, until_damage=not finished)
+    return definitions, *_kept(found for found in contents if isinstance(found, Attachment))
+
+
+def _kept(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str]]:
+    """Return the attachments that are kept in memory, and the names of those that do not fit."""
+    kept, beyond, left = [], [], MOST_ATTACHED
+    for attachment in attachments:
+        if len(attachment.data) <= left:
+            left -= len(attachment.data)
+            kept.append(attachment)
+        else:
+            beyond.append(attachment.name)
+    return kept, beyond
+
+
+def _contents(
+    file: Path, definitions: Definitions, told: Told, *, until_damage: bool
+) -> Iterator[Found]:
+    """Yield messages, attachments and metadata in the order of the file; checksums fit."""
+    finished = is_finished(file)
+    with _translated(file), file.open('rb') as stream:
+        source = Source(stream)
+        index = index_of(source) if finished else None
+        if index and index.checked:
+            # What the data says must be what the index says.
+            definitions.schemas |= index.definitions.schemas
+            definitions.channels |= index.definitions.channels
+        data = DataSection(source, definitions, index.start if index else 0)
+        messages, at = 0, len(MCAP0_MAGIC)
+        try:
+            while not data.finished:
+                told(at)
+                records, end = data.take(at)
+                for found in records:
+                    messages += isinstance(found, Message)
+                    yield found
+                at = end
+        except DamagedError as error:
+            if until_damage and not finished:
+                return
+            raise DamagedError(f'the record at byte {at:,}: {error}') from None
+        if index is None:
+            return
+        data.covered()
+        if at != index.start:
+            raise DamagedError('its index begins elsewhere than it says')
+        promised = index.statistics
+        if promised and promised.message_count != messages:
+            raise DamagedError(f'{messages:,} messages are there of {promised.message_count:,}')
+
+
+def _untold(_read: int) -> None:
+    pass
+
+
+@contextmanager
+def _translated(file: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise unreadable(file, error) from None
+    except DamagedError as error:
+        raise _damaged(file, str(error)) from None
+
+
+def topic_of(channel: Channel, schema: Schema | None) -> Topic:
+    """Return the topic that a channel is."""
+    return Topic(
+        name=channel.topic,
+        type=schema.name if schema else '',
+        definition=schema.data.decode('utf-8', 'replace') if schema else '',
+        type_hash=channel.metadata.get('topic_type_hash', ''),
+        qos=_qos(channel.metadata.get('offered_qos_profiles', '')),
+    )
+
+
+@lru_cache(maxsize=256)
+def _qos(text: str) -> QosProfile:
+    """Return the first of the profiles; the default if there is none, or none to be understood."""
+    # One for each publisher: of /tf there may be hundreds.
+    first = text.partition('\n- ')[0]
+    try:
+        if len(first) > _LONGEST_QOS:
+            raise ValueError
+        return QosProfile.from_mapping(bounded_yaml(first, _MOST_QOS)[0])
+    except Exception:  # noqa: BLE001 (whatever yaml and the numbers in it raise)
+        # A QoS nobody understands is no reason to withhold the messages.
+        return QosProfile(understood=not text)
+
+
+def _damaged(file: Path, reason: str) -> BagError:
+    return BagError(file, f'is damaged: {reason}', 'linkage recover saves what is whole')

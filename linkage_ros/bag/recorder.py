@@ -1,0 +1,403 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Record from the hot path: hand over and forget.
+
+``offer`` is two length checks and an append. A thread of the recorder's own does the rest. A disk
+that stalls or fills stops that thread only: the queue fills, and further messages are counted.
+After a full disk the recording goes on in a new file of the bag as soon as there is room; whatever
+it ends by, the bag says what became of all that was offered until `Recorder.stop`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+import threading
+import time
+
+from linkage_ros.bag.metadata import BagSummary
+from linkage_ros.bag.recording_stats import RecordingStats
+from linkage_ros.bag.storage import FLUSH_AFTER
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import RecordingError
+
+POLL = 0.02
+"""How often a thread looks for what was offered, in [s]."""
+
+ROOM_POLL = 1.0
+"""How often a recorder looks whether a disk that was full has room again, in [s]."""
+
+BATCH, NAP = 50, 50e-6
+"""
+Messages between two naps of a thread, about 0.3 ms of work, and the nap [s].
+
+It is not 0: with a nap of 0 the thread often takes the interpreter back before a waiting tick
+wakes up.
+"""
+
+
+PLACE = 16 * 1024
+"""
+How large a message may be that takes one place in a queue [bytes]; a larger one takes more.
+
+So a bound on the places is one on the bytes too, at most one message more for each thread that
+offers. To count bytes, these threads would need a lock, and a tick would wait for it.
+"""
+
+Offered = tuple[int, int, int, bytes]
+"""A message on its way: topic, log time, publish time [ns] and its CDR bytes."""
+
+
+class ThreadCounter:
+    """
+    A counter that several threads count up without a lock.
+
+    Stepping an `itertools.count` is one C call, which threads cannot tear apart as they can
+    ``n += 1``. It can only be read by stepping it, so the steps made for reading are taken off.
+    """
+
+    __slots__ = ('_reading', '_readings', 'add')
+
+    def __init__(self) -> None:
+        self.add = count().__next__
+        self._readings = 0
+        self._reading = threading.Lock()
+
+    def value(self) -> int:
+        with self._reading:
+            steps = self.add() - self._readings
+            self._readings += 1
+            return steps
+
+
+class MessageQueue:
+    """
+    Messages on their way to one thread, and how many of each topic were offered and dropped.
+
+    Parameters
+    ----------
+    topics
+        How many topics there are.
+    capacity
+        Messages that may wait, each of up to `PLACE`; a larger one counts as so many more.
+
+    Attributes
+    ----------
+    open
+        Whether messages are taken; else they are dropped.
+    received, dropped
+        A counter for each topic.
+
+    """
+
+    def __init__(self, topics: int, capacity: int) -> None:
+        self.open = True
+        self._capacity = capacity
+        self._waiting: deque[Offered | None] = deque()
+        self.received = [ThreadCounter() for _ in range(topics)]
+        self.dropped = [ThreadCounter() for _ in range(topics)]
+        self._add_received = [counter.add for counter in self.received]
+        self._add_dropped = [counter.add for counter in self.dropped]
+
+    def offer(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
+        """
+        Hand over one message, from any thread; never blocks, never raises for the disk's sake.
+
+        Parameters
+        ----------
+        topic
+            The topic's number.
+        log_time, publish_time
+            When it was received, and when its source made it [ns].
+        data
+            The CDR bytes. They are kept, not copied: a buffer that is reused must be given as
+            ``bytes(buffer)``.
+
+        """
+        self._add_received[topic]()
+        if not self.open or len(self._waiting) >= self._capacity:
+            self._add_dropped[topic]()
+        elif len(data) < PLACE:
+            self._waiting.append((topic, log_time, publish_time, data))
+        else:
+            places = len(data) // PLACE
+            self._waiting.extend(((topic, log_time, publish_time, data), *(None,) * places))
+
+    def __len__(self) -> int:
+        """Return how many places are taken."""
+        return len(self._waiting)
+
+    def take(self, most: int) -> Iterator[Offered]:
+        """Yield the messages that wait, of so many places."""
+        for _ in range(min(most, len(self._waiting))):
+            if message := self._waiting.popleft():
+                yield message
+
+
+@dataclass(frozen=True, slots=True)
+class TopicCounts:
+    """
+    What became of one topic's messages.
+
+    ``received == recorded + dropped + let_go + waiting``, at every instant. Waiting is what is in
+    the queue or in the hands of the recorder's thread, let go what was recorded in a file that
+    made way for a newer one.
+    """
+
+    name: str
+    received: int
+    recorded: int
+    dropped: int
+    waiting: int
+    let_go: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingSummary:
+    """
+    How a recording went.
+
+    Parameters
+    ----------
+    folder
+        The bag.
+    topics
+        Counts for each topic, in the order of their numbers; nothing waits any more, so
+        ``received == recorded + dropped + let_go``.
+    size
+        Size of the MCAP files [bytes].
+    failure
+        Why messages are missing, on one line; None where no disk has failed.
+
+    """
+
+    folder: Path
+    topics: tuple[TopicCounts, ...]
+    size: int
+    failure: str | None
+
+
+class Recorder:
+    """
+    A bag that is written on a thread of its own.
+
+    Parameters
+    ----------
+    writer
+        The open bag, the recorder's from here on.
+    capacity
+        Messages that may wait, each of up to 16 KiB; a larger one counts as so many more. The
+        default is 16 s of two topics at 2 kHz, about 25 MB, and 1 GiB at most.
+    flush_period
+        What a power cut may cost [s], as long as the disk answers within a tenth of it.
+
+    """
+
+    def __init__(
+        self, writer: BagWriter, *, capacity: int = 65536, flush_period: float = 1.0
+    ) -> None:
+        self.failure: RecordingError | None = None
+        """Why messages are lost, or were; a recording that went on again has one too."""
+        self._recording = True
+        self.folder = writer.folder
+        self._writer = writer
+        self._flush_after = FLUSH_AFTER * flush_period
+        self._queue = MessageQueue(len(writer.topics), capacity)
+        self.offer = self._queue.offer
+        """Hands over one message, as `MessageQueue.offer`."""
+        # The thread's own: what the writer took, and what did not get there. One tuple, so that
+        # another thread never sees a message in both, or in neither.
+        self._done = ([0] * len(writer.topics), [0] * len(writer.topics))
+        self._safe = (0,) * len(writer.topics)
+        self._custom: dict[str, str] = {}
+        writer.account = self._account
+        self._summary: RecordingSummary | None = None
+        self._stopping = threading.Event()
+        # A daemon: a disk that never answers must not keep the process from ending.
+        self._thread = threading.Thread(target=self._run, name='bag recorder', daemon=True)
+        self._thread.start()
+
+    def inspect(self) -> tuple[TopicCounts, ...]:
+        """Return the counts as they are now; after a failure, ``recorded`` is what was kept."""
+        counts = []
+        # First, so that nothing is let go that was not taken.
+        let_go = self._writer.let_go
+        opened = self._writer.opened
+        taken, lost = self._done
+        for number, topic in enumerate(self._writer.topics):
+            gone = let_go[number]
+            recorded = taken[number] + opened[number] - gone
+            dropped = self._queue.dropped[number].value() + lost[number]
+            # Last, so that a message on its way is waiting, and never gone twice.
+            received = self._queue.received[number].value() + opened[number]
+            waiting = received - recorded - dropped - gone
+            counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting, gone))
+        return tuple(counts)
+
+    def stop(
+        self, custom: Mapping[str, str] | None = None, *, timeout: float = 10.0
+    ) -> RecordingSummary:
+        """
+        Write what waits, close the bag and say how it went; raises nothing.
+
+        Parameters
+        ----------
+        custom
+            Goes to ``custom_data`` of the bag's metadata, beside the account.
+        timeout
+            How long a disk that does not answer is waited for [s]. After that the summary counts
+            as recorded only what a flush has brought to the disk.
+
+        """
+        if self._summary:
+            return self._summary
+        self._custom = dict(custom or {})
+        self._queue.open = False
+        self._stopping.set()
+        self._thread.join(timeout)
+        stuck = self._thread.is_alive()
+        if stuck:
+            self.failure = RecordingError(
+                self._writer.folder,
+                f'the disk has not answered for {timeout:g} s',
+                'what was flushed before is readable; check the disk',
+            )
+        topics = []
+        for number, counts in enumerate(self.inspect()):
+            recorded = counts.recorded
+            if stuck:
+                recorded = max(0, self._safe[number] - counts.let_go)
+            dropped = counts.received - recorded - counts.let_go
+            topics.append(replace(counts, recorded=recorded, dropped=dropped, waiting=0))
+        self._summary = RecordingSummary(
+            folder=self._writer.folder,
+            topics=tuple(topics),
+            size=self._writer.size,
+            failure=str(self.failure) if self.failure else None,
+        )
+        return self._summary
+
+    @property
+    def recording(self) -> bool:
+        """Return whether messages get into the bag; not after a failure, until there is room."""
+        return self._recording
+
+    @property
+    def ended(self) -> bool:
+        """Return whether it has failed for good, so that no more messages are taken."""
+        return self.failure is not None and not self._queue.open
+
+    def _run(self) -> None:
+        going = True
+        while going:
+            try:
+                if self._goes_on():
+                    self._record()
+                going = False
+            except Exception as error:  # noqa: BLE001, PERF203 (nothing ends it in silence)
+                self._fail(error)
+        try:
+            self._writer.close(self._custom)
+        except Exception as error:  # noqa: BLE001 (as above)
+            self._fail(error)
+        self._count_kept()
+        self._lose_queue()
+
+    def _goes_on(self) -> bool:
+        """Wait after a failure until there is room again; return False where nobody waits."""
+        while not self._recording:
+            patience = ROOM_POLL if self._writer.out_of_room else None
+            if self._stopping.wait(patience):
+                return False
+            self._recording = self._writer.resume()
+        return True
+
+    def _record(self) -> None:
+        """Write what is offered until the recorder is to stop."""
+        due = time.monotonic() + self._flush_after
+        stopping = False
+        while not stopping:
+            # Asked before the queue is emptied: what was offered until then is written.
+            stopping = self._stopping.wait(max(0.0, min(POLL, due - time.monotonic())))
+            more = True
+            while more:
+                more = self._write_batch()
+                now = time.monotonic()
+                # A backlog first, lest a slow disk leave time for nothing but flushes.
+                if now >= due + self._flush_after * more:
+                    self._writer.flush()
+                    self._safe = tuple(self._done[0])
+                    # What came while it lasted is not with the system yet.
+                    due = max(now + self._flush_after, time.monotonic())
+                if more:
+                    time.sleep(NAP)
+
+    def _account(self, summary: BagSummary) -> RecordingStats:
+        """Return what became of all messages, once no more are taken; `dropped` is the rest."""
+        received = [
+            tally.value() + opened
+            for tally, opened in zip(self._queue.received, self._writer.opened, strict=True)
+        ]
+        dropped = [
+            came - there - gone
+            for came, there, gone in zip(received, summary.counts, summary.let_go, strict=True)
+        ]
+        return RecordingStats(received, summary.counts, dropped, summary.let_go)
+
+    def _write_batch(self) -> bool:
+        """Write up to a batch of messages; return whether there may be more."""
+        queue, write, (taken, lost) = self._queue, self._writer.write, self._done
+        for message in queue.take(BATCH):
+            topic = message[0]
+            # Until the writer has answered, the message is counted nowhere, and so it waits.
+            try:
+                kept = write(*message)
+            except BaseException:
+                lost[topic] += 1
+                raise
+            (taken if kept else lost)[topic] += 1
+        return bool(queue)
+
+    def _fail(self, error: Exception) -> None:
+        """Keep the failure, and count as recorded only what the writer could keep."""
+        self._recording = False
+        if not isinstance(error, RecordingError):
+            reason = f'the recording ended early: {type(error).__name__}: {error}'
+            error = RecordingError(self._writer.folder, reason, 'please report this')
+        self._count_kept()
+        if not self._writer.out_of_room:
+            self._queue.open = False
+            self._lose_queue()
+        self.failure = error
+
+    def _count_kept(self) -> None:
+        """Count as lost what the writer has taken and could not keep."""
+        kept = self._writer.kept
+        taken, lost = self._done
+        lost = [gone + had - has for gone, had, has in zip(lost, taken, kept, strict=True)]
+        self._done = (list(kept), lost)
+        self._safe = kept
+
+    def _lose_queue(self) -> None:
+        """Count what waits as lost."""
+        _, lost = self._done
+        while self._queue:
+            for topic, *_ in self._queue.take(BATCH):
+                lost[topic] += 1

@@ -1,0 +1,537 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Make a whole bag of what a damaged one still holds; the damaged one is read, nothing else."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+import os
+from pathlib import Path
+import shutil
+from typing import Any, NamedTuple
+
+from linkage_ros.bag.bag_file import COMPRESSION_TYPES, start
+from linkage_ros.bag.disk import CHUNK_SIZE
+from linkage_ros.bag.mcap_records import Definitions, Found, Message, Source
+from linkage_ros.bag.metadata import (
+    BagSummary,
+    METADATA_FILE,
+    metadata_text,
+    NO_START,
+    sync_folder,
+    write_metadata,
+)
+from linkage_ros.bag.reader import (
+    by_number,
+    custom_of,
+    files_of,
+    information_of,
+    is_in_use,
+    serialized_metadata,
+    topic_of,
+    unreadable,
+)
+from linkage_ros.bag.recording_stats import UNFINISHED
+from linkage_ros.bag.salvage import BEGINNING, Loss, Salvage
+from linkage_ros.bag.topic import Topic
+from linkage_ros.errors import BagError, quoted, RecordingError
+from mcap.exceptions import UnsupportedCompressionError
+from mcap.records import Attachment, Channel
+from mcap.writer import CompressionType, Writer
+
+RECOVERED = 'linkage_ros.recovered'
+"""Key in the ``custom_data`` of a recovered bag: what it was made of, and what was lost."""
+
+
+NOTHING_LOST = 'nothing lost'
+"""How that text ends where it is so."""
+
+
+class TopicRecovery(NamedTuple):
+    """How many messages of a topic were saved, and how many there were; None if unknown."""
+
+    name: str
+    saved: int
+    promised: int | None
+
+
+class Recovery(NamedTuple):
+    """
+    What became of a damaged bag.
+
+    Attributes
+    ----------
+    folder
+        The new bag.
+    topics
+        What was saved of each, and what was to be there.
+    attachments
+        Names of those that were saved.
+    losses
+        What is lost, with the name of its file.
+    repaired
+        What was damaged or missing and cost nothing, each on a line.
+    remarks
+        What else one has to know, each on a line.
+
+    """
+
+    folder: Path
+    topics: tuple[TopicRecovery, ...]
+    attachments: tuple[str, ...]
+    losses: tuple[tuple[str, Loss], ...]
+    repaired: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def missing(self) -> int:
+        """Return how many messages were promised and are not there."""
+        return sum(max((topic.promised or 0) - topic.saved, 0) for topic in self.topics)
+
+    @property
+    def whole(self) -> bool:
+        """Return whether nothing was lost."""
+        return not self.losses and not self.missing
+
+    def in_short(self, path: Path) -> str:
+        """Return in a line what became of the bag of this name."""
+        saved = sum(topic.saved for topic in self.topics)
+        lost = NOTHING_LOST
+        if not self.whole:
+            size = sum(loss.end - loss.start for _, loss in self.losses)
+            lost = f'{size} bytes lost in {len(self.losses)} places'
+        return f'from {path.absolute().name}: {saved} messages, {lost}'
+
+
+def promised_counts(information: Mapping[str, Any]) -> dict[str, int]:
+    """Return how many messages of each topic ``metadata.yaml`` promises, if it does."""
+    counts = {}
+    try:
+        for each in information['topics_with_message_count']:
+            counts[str(each['topic_metadata']['name'])] = int(each['message_count'])
+    except Exception:  # noqa: BLE001 (it may say anything)
+        return {}
+    return counts if any(counts.values()) else {}
+
+
+MOST_CHANNELS = 10_000
+"""How many channels a new bag may have: its metadata, 700 bytes for each, must stay readable."""
+
+
+class NewBag:
+    """
+    A new bag, open for writing.
+
+    Parameters
+    ----------
+    folder
+        Where it goes; it is there, and empty.
+    profile
+        The profile of its file: 'ros2'.
+    compression
+        How its chunks are packed: '', 'lz4' or 'zstd'.
+
+    Attributes
+    ----------
+    counts
+        Messages by topic.
+    attachments
+        Content by name.
+    information
+        What rosbag2 wrote of itself into the file that this is made of.
+
+    Raises
+    ------
+    OSError
+        As the system gives it, here and from all that writes.
+    BagError
+        From `add` and `describe`: there are more than `MOST_CHANNELS`.
+
+    """
+
+    def __init__(self, folder: Path, profile: str, compression: str) -> None:
+        self.counts: Counter[str] = Counter()
+        self.attachments: dict[str, bytes] = {}
+        self.information: Mapping[str, Any] = {}
+        self._folder = folder
+        self._topics: dict[str, Topic] = {}
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._channels: dict[tuple[object, ...], int] = {}
+        self._numbers: dict[int, int] = {}
+        self._start, self._end = NO_START, 0
+        self._file = (folder / f'{folder.name}_0.mcap').open('xb')
+        packing = COMPRESSION_TYPES.get(compression, CompressionType.NONE)
+        try:
+            self._mcap = Writer(self._file, chunk_size=CHUNK_SIZE, compression=packing)
+        except UnsupportedCompressionError:
+            self._mcap = Writer(
+                self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.NONE
+            )
+        start(self._mcap, profile)
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Return the names of its topics."""
+        return tuple(self._topics)
+
+    def begin_file(self) -> None:
+        """Forget the numbers of channels: they are those of a file."""
+        self._numbers.clear()
+
+    def add(self, found: Found, definitions: Definitions) -> None:
+        """Add what was found in a file, of which these schemas and channels are known."""
+        if isinstance(found, Message):
+            if not self._numbers:
+                self.describe(definitions)
+            number = self._numbers.get(found.channel.id)
+            if number is None:
+                # Not all that are known by now: of thousands, each comes with its first message.
+                number = self._number_of(found.channel, definitions)
+                self._numbers[found.channel.id] = number
+            self._mcap.add_message(
+                number, found.log_time, found.data, found.publish_time, found.sequence
+            )
+            self.counts[found.channel.topic] += 1
+            self._start = min(self._start, found.log_time)
+            self._end = max(self._end, found.log_time)
+        elif isinstance(found, Attachment):
+            # Files of one bag repeat them.
+            if self.attachments.get(found.name) != found.data:
+                self.attachments.setdefault(found.name, found.data)
+                self._mcap.add_attachment(
+                    found.create_time, found.log_time, found.name, found.media_type, found.data
+                )
+        elif found.name != 'rosbag2':
+            self._mcap.add_metadata(found.name, found.metadata)
+        else:
+            self.information = serialized_metadata(found)
+
+    def describe(self, definitions: Definitions) -> None:
+        """Take over all channels, those without a message too."""
+        for channel in definitions.channels.values():
+            if channel.id not in self._numbers:
+                self._numbers[channel.id] = self._number_of(channel, definitions)
+
+    def close(self, custom: Mapping[str, str]) -> BagSummary:
+        """Finish the bag, and return what it holds."""
+        summary = self._summary()
+        text = metadata_text(summary, custom, root=False)
+        self._mcap.add_metadata('rosbag2', {'serialized_metadata': text})
+        self._mcap.finish()  # type: ignore[no-untyped-call]
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        summary = self._summary()
+        self._file.close()
+        write_metadata(summary, custom)
+        sync_folder(self._folder.absolute().parent)
+        return summary
+
+    def abandon(self) -> None:
+        """Let go of the file; what is in it is of no use."""
+        with suppress(OSError):
+            self._file.close()
+
+    def _number_of(self, channel: Channel, definitions: Definitions) -> int:
+        """Return the number that a channel has here, the same for the same one of each file."""
+        schema = definitions.schema_of(channel)
+        kind = (schema.name, schema.encoding, schema.data) if schema else None
+        described = (channel.topic, channel.message_encoding, kind, *channel.metadata.items())
+        if described not in self._channels:
+            if len(self._channels) == MOST_CHANNELS:
+                raise BagError(
+                    self._folder,
+                    f'would hold more than {MOST_CHANNELS:,} channels; no more are recovered',
+                    'no ROS graph has as many: ask who made the bag',
+                )
+            number = 0
+            if kind is not None:
+                if kind not in self._schemas:
+                    self._schemas[kind] = self._mcap.register_schema(*kind)
+                number = self._schemas[kind]
+            self._channels[described] = self._mcap.register_channel(
+                channel.topic, channel.message_encoding, number, channel.metadata
+            )
+            self._topics.setdefault(channel.topic, topic_of(channel, schema))
+        return self._channels[described]
+
+    def _summary(self) -> BagSummary:
+        return BagSummary(
+            folder=self._folder,
+            file=Path(self._file.name).name,
+            topics=tuple(self._topics.values()),
+            counts=tuple(self.counts[name] for name in self._topics),
+            refused=(0,) * len(self._topics),
+            start=self._start,
+            duration=max(0, self._end - self._start),
+            size=self._file.tell(),
+        )
+
+
+Told = Callable[[int, int], None]
+Stopped = Callable[[], bool]
+
+
+class _Findings:
+    """Losses, repairs and remarks, collected on the way."""
+
+    def __init__(self) -> None:
+        self.losses: list[tuple[str, Loss]] = []
+        self.repaired: list[str] = []
+        self.remarks: list[str] = []
+        self.promised: Counter[str] = Counter()
+        self.all_promised = True  # whether the index of each file could be believed
+
+
+def recovered_name(path: Path) -> Path:
+    """Return the folder that a bag is recovered to if none is named: beside it."""
+    whole = Path(os.path.abspath(path))  # noqa: PTH100 (a link keeps the name it goes by)
+    return whole.with_name(f'{whole.name if path.is_dir() else whole.stem}_recovered')
+
+
+def recover(
+    path: Path,
+    target: Path | None = None,
+    told: Told = lambda done, of: None,
+    stopped: Stopped = lambda: False,
+) -> Recovery | None:
+    """
+    Save what is whole of a bag into a new one.
+
+    Parameters
+    ----------
+    path
+        The bag's folder, or an MCAP file.
+    target
+        The new folder; without it `recovered_name`.
+    told
+        Takes how many bytes have been seen, and of how many.
+    stopped
+        Whether to stop: then nothing is left behind, and nothing returned.
+
+    Raises
+    ------
+    BagError
+        It is no bag, leads out of its folder, has too many channels, or nothing of it is whole.
+        Nothing was written.
+    RecordingError
+        The new folder exists or cannot be written to. Nothing is left behind.
+
+    """
+    target = target or recovered_name(path)
+    findings = _Findings()
+    information = _information(path, findings)
+    files = _files(path, information, findings)
+    if os.path.lexists(target):
+        raise _exists(target)
+    profile, compression = _foretaste(path, files, stopped)
+    sizes = [file.stat().st_size for file in files]
+    with _new_folder(target):
+        bag = NewBag(target, profile, compression)
+        try:
+            for number, file in enumerate(files):
+                before, of = sum(sizes[:number]), sum(sizes)
+                for done in _save(file, bag, findings):
+                    told(before + done, of)
+                    if stopped():
+                        bag.abandon()
+                        shutil.rmtree(target)
+                        return None
+            recovery = _recovery(target, bag, information, findings)
+            custom = custom_of(information or bag.information)
+            # The old one had no end; the new one has.
+            custom = {key: text for key, text in custom.items() if key != UNFINISHED}
+            bag.close({**custom, RECOVERED: recovery.in_short(path)})
+        finally:
+            bag.abandon()
+    return recovery
+
+
+def _information(path: Path, findings: _Findings) -> dict[str, Any]:
+    """Return what the metadata says; what is damaged says nothing."""
+    if not path.is_dir():
+        return {}
+    try:
+        information = information_of(path)
+    except BagError:
+        information = {}
+    if not information:
+        findings.repaired.append(METADATA_FILE)
+    return information
+
+
+def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> list[Path]:
+    """Return the files of a bag: those that are named, and those that lie there."""
+    if path.is_dir():
+        named = files_of(path, information) if information else []
+        there = files_of(path, {}) if any(path.glob('*.mcap')) or not named else []
+        if [file for file in there if file in named] == named:
+            # By their numbers: one that made way in a ring may be left, before those named.
+            files = there
+        else:
+            files = _in_order(named, [file for file in there if file not in named])
+    else:
+        files = [path]
+    found = []
+    for file in files:
+        try:
+            if file.is_file():
+                with file.open('rb'):
+                    found.append(file)
+                continue
+            reason = 'is no file' if file.exists() else 'does not exist'
+        except OSError as error:
+            reason = unreadable(file, error).reason
+        if len(files) == 1:
+            raise BagError(file, reason, "name a bag's folder, or its file")
+        findings.losses.append((file.name, Loss(0, 0, reason)))
+    findings.remarks += [
+        f'{file.name} is still being written; what comes after this is not in the new bag'
+        for file in found
+        if is_in_use(file)
+    ]
+    return found
+
+
+def _in_order(named: Sequence[Path], others: Sequence[Path]) -> list[Path]:
+    """Put files that nobody names to those that are: a ring that was killed left older ones."""
+    place = by_number(named[0]) if named else (0, '')
+    older = [file for file in others if by_number(file) < place]
+    return [*older, *named, *(file for file in others if file not in older)]
+
+
+def _foretaste(path: Path, files: Sequence[Path], stopped: Stopped) -> tuple[str, str]:
+    """Return profile and compression for the new bag; or BagError, where there is nothing."""
+    profile, anything, reason = '', False, 'holds no file'
+    for file in files:
+        with file.open('rb') as stream:
+            salvage = Salvage(Source(stream))
+            for found in salvage.found():
+                anything = True
+                if isinstance(found, Message):
+                    ros = found.channel.message_encoding == 'cdr'
+                    return 'ros2' if ros else salvage.data.profile, salvage.data.compression
+                if stopped():
+                    break
+            anything |= bool(salvage.data.definitions.channels)
+            profile = profile or salvage.data.profile
+            reason = _why_nothing(file, salvage)
+    if not anything:
+        raise BagError(path, f'holds nothing that can be saved: {reason}', 'name another bag')
+    return profile or 'ros2', ''
+
+
+def _why_nothing(file: Path, salvage: Salvage) -> str:
+    with file.open('rb') as stream:
+        start = stream.read(8)
+    if not start:
+        return f'{file.name} is empty'
+    if BEGINNING in salvage.repaired:
+        return f'{file.name} starts with {quoted(start)}, as no MCAP file does'
+    if salvage.losses:
+        loss = salvage.losses[0]
+        return f'{file.name} at byte {loss.start:,}: {loss.reason}'
+    return f'{file.name} is whole, and empty'
+
+
+def _save(file: Path, bag: NewBag, findings: _Findings) -> Iterator[int]:
+    """Copy what is whole of a file; yield now and then how many of its bytes have been seen."""
+    bag.begin_file()
+    with file.open('rb') as stream:
+        salvage = Salvage(Source(stream))
+        definitions = salvage.data.definitions
+        told = 0
+        for found in salvage.found():
+            bag.add(found, definitions)
+            if salvage.seen != told:
+                told = salvage.seen
+                yield told
+        bag.describe(definitions)
+    findings.losses += [(file.name, loss) for loss in salvage.losses]
+    findings.repaired += [f'{file.name}: {what}' for what in salvage.repaired]
+    if salvage.data.unchecked:
+        findings.remarks.append(
+            f'{file.name}: {salvage.data.unchecked:,} messages that no checksum covers, taken as '
+            'they stand'
+        )
+    said = salvage.index.statistics if salvage.index else None
+    if said is None:
+        findings.all_promised = False
+        return
+    for number, count in said.channel_message_counts.items():
+        if number in definitions.channels:
+            findings.promised[definitions.channels[number].topic] += count
+
+
+def _recovery(
+    target: Path, bag: NewBag, information: Mapping[str, Any], findings: _Findings
+) -> Recovery:
+    promised: Mapping[str, int] = findings.promised
+    exact = findings.all_promised
+    if not exact:
+        promised = promised_counts(information)
+        exact = UNFINISHED not in custom_of(information)
+    names = dict.fromkeys([*bag.topics, *promised])
+    return Recovery(
+        folder=target,
+        topics=tuple(
+            TopicRecovery(name, saved, _true_promise(promised, name, saved, exact))
+            for name, saved in ((name, bag.counts[name]) for name in names)
+        ),
+        attachments=tuple(bag.attachments),
+        losses=tuple(findings.losses),
+        repaired=tuple(findings.repaired),
+        remarks=tuple(findings.remarks),
+    )
+
+
+def _true_promise(promised: Mapping[str, int], name: str, saved: int, exact: bool) -> int | None:
+    """
+    Return how many messages there were; None where that is unknown.
+
+    What a bag counts that is not finished is what was on the disk by the last flush: there were as
+    many at least. Where more are there than it says, it does not know how many there were.
+    """
+    count = promised.get(name, 0)
+    known = saved < count or (exact and bool(promised) and saved == count)
+    return count if known else None
+
+
+@contextmanager
+def _new_folder(target: Path) -> Iterator[None]:
+    """Make a folder, which goes away again if what is done in it fails."""
+    remedy = 'name a folder on a disk with room, with -o'
+    try:
+        target.mkdir(parents=True)
+    except FileExistsError:
+        raise _exists(target) from None
+    except OSError as error:
+        reason = f'cannot be made: {error.strerror or error}'
+        raise RecordingError(target, reason, remedy) from None
+    try:
+        yield
+    except OSError as error:
+        shutil.rmtree(target, ignore_errors=True)
+        reason = f'cannot be written: {error.strerror or error}'
+        raise RecordingError(target, reason, remedy) from None
+    except BaseException:
+        shutil.rmtree(target, ignore_errors=True)
+        raise
+
+
+def _exists(target: Path) -> RecordingError:
+    return RecordingError(target, 'exists already', 'name a new folder with -o')

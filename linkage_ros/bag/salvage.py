@@ -1,0 +1,366 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Find the records of a damaged MCAP file that are whole.
+
+The file is taken record by record, as a reader takes it. Where a record is not what it says, the
+index says where to go on, if its own checksum fits; else the records around do, or the file is
+searched for the next chunk or attachment whose checksum fits. A record with a checksum is given
+only if it fits; a record without one is never given behind a damage.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+import re
+from struct import Struct
+from typing import NamedTuple
+
+from linkage_ros.bag.mcap_records import (
+    attachment_at,
+    Chunk,
+    chunk_at,
+    DamagedError,
+    DataSection,
+    Definitions,
+    definitions_in,
+    FileIndex,
+    Found,
+    HEAD,
+    index_of,
+    is_whole_attachment,
+    is_whole_chunk,
+    LARGEST,
+    Message,
+    Source,
+)
+from linkage_ros.bag.topic import CHANNELS_FILE
+from mcap.opcode import Opcode
+from mcap.records import Attachment, AttachmentIndex, ChunkIndex, MetadataIndex
+from mcap.writer import MCAP0_MAGIC
+
+_WINDOW = 2**20
+_BLOCK = 4096
+_BEYOND = max(HEAD.size, len(MCAP0_MAGIC))
+# Of a record's length the upper half is zero: none of 4 GiB is taken. The look ahead consumes
+# nothing, so that none is overlooked in the bytes of another.
+_BEGINNING = re.compile(rb'[\x06\x09](?=.{4}\x00{4})|' + re.escape(MCAP0_MAGIC), re.DOTALL)
+_MOST_IN_VAIN = 16
+"""How often the size of the file is read for what only looks like a chunk."""
+
+
+def next_whole(source: Source, at: int) -> int:
+    """
+    Return where the first chunk or attachment begins, from there on; the file's size if none does.
+
+    What looks like one has to have a checksum that fits. A whole MCAP file within the file, as in
+    an attachment, is passed over: its messages are not those of this file.
+    """
+    budget = _MOST_IN_VAIN * source.size + LARGEST
+    while at < source.size:
+        window, size = _window(source, at)
+        goes_on = at + size
+        for match in _BEGINNING.finditer(window):
+            place = at + match.start()
+            if place >= goes_on:
+                break
+            if match.group() == MCAP0_MAGIC:
+                end = _end_of_file_at(source, place)
+                if end:
+                    goes_on = end
+                    break
+            elif _is_whole(source, place):
+                return place
+            else:
+                budget -= max(source.head(place)[1] - place, 0)
+                if budget < 0:
+                    return source.size
+        at = goes_on
+    return source.size
+
+
+def _window(source: Source, at: int) -> tuple[bytes, int]:
+    """Return some bytes, and of how many of them the beginnings are to be looked at."""
+    try:
+        return source.read(at, min(_WINDOW + _BEYOND, source.size - at)), _WINDOW
+    except DamagedError:
+        # The disk cannot read them all; what is before and behind a bad block it can.
+        with suppress(DamagedError):
+            return source.read(at, min(_BLOCK + _BEYOND, source.size - at)), _BLOCK
+    return b'', _BLOCK
+
+
+def _is_whole(source: Source, at: int) -> bool:
+    opcode, end = source.head(at)
+    if end > source.size:
+        return False
+    if opcode == Opcode.CHUNK:
+        return is_whole_chunk(source, at)
+    return is_whole_attachment(source, at)
+
+
+def _end_of_file_at(source: Source, at: int) -> int:
+    """Return where an MCAP file that begins there ends, if it does before this one; else 0."""
+    place = at + len(MCAP0_MAGIC)
+    while place < source.size:
+        window, size = _window(source, place)
+        found = window.find(MCAP0_MAGIC)
+        if found >= 0:
+            end = place + found + len(MCAP0_MAGIC)
+            return end if end < source.size else 0
+        place += size
+    return 0
+
+
+_INT = Struct('<I')
+_CHECKSUM_PLACE = HEAD.size + 24
+_KINDS = {
+    ChunkIndex: Opcode.CHUNK,
+    AttachmentIndex: Opcode.ATTACHMENT,
+    MetadataIndex: Opcode.METADATA,
+}
+_MADE_ANEW = {(MetadataIndex, 'rosbag2'), (AttachmentIndex, CHANNELS_FILE)}
+_IN_DATA = {*_KINDS.values(), Opcode.MESSAGE_INDEX, Opcode.DATA_END}
+
+BEGINNING = 'the beginning, which is not that of an MCAP file'
+
+
+class Loss(NamedTuple):
+    """Bytes of a file that are lost, from `start` to before `end`, and why."""
+
+    start: int
+    end: int
+    reason: str
+
+
+class Salvage:
+    """
+    Finds what is whole in a file, once.
+
+    Parameters
+    ----------
+    source
+        The file, as far as it reached when it was opened.
+
+    Attributes
+    ----------
+    seen
+        How far it was looked at.
+    losses
+        What is lost; grows as things are found, as do the next two.
+    repaired
+        What is damaged without a loss.
+    data
+        What was learned from the data.
+    index
+        The file's index, if its checksum fits.
+
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.seen = 0
+        self.losses: list[Loss] = []
+        self.repaired: list[str] = []
+        self.index = _trusted_index(source)
+        index = self.index
+        self.data = DataSection(
+            source,
+            index.definitions if index else Definitions(),
+            index.start if index else 0,
+        )
+        self._source = source
+        self._promised = _promised(self.index)
+        self._places = sorted(self._promised)
+        # With all places known there is nothing to search for, and nothing else to lose.
+        self._all_known = self.index is not None and _is_complete(self.index)
+        self._end = self.index.start if self.index else source.size
+        self._spare = Definitions()
+        self._messages = 0
+        self._indexes_end = 0  # of the messages of the chunk before
+
+    def found(self) -> Iterator[Found]:
+        """Yield messages, attachments and metadata in the order of the file."""
+        at = len(MCAP0_MAGIC)
+        if self._source.size < at or self._source.read(0, at) != MCAP0_MAGIC:
+            self.repaired.append(BEGINNING)
+        while at < self._end and not self.data.finished:
+            try:
+                records, end = self._take(at)
+            except DamagedError as error:
+                end = self._resume(at)
+                self._lose(at, end, str(error))
+            else:
+                if self.data.unknown[-1:] == [(at, end)]:
+                    self._lose(at, end, 'is of a kind that nobody has defined')
+                try:
+                    yield from self._wanted(self._counted(records, end))
+                except DamagedError as error:
+                    self._lose(at, end, str(error))
+            at = end
+            self.seen = at
+        self._conclude()
+
+    def _take(self, at: int) -> tuple[Iterable[Found], int]:
+        """Take what is there as a reader does, or by what the index says of it."""
+        promised = self._promised.get(at)
+        try:
+            opcode, end = self._source.head(at)
+            if promised and opcode != _KINDS[type(promised)]:
+                raise DamagedError('is not what the index says')
+            if opcode not in (Opcode.CHUNK, Opcode.ATTACHMENT) and end > self._next_place(at):
+                raise DamagedError('reaches into what the index says to be another')
+            return self.data.take(at)
+        except DamagedError:
+            taken: tuple[Iterable[Found], int]
+            if isinstance(promised, ChunkIndex):
+                taken = self._chunk_by_index(promised)
+            elif isinstance(promised, AttachmentIndex):
+                attachment, end, crc = attachment_at(self._source, at)
+                if not crc:
+                    raise
+                taken = (attachment,), end
+            else:
+                raise
+            self.repaired.append(f'the head of the record at byte {at:,}')
+            return taken
+
+    def _chunk_by_index(self, promised: ChunkIndex) -> tuple[Iterable[Message], int]:
+        """Take a chunk by all that the index repeats of its head; the checksum is not among it."""
+        start, length = promised.chunk_start_offset, promised.compressed_size
+        (crc,) = _INT.unpack(self._source.read(start + _CHECKSUM_PLACE, _INT.size))
+        if not crc:
+            raise DamagedError('has a damaged head and no checksum')
+        end = start + promised.chunk_length
+        data = self._source.read(end - length, length)
+        chunk = Chunk(promised.uncompressed_size, crc, promised.compression, data, end)
+        return self.data.chunk(chunk), end
+
+    def _counted(self, records: Iterable[Found], end: int) -> Iterator[Found]:
+        """Pass on what was found, and work out how long the indexes behind it are."""
+        counts: Counter[int] = Counter()
+        for found in records:
+            if isinstance(found, Message):
+                counts[found.channel.id] += 1
+            yield found
+        if counts:
+            self._messages += counts.total()
+            self._indexes_end = end + sum(15 + 16 * count for count in counts.values())
+
+    def _wanted(self, found: Iterable[Found]) -> Iterator[Found]:
+        """Pass on what is found, but keep what is there for us only."""
+        for one in found:
+            if isinstance(one, Attachment) and one.name == CHANNELS_FILE:
+                self._spare = definitions_in(one.data)
+            else:
+                yield one
+
+    def _resume(self, at: int) -> int:
+        """Return where to go on behind a record that is damaged."""
+        self.data.loose = False
+        if self._all_known:
+            return self._next_place(at)
+        ends = [self._indexes_end]
+        try:
+            ends.append(self._source.head(at)[1])
+            ends.append(chunk_at(self._source, at).end)
+        except DamagedError:
+            pass
+        for end in ends:
+            if end > at and self._goes_on_at(end):
+                return end
+        return next_whole(self._source, at + 1)
+
+    def _next_place(self, at: int) -> int:
+        number = bisect_right(self._places, at)
+        return self._places[number] if number < len(self._places) else self._end
+
+    def _goes_on_at(self, at: int) -> bool:
+        """Say whether records follow there: two of this place, or the end of the data."""
+        try:
+            for _ in range(2):
+                opcode, end = self._source.head(at)
+                if opcode not in _IN_DATA or end > self._source.size:
+                    return False
+                if opcode == Opcode.DATA_END:
+                    return end - at == HEAD.size + _INT.size
+                at = end
+        except DamagedError:
+            return False
+        return True
+
+    def _lose(self, start: int, end: int, reason: str) -> None:
+        # Schemas and channels may be among it.
+        self.data.definitions.complete(self._spare)
+        promised = self._promised.get(start)
+        ours = (type(promised), getattr(promised, 'name', '')) in _MADE_ANEW
+        if (self._all_known and not promised) or ours or end <= self._indexes_end:
+            self.repaired.append(f'what marks and describes, at byte {start:,}: {reason}')
+        else:
+            self.losses.append(Loss(start, end, reason))
+
+    def _conclude(self) -> None:
+        size, length = self._source.size, len(MCAP0_MAGIC)
+        self.repaired += [f'the length of the record at byte {at:,}' for at in self.data.misfits]
+        if self.index is None and not self.data.finished:
+            self.losses.append(Loss(size, size, 'it ends here, without its end'))
+        elif self.index is None:
+            self.repaired.append('the index')
+        elif self._source.read(size - length, length) != MCAP0_MAGIC:
+            self.repaired.append('the end, which is not that of an MCAP file')
+        if self.losses:
+            return
+        promised = self.index.statistics if self.index else None
+        missing = promised.message_count - self._messages if promised else 0
+        if missing > 0:
+            reason = f'{missing:,} messages that the index counts are nowhere'
+            self.losses.append(Loss(size, size, reason))
+        try:
+            _ = self.data.finished and self.data.covered()
+        except DamagedError as error:
+            self.repaired.append(str(error))
+
+
+def _trusted_index(source: Source) -> FileIndex | None:
+    """Return the index, if its checksum fits; nothing else is believed here."""
+    try:
+        index = index_of(source)
+    except DamagedError:
+        return None
+    return index if index.checked else None
+
+
+def _is_complete(index: FileIndex) -> bool:
+    """Say whether an index tells of all that there is."""
+    said = index.statistics
+    return (
+        said is not None
+        and said.chunk_count == len(index.chunks)
+        and said.attachment_count == len(index.attachments)
+        and said.metadata_count == len(index.metadata)
+        and bool(index.chunks or not said.message_count)
+    )
+
+
+def _promised(index: FileIndex | None) -> dict[int, ChunkIndex | AttachmentIndex | MetadataIndex]:
+    promised: dict[int, ChunkIndex | AttachmentIndex | MetadataIndex] = {}
+    if index:
+        promised |= {chunk.chunk_start_offset: chunk for chunk in index.chunks}
+        promised |= {each.offset: each for each in index.attachments}
+        promised |= {each.offset: each for each in index.metadata}
+    return promised

@@ -1,0 +1,452 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Write a bag, in one file or several, whose every flushed message outlives a kill or a full disk.
+
+``metadata.yaml`` is there from the first moment and renewed about once a second and with each new
+file: it names all files, and counts what is on the disk. Until the bag is closed its custom data
+has `recording_stats.UNFINISHED`; so a killed bag says that it is one, and where it stopped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from itertools import count
+from pathlib import Path
+import time
+from typing import NoReturn
+
+from linkage_ros.bag.bag_file import BagFile, channels_file, compression_type
+from linkage_ros.bag.disk import FIRST_RESERVE, LostError, NO_ROOM, Reserve
+from linkage_ros.bag.metadata import BagSummary, sync_folder, together, write_metadata
+from linkage_ros.bag.recording_stats import (
+    custom_data,
+    FAILURE,
+    last_records,
+    RecordingStats,
+    UNFINISHED_DATA,
+)
+from linkage_ros.bag.storage import scarcity, Storage
+from linkage_ros.bag.topic import CHANNELS_FILE, Topic
+from linkage_ros.errors import RecordingError
+
+_MAKE_ROOM = 'make room there'
+_GO_ON = 'make room there: a run then goes on in a new file'
+_CHECK_DISK = 'check the disk before the next recording'
+_KEEP_OUT = 'let no other process write to the folder of a bag while it is recorded'
+TIME_END = 2**63  # rosbag2's times are signed
+_SEQUENCE_END = 2**32  # MCAP's sequence numbers; at 10 kHz they start again after five days
+_RENEWAL = 0.8  # [s]; less than is between two flushes of a second
+_ROOM_TO_GO_ON = 4 * FIRST_RESERVE  # lest a disk that stays full get many small files [bytes]
+
+
+class BagWriter:
+    """
+    A new bag, open for writing; not for several threads at once.
+
+    Parameters
+    ----------
+    folder
+        Where the bag goes. It is made here; one that exists is never touched.
+    topics
+        What will be written; a topic's number is its place in this sequence.
+    attachments
+        Name to (media type, content); each file has them, and its topics, so that each explains
+        itself.
+    storage
+        How it is stored; its ``flush_period`` is for whoever calls `flush`.
+    opening
+        Topic number and CDR bytes of what stands before the first message of each file, with its
+        log time: what was published once, for whoever comes later.
+
+    Attributes
+    ----------
+    let_go
+        Messages of each topic that were in files that made way for newer ones.
+    out_of_room
+        Whether it has failed for want of room, so that `resume` may go on.
+    opened
+        How many messages of each topic are there by `opening`, and were not given to `write`.
+    account
+        Returns what became of all messages, given what the bag holds; none for a bag whose writer
+        keeps no account.
+
+    Raises
+    ------
+    RecordingError
+        The folder exists, or cannot be made or written to. Nothing is left behind.
+
+    """
+
+    def __init__(
+        self,
+        folder: str | Path,
+        topics: Sequence[Topic],
+        attachments: Mapping[str, tuple[str, bytes]] | None = None,
+        storage: Storage | None = None,
+        opening: Sequence[tuple[int, bytes]] = (),
+    ) -> None:
+        self.folder = Path(folder)
+        self.topics = tuple(topics)
+        self.storage = storage or Storage()
+        self._compression = compression_type(self.storage.compression, self.folder)
+        self.let_go = (0,) * len(self.topics)
+        self.account: Callable[[BagSummary], RecordingStats | None] = lambda summary: None
+        channels = 'application/mcap', channels_file(self.topics)
+        self._attachments = {**(attachments or {}), CHANNELS_FILE: channels}
+        self._split_time = round(self.storage.split_seconds * 1e9)  # [ns]
+        self._splits = self.storage.split_bytes > 0 or self._split_time > 0
+        self._paths = (self.folder / f'{self.folder.name}_{number}.mcap' for number in count())
+        self._opening = tuple(opening)
+        self.opened = (0,) * len(self.topics)
+        self._sequences = [0] * len(self.topics)
+        self._refused = [0] * len(self.topics)
+        self._ended: list[BagSummary] = []
+        self._gone: list[Path] = []  # files that made way, as far as they are still there
+        self._due = 0.0
+        self._looked = 0  # size of the file when it was last looked how much is free [bytes]
+        self._summary: BagSummary | None = None
+        self.out_of_room = False
+        self._failure: RecordingError | None = None
+        self._said: dict[str, str] = {}  # of failures, in the metadata
+        try:
+            self.folder.mkdir(parents=True)
+        except FileExistsError:
+            raise RecordingError(
+                self.folder, 'exists already', 'name a new folder; nothing is overwritten'
+            ) from None
+        except OSError as error:
+            self._give_up(error)
+        try:
+            with ExitStack() as undo:
+                undo.callback(_remove, self.folder)
+                self._file = self._next_file()
+                undo.callback(self._file.abandon)
+                self._refuse_if_scarce('cannot be recorded to', _MAKE_ROOM)
+                self._renew(self._summarize())
+                sync_folder(self.folder.absolute().parent)
+                undo.pop_all()
+        except OSError as error:
+            self._give_up(error)
+
+    def write(self, topic: int, log_time: int, publish_time: int, data: bytes) -> bool:
+        """
+        Take one message; it is on the disk at the latest after the next `flush`.
+
+        Parameters
+        ----------
+        topic
+            The topic's number.
+        log_time, publish_time
+            When it was received, and when its source made it [ns].
+        data
+            The CDR bytes with their 4-byte header.
+
+        Returns
+        -------
+        bool
+            Whether the message was taken. One whose times are negative or beyond 63 bits is
+            refused and counted: inside mcap it would break the chunk it comes into.
+
+        Raises
+        ------
+        RecordingError
+            The recording has ended here, and the bag is closed as well as the disk let it be.
+
+        """
+        if self._failure:
+            raise self._failure
+        if not (0 <= log_time < TIME_END and 0 <= publish_time < TIME_END):
+            self._refused[topic] += 1
+            return False
+        if self._splits and self._is_full(log_time):
+            self._split()
+        if self.storage.min_free_bytes and self._file.size != self._looked:
+            self._look()
+        if self._opening and self._file.first is None:
+            self._open_file(log_time)
+        self._add(topic, log_time, publish_time, data)
+        if self._file.error:
+            self._end(self._file.error)
+        return True
+
+    def _open_file(self, log_time: int) -> None:
+        opened = list(self.opened)
+        for topic, data in self._opening:
+            self._add(topic, log_time, log_time, data)
+            opened[topic] += 1
+        self.opened = tuple(opened)
+
+    def _add(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
+        sequence = self._sequences[topic]
+        self._file.add(topic, log_time, publish_time, data, sequence % _SEQUENCE_END)
+        self._sequences[topic] = sequence + 1
+
+    def flush(self) -> None:
+        """Bring to the disk what was written, and look how full it is; raises as `write` does."""
+        if self._failure:
+            raise self._failure
+        try:
+            if self._file.flush() and time.monotonic() >= self._due:
+                self._try_to_renew(self._summarize())
+            self._refuse_if_scarce('the recording was interrupted')
+        except (OSError, RecordingError) as error:
+            self._end(error)
+
+    def resume(self) -> bool:
+        """
+        Go on in a new file where there was no room and is some again; return whether it does.
+
+        What the bag says of the failure stays in its metadata.
+        """
+        if not self.out_of_room or not self._file.ended:
+            return False
+        try:
+            reserve = Reserve(self.folder)
+            try:
+                # Quotas and blocks that are reserved are known to who allocates only.
+                reserve.grow(_ROOM_TO_GO_ON)
+                self._refuse_if_scarce('cannot go on')
+            finally:
+                reserve.release()
+            file = self._next_file()
+        except (OSError, RecordingError):
+            return False
+        self._ended, self._file = self._parts(), file
+        self._failure, self.out_of_room = None, False
+        self._renew_and_let_go()
+        return True
+
+    def close(self, custom: Mapping[str, str] | None = None) -> BagSummary:
+        """
+        Finish the bag and return what it holds; after a failure, return what could be kept.
+
+        Parameters
+        ----------
+        custom
+            Goes to ``custom_data`` of the bag's metadata.
+
+        Raises
+        ------
+        RecordingError
+            As `write`, once; after it a call returns the summary.
+
+        """
+        if self._summary:
+            return self._summary
+        failed, error = self._failure, self._finish(custom or {})
+        self._summary = self._summarize()
+        if error and not failed:
+            self._failure = self._ended_by(error)
+            raise self._failure
+        return self._summary
+
+    @property
+    def kept(self) -> tuple[int, ...]:
+        """Return how many messages of each topic `write` took by now that are not lost since."""
+        summary = self._summarize()
+        there = zip(summary.counts, summary.let_go, self.opened, strict=True)
+        return tuple(counts + gone - opened for counts, gone, opened in there)
+
+    @property
+    def size(self) -> int:
+        """Return the size of the MCAP files by now [bytes]."""
+        return sum(part.size for part in self._ended) + self._file.size
+
+    def _is_full(self, log_time: int) -> bool:
+        file = self._file
+        if file.first is None:
+            return False
+        if 0 < self.storage.split_bytes <= file.size and file.has_chunks:
+            return True
+        # Where time jumps back, what comes after it is not put to what came before.
+        return 0 < self._split_time <= abs(log_time - file.first)
+
+    def _look(self) -> None:
+        """End the recording where too little is free."""
+        self._looked = self._file.size
+        try:
+            self._refuse_if_scarce('the recording was interrupted')
+        except (OSError, RecordingError) as error:
+            self._end(error)
+
+    def _split(self) -> None:
+        """End the file and begin the next; where they are too many, let the oldest go."""
+        try:
+            self._refuse_if_scarce('the recording was interrupted')
+            error = self._file.finish(last_records(self._unfinished, self._summarize(), None))
+            if error:
+                raise error
+            file = self._next_file()
+            self._ended, self._file = self._parts(), file
+            self._renew_and_let_go()
+        except (OSError, RecordingError) as worse:
+            self._end(worse)
+
+    def _renew_and_let_go(self) -> None:
+        """Name the files that are kept, then remove the others: no name is without its file."""
+        parts, most = self._parts(), self.storage.keep_files
+        excess = max(0, len(parts) - most) if most else 0
+        gone, kept = parts[:excess], parts[excess:]
+        let_go = [self.let_go, *(part.counts for part in gone)]
+        summary = together(kept, self._refused, tuple(map(sum, zip(*let_go, strict=True))))
+        if not self._try_to_renew(summary):
+            return
+        self._ended, self.let_go = kept[:-1], summary.let_go
+        self._gone += [self.folder / part.file for part in gone]
+        self._remove_gone()
+
+    def _remove_gone(self) -> None:
+        """Remove the files that made way; one that cannot be removed is tried again."""
+        self._gone = [file for file in self._gone if not _is_removed(file)]
+
+    def _finish(self, custom: Mapping[str, str], *, accounted: bool = True) -> OSError | None:
+        """
+        Close the bag as well as the disk allows; return what went wrong now.
+
+        Where it has failed before, only its metadata are written anew.
+        """
+        error = None
+        if not self._file.finished:
+            summary = self._summarize()
+            account = self.account(summary) if accounted else None
+            said = {**custom, **self._said}
+            error = self._file.finish(last_records(said, summary, account))
+        gone = self._lose_what_is_gone()
+        error = error or gone
+        if error and not self._failure:
+            self._said = {FAILURE: str(self._ended_by(error))}
+        summary = self._summarize()
+        self._remove_gone()
+        account = self.account(summary) if accounted else None
+        last = custom_data({**self._said, **custom}, summary, account)
+        try:
+            try:
+                write_metadata(summary, last)
+            except OSError:
+                # All of it once more: it is the bag's last word.
+                write_metadata(summary, last)
+        except OSError as worse:
+            error = error or worse
+        return error
+
+    def _lose_what_is_gone(self) -> LostError | None:
+        """Count no more what is in files that another process has cut or removed; name these."""
+        parts = self._parts()
+        gone = [part for part in parts if not _is_there(self.folder / part.file, part.size)]
+        if not gone:
+            return None
+        self._ended = [part for part in self._ended if part not in gone]
+        if parts[-1] in gone:
+            self._file.forget()
+        names = ', '.join(part.file for part in gone)
+        return LostError(f'{names}: cut or removed by another process')
+
+    def _try_to_renew(self, summary: BagSummary) -> bool:
+        """Write the metadata anew, or leave the old ones: no message depends on them."""
+        try:
+            self._renew(summary)
+        except OSError:
+            self._due = time.monotonic() + _RENEWAL
+            return False
+        return True
+
+    def _renew(self, summary: BagSummary) -> None:
+        """Write into the metadata what is on the disk by now."""
+        begin = time.monotonic()
+        write_metadata(summary, custom_data(self._unfinished, summary, None))
+        end = time.monotonic()
+        # Of a bag in many files it is long, and a slow disk must not be kept busy with it.
+        self._due = end + max(_RENEWAL, 20.0 * (end - begin))
+
+    def _next_file(self) -> BagFile:
+        return BagFile(next(self._paths), self.topics, self._attachments, self._compression)
+
+    @property
+    def _unfinished(self) -> dict[str, str]:
+        """Return what the metadata say until the recording has ended."""
+        return {**UNFINISHED_DATA, **self._said}
+
+    def _refuse_if_scarce(self, what: str, remedy: str = _GO_ON) -> None:
+        """Raise RecordingError where too little is free; what a file has set aside is not."""
+        scarce = scarcity(self.folder, self.storage.min_free_bytes)
+        if scarce:
+            raise RecordingError(self.folder, f'{what}: {scarce}', remedy)
+
+    def _end(self, error: OSError | RecordingError) -> NoReturn:
+        self._failure = error if isinstance(error, RecordingError) else self._ended_by(error)
+        self._said = {FAILURE: str(self._failure)}
+        # A RecordingError comes from `_refuse_if_scarce` alone.
+        self.out_of_room = isinstance(error, RecordingError) or error.errno in NO_ROOM
+        if self.out_of_room:
+            self._finish(UNFINISHED_DATA, accounted=False)
+        else:
+            self._finish({})
+        raise self._failure
+
+    def _ended_by(self, error: OSError) -> RecordingError:
+        kept = 'what was flushed before' if self._file.in_doubt else 'what is on the disk'
+        reason, remedy = 'the recording ended early', _CHECK_DISK
+        if error.errno in NO_ROOM:
+            reason, remedy = 'the recording was interrupted', _GO_ON
+        elif isinstance(error, LostError):
+            kept, remedy = 'what is left of it', _KEEP_OUT
+        return RecordingError(
+            self.folder,
+            f'{reason}: {error.strerror or error}',
+            f'{kept} stays readable; {remedy}',
+        )
+
+    def _give_up(self, error: OSError) -> NoReturn:
+        raise RecordingError(
+            self.folder,
+            f'cannot be recorded to: {error.strerror or error}',
+            'name a folder on a disk that can be written to',
+        ) from None
+
+    def _parts(self) -> list[BagSummary]:
+        if self._file.forgotten and self._ended:
+            return self._ended
+        return [*self._ended, self._file.summary(self.topics)]
+
+    def _summarize(self) -> BagSummary:
+        return together(self._parts(), self._refused, self.let_go)
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder that nobody but us has written to."""
+    for leftover in folder.iterdir():
+        leftover.unlink()
+    folder.rmdir()
+
+
+def _is_there(file: Path, size: int) -> bool:
+    """Return whether a file is there, and as large as it was; a disk that fails says nothing."""
+    try:
+        return 0 < size <= file.stat().st_size
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError:
+        return True
+
+
+def _is_removed(file: Path) -> bool:
+    try:
+        file.unlink(missing_ok=True)
+    except OSError:
+        return False
+    return True

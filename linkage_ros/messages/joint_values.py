@@ -1,0 +1,210 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The numbers in messages about joints, by joint and quantity: three message types, any joints.
+
+A message is parsed only if its layout differs from that of the last one; else it is unpacked at
+known places in one call. ``sensor_msgs/msg/JointState`` is read as it is. A message of
+``trajectory_msgs/msg/JointTrajectory`` is read where it has one point, as ``~/motion`` has: the
+state at an instant. One of ``sensor_msgs/msg/MultiDOFJointState`` is where it has wrenches alone,
+as ``~/pin_forces``; of these what acts in the plane: forces in x and y, moment about z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from functools import partial
+from typing import NamedTuple
+
+from linkage_ros.messages import joint_state as declaration
+from linkage_ros.messages.joint_state import Rejection
+from linkage_ros.messages.joint_trajectory import JOINT_TRAJECTORY
+from linkage_ros.messages.layout import (
+    MalformedError,
+    NANOSECONDS,
+    Numbers,
+    parsed,
+    Pattern,
+    pattern,
+)
+from linkage_ros.messages.multi_dof_joint_state import MULTI_DOF_JOINT_STATE
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
+WRENCHES = 'sensor_msgs/msg/MultiDOFJointState'
+
+POSITION, RATE, ACCELERATION, EFFORT = 'position', 'rate', 'acceleration', 'effort'
+FORCE_X, FORCE_Y, TORQUE = 'force x', 'force y', 'torque'
+QUANTITIES = (POSITION, RATE, ACCELERATION, EFFORT, FORCE_X, FORCE_Y, TORQUE)
+
+UNITS = {
+    POSITION: ('rad', 'm'),
+    RATE: ('rad/s', 'm/s'),
+    ACCELERATION: ('rad/s²', 'm/s²'),
+    EFFORT: ('N·m', 'N'),
+    FORCE_X: ('N', 'N'),
+    FORCE_Y: ('N', 'N'),
+    TORQUE: ('N·m', 'N·m'),
+}
+"""Of each quantity the unit where the joint turns, and where it slides."""
+
+MALFORMED = Rejection.MALFORMED.value
+UNEQUAL = Rejection.UNEQUAL.value
+TWICE = 'a joint named twice'
+POINTS = 'not one point'
+POSES = 'transforms or twists'
+NO_JOINTS = 'not about joints'
+
+Key = tuple[str, str]
+"""A joint's name, and the quantity."""
+
+
+class Values(NamedTuple):
+    """
+    The values in a message.
+
+    Attributes
+    ----------
+    stamp
+        In [ns].
+    keys
+        What the numbers are; the same object as long as the layout is the same.
+    names
+        The joints, in the order of the message; the same object as `keys` is.
+    numbers
+        In [rad], [m], [N·m] or [N], and per second.
+
+    """
+
+    stamp: int
+    keys: tuple[Key, ...]
+    names: tuple[str, ...]
+    numbers: tuple[float, ...]
+
+
+class MessageValues:
+    """
+    Reads the numbers of messages of one topic.
+
+    Parameters
+    ----------
+    message_type
+        One of `JOINT_STATE`, `TRAJECTORY` and `WRENCHES`; messages of other types have no values.
+    dependent
+        Names of joints that nobody can command. A JointState may name them without a number, as
+        `JointEffortReader` takes it.
+
+    """
+
+    __slots__ = ('_known', '_parse')
+
+    def __init__(self, message_type: str, dependent: Collection[str] = ()) -> None:
+        self._parse = _PARSERS.get(message_type, _others)
+        if message_type == JOINT_STATE:
+            self._parse = partial(_joint_state, dependent=dependent)
+        self._known: tuple[Pattern, tuple[Key, ...], tuple[str, ...]] | None = None
+
+    def read(self, data: bytes) -> Values | str:
+        """Return the values of a message, or why it is left out."""
+        if self._known is not None:
+            (size, unpack_from, pick_fixed, fixed, (pick,)), keys, joints = self._known
+            if len(data) >= size:
+                values = unpack_from(data)
+                if pick_fixed(values) == fixed:
+                    stamp = values[1] * NANOSECONDS + values[2]
+                    return Values(stamp, keys, joints, pick(values))
+        try:
+            found = self._parse(data)
+        except MalformedError:
+            return MALFORMED
+        if isinstance(found, str):
+            return found
+        names, columns, width = found
+        if len(set(names)) != len(names):
+            return TWICE
+        places = {
+            (name, quantity): array.first + 8 * (width * number + place)
+            for array, listed, quantities in columns
+            for number, name in enumerate(listed if array.length else ())
+            for place, quantity in quantities
+        }
+        arrays = [array for array, _, _ in columns]
+        known = pattern(data, arrays, [list(places.values())], width)
+        self._known = known, tuple(places), tuple(names)
+        return self.read(data)
+
+
+_Column = tuple[Numbers, Sequence[str], Sequence[tuple[int, str]]]
+"""An array, the joints of its elements, and which number of an element is which quantity."""
+
+_Parsed = tuple[Sequence[str], Sequence[_Column], int]
+"""All joints, the arrays, and how many numbers an element has."""
+
+
+def _joint_state(data: bytes, dependent: Collection[str] = ()) -> _Parsed | str:
+    fields = parsed(data, declaration.JOINT_STATE)
+    names = _texts(fields['name'])
+    able = [name for name in names if name not in dependent]
+    columns: list[_Column] = []
+    for name, quantity in (('position', POSITION), ('velocity', RATE), ('effort', EFFORT)):
+        array = fields[name]
+        listed = next((some for some in ([], names, able) if len(some) == array.length), None)
+        if listed is None:
+            return UNEQUAL
+        columns.append((array, listed, [(0, quantity)]))
+    return names, columns, 1
+
+
+def _trajectory(data: bytes) -> _Parsed | str:
+    fields = parsed(data, JOINT_TRAJECTORY)
+    names = _texts(fields['joint_names'])
+    if len(fields['points']) != 1:
+        return POINTS
+    (point,) = fields['points']
+    arrays = [point[name] for name in ('positions', 'velocities', 'accelerations', 'effort')]
+    if not {array.length for array in arrays} <= {0, len(names)}:
+        return UNEQUAL
+    quantities = (POSITION, RATE, ACCELERATION, EFFORT)
+    columns = zip(arrays, quantities, strict=True)
+    return names, [(array, names, [(0, quantity)]) for array, quantity in columns], 1
+
+
+def _wrenches(data: bytes) -> _Parsed | str:
+    fields = parsed(data, MULTI_DOF_JOINT_STATE)
+    names, wrenches = _texts(fields['joint_names']), fields['wrench']
+    if fields['transforms'].length or fields['twist'].length:
+        return POSES
+    if wrenches.length not in (0, len(names)):
+        return UNEQUAL
+    return names, [(wrenches, names, [(0, FORCE_X), (1, FORCE_Y), (5, TORQUE)])], 6
+
+
+def _others(_: bytes) -> str:
+    return NO_JOINTS
+
+
+_PARSERS: dict[str, Callable[[bytes], _Parsed | str]] = {
+    JOINT_STATE: _joint_state,
+    TRAJECTORY: _trajectory,
+    WRENCHES: _wrenches,
+}
+
+TYPES = tuple(_PARSERS)
+"""Types of messages that can be read."""
+
+
+def _texts(names: Sequence[bytes]) -> list[str]:
+    return [name.decode('utf-8', 'backslashreplace') for name in names]

@@ -1,0 +1,412 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+CDR version 1, compiled from declarations: a message is declared once, and read and written by it.
+
+Numbers stand at multiples of their size, counted from behind the four bytes of the encapsulation;
+a sequence or a text is a count, and then its content. `packed` and `parsed` go through a message
+field by field. Where many messages have the same layout, one of them is compiled: `pattern` takes
+the numbers out of the next ones in one call of `struct`, and `packing` writes them in one call.
+
+Source: OMG, DDS-XTypes 1.3, section 7.4.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
+from itertools import combinations, zip_longest
+from operator import itemgetter
+from struct import calcsize, pack, Struct, unpack
+from struct import error as StructError
+from typing import Any, NamedTuple
+
+from linkage_ros.written import Lines, written
+
+NANOSECONDS = 1_000_000_000
+"""A second, in [ns]."""
+
+ENCAPSULATION = b'\x00\x01\x00\x00'
+"""The first bytes of a message that is written here: little-endian, no options."""
+
+STAMP_END = 12
+"""Where a stamp ends that begins a message: two numbers of four bytes."""
+
+_TEXT = 's'
+_COUNT = 'I'
+_COUNTS = {b'\x00\x00': Struct('>I'), b'\x00\x01': Struct('<I')}
+"""What reads a count, by the encapsulation."""
+
+_KINDS = {
+    'bool': 'B',
+    'uint8': 'B',
+    'int32': 'i',
+    'float64': 'd',
+    'Time': 'iI',
+    'Duration': 'iI',
+    'Point': '3d',
+    'Vector3': '3d',
+    'Pose': '7d',
+    'Transform': '7d',
+    'Twist': '6d',
+    'Wrench': '6d',
+    'ColorRGBA': '4f',
+    'UVCoordinate': '2f',
+    'string': _TEXT,
+}
+"""What a type holds: numbers of one size, as `struct` has them, or a text."""
+
+
+class Field(NamedTuple):
+    """A field of a message: its name, what it holds, and whether it is a sequence of these."""
+
+    name: str
+    kind: str | tuple[Field, ...]
+    many: bool
+
+
+def declared(text: str, **nested: tuple[Field, ...]) -> tuple[Field, ...]:
+    """
+    Return the declaration of a message.
+
+    Parameters
+    ----------
+    text
+        Types and names of its fields, as in the ``.msg`` file, separated by commas.
+    nested
+        The declarations of types that are messages themselves.
+
+    """
+    fields = []
+    for field in text.split(','):
+        kind, name = field.split()
+        element = kind.removesuffix('[]')
+        fields.append(Field(name, nested.get(element) or _KINDS[element], kind != element))
+    return tuple(fields)
+
+
+class MalformedError(ValueError):
+    """The bytes are no message of the declared type."""
+
+
+class Numbers(NamedTuple):
+    """Where a sequence stands: its count, and its first number; a single number has no count."""
+
+    count_at: int
+    length: int
+    first: int
+
+
+def byte_order(data: bytes) -> str:
+    """Return the byte order of a message, as `struct` has it; MalformedError if it has none."""
+    if data[:2] not in _COUNTS:
+        raise MalformedError('unknown encapsulation')
+    return _COUNTS[data[:2]].format[0]
+
+
+def parsed(data: bytes, fields: Iterable[Field], most: int = 2**32) -> dict[str, Any]:
+    """
+    Return the fields of a message by name; bytes behind its end are ignored.
+
+    A text is bytes; of numbers it is `Numbers`, where they stand.
+
+    Parameters
+    ----------
+    data
+        The message.
+    fields
+        Its declaration.
+    most
+        How many elements a sequence of texts or of nested messages may have.
+
+    Raises
+    ------
+    MalformedError
+        It is not of this type, not whole, or has more elements.
+
+    """
+    byte_order(data)
+    try:
+        found, end = _parse(data, 4, fields, _COUNTS[data[:2]], most)
+    except StructError:
+        raise MalformedError('ends too early') from None
+    if end > len(data):
+        raise MalformedError('ends too early')
+    return found
+
+
+def _parse(
+    data: bytes, at: int, fields: Iterable[Field], number: Struct, most: int
+) -> tuple[dict[str, Any], int]:
+    """Return the fields that begin at a place, and where they end."""
+    found: dict[str, Any] = {}
+    for name, kind, many in fields:
+        count, count_at = 1, at
+        if many:
+            count_at = at + -at % 4
+            (count,) = number.unpack_from(data, count_at)
+            at = count_at + 4
+        if isinstance(kind, str) and kind != _TEXT:
+            size, total = _sizes(kind)
+            first = at + (4 - at) % size if count else at
+            at = first + total * count
+            found[name] = Numbers(count_at if many else first, count, first)
+            continue
+        if count > most:
+            raise MalformedError(f'more than {most:,} elements')
+        elements: list[Any] = []
+        # An element takes bytes, so that no count makes this loop longer than the message.
+        for _ in range(count):
+            if isinstance(kind, str):
+                at += -at % 4
+                (length,) = number.unpack_from(data, at)
+                start, at = at + 4, at + 4 + length
+                end = at - 1
+                elements.append(data[start:end])
+            else:
+                element, at = _parse(data, at, kind, number, most)
+                elements.append(element)
+        found[name] = elements if many else elements[0]
+    return found, at
+
+
+@cache
+def _sizes(kind: str) -> tuple[int, int]:
+    """Return the size of each of some numbers, and of all."""
+    return calcsize(f'<{kind[-1]}'), calcsize(f'<{kind}')
+
+
+def packed(fields: Iterable[Field], values: Mapping[str, Any]) -> bytes:
+    """
+    Return a message, little-endian.
+
+    Parameters
+    ----------
+    fields
+        Its declaration.
+    values
+        By name: a text, a number or a tuple of numbers, the values of a nested message; sequences
+        of these. A field without a value is zero, or empty.
+
+    """
+    data = bytearray(ENCAPSULATION)
+    _pack(data, fields, values)
+    return bytes(data)
+
+
+def _pack(data: bytearray, fields: Iterable[Field], values: Mapping[str, Any]) -> None:
+    def add(kind: str, *numbers: float) -> None:
+        size, _ = _sizes(kind)
+        data.extend(bytes((4 - len(data)) % size))
+        data.extend(pack(f'<{kind}', *numbers))
+
+    for name, kind, many in fields:
+        value = values.get(name)
+        if many:
+            add(_COUNT, len(value or ()))
+        for element in (value or ()) if many else (value,):
+            if not isinstance(kind, str):
+                _pack(data, kind, element or {})
+            elif kind == _TEXT:
+                text = (element or '').encode() + b'\0'
+                add(_COUNT, len(text))
+                data.extend(text)
+            elif element is None:
+                add(kind, *unpack(f'<{kind}', bytes(_sizes(kind)[1])))
+            else:
+                add(kind, *(element if isinstance(element, tuple) else (element,)))
+
+
+class Pattern(NamedTuple):
+    """
+    The layout of a message; the messages of one publisher have the same.
+
+    A message has it if it has `size` bytes or more, and `pick_fixed` takes `fixed` out of the
+    values that `unpack_from` returns: byte order, counts and texts. Values 1 and 2 are the stamp,
+    in [s] and [ns]; `picks` take each group of numbers out of them.
+    """
+
+    size: int
+    unpack_from: Callable[[bytes], tuple[Any, ...]]
+    pick_fixed: Callable[[tuple[Any, ...]], tuple[Any, ...]]
+    fixed: tuple[Any, ...]
+    picks: tuple[Callable[[tuple[Any, ...]], tuple[Any, ...]], ...]
+
+
+def pattern(
+    data: bytes, arrays: Iterable[Numbers], groups: Sequence[Sequence[int]], width: int = 1
+) -> Pattern:
+    """
+    Compile the layout of a message whose first field is a header.
+
+    Parameters
+    ----------
+    data
+        The message.
+    arrays
+        Its sequences of numbers of eight bytes, one behind the other; all that stands before and
+        between them decides the layout. Padding does not.
+    groups
+        In each group where the wanted numbers stand.
+    width
+        So many numbers has an element of an array.
+
+    """
+    parts = [(0, 2, '2s'), (4, STAMP_END, 'iI')]
+    end = STAMP_END
+    for count_at, length, first in arrays:
+        after = count_at + 4
+        parts.append((end, after, f'{after - end}s'))
+        end = first + 8 * width * length
+    parts += [(first, first + 8, 'd') for group in groups for first in group]
+    fields, at, number = byte_order(data), 0, 0
+    fixed, places = [], {}
+    for first, after, kind in sorted(parts):
+        fields += f'{first - at}x{kind}'
+        at = after
+        if kind == 'd':
+            places[first] = number
+        elif kind != 'iI':
+            fixed.append(number)
+        number += len(kind) if kind == 'iI' else 1
+    fields += f'{end - at}x'
+    struct, pick_fixed = Struct(fields), _pick(fixed)
+    return Pattern(
+        size=struct.size,
+        unpack_from=struct.unpack_from,
+        pick_fixed=pick_fixed,
+        fixed=pick_fixed(struct.unpack_from(data)),
+        picks=tuple(_pick([places[first] for first in group]) for group in groups),
+    )
+
+
+def _pick(places: Sequence[int]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]:
+    """Return what takes some values out of a tuple, as a tuple, in one call of C."""
+    if len(places) > 1:
+        return itemgetter(*places)
+    return itemgetter(slice(places[0], places[0] + 1) if places else slice(0))
+
+
+def packing(
+    message: bytes, arrays: Iterable[tuple[int, str]]
+) -> tuple[Callable[..., bytes], list[bytes]]:
+    """
+    Compile what writes messages that differ from one in their stamps and in arrays of numbers.
+
+    Parameters
+    ----------
+    message
+        The message; it begins with a stamp.
+    arrays
+        Where each array begins, and its format.
+
+    Returns
+    -------
+    pack : callable
+        Takes bytes, the stamp in [s] and [ns], bytes, the first array, bytes, and so on.
+    constants : list of bytes
+        These bytes.
+
+    """
+    fields, constants, at = '<', [], 0
+    for first, kind in ((4, 'iI'), *arrays):
+        constants.append(message[at:first])
+        fields += f'{first - at}s{kind}'
+        at = first + calcsize(f'<{kind}')
+    if at < len(message):
+        constants.append(message[at:])
+        fields += f'{len(message) - at}s'
+    return Struct(fields).pack, constants
+
+
+class ArrayWriter:
+    """
+    Writes messages of a stamp and of arrays of numbers, for the same joints again and again.
+
+    Parameters
+    ----------
+    fields
+        Their declaration.
+    names
+        The joints in the order of the message, by the name of their field.
+    arrays
+        Field of each array by its name as a parameter of `write`.
+    within
+        The sequence of one element in which the arrays stand; '' where they stand in none.
+
+    Attributes
+    ----------
+    write
+        Returns a message, given its stamp in [ns], and for each array a number for each joint.
+        All arrays but the first may be empty; empty is also their default.
+
+    """
+
+    __slots__ = ('_arrays', '_fields', '_names', '_within', 'write')
+
+    write: Callable[..., bytes]
+
+    def __init__(
+        self,
+        fields: tuple[Field, ...],
+        names: Mapping[str, Sequence[str]],
+        arrays: Mapping[str, str],
+        within: str = '',
+    ) -> None:
+        self._fields, self._names, self._arrays, self._within = fields, names, arrays, within
+        first, *others = arrays
+        lines = [
+            f'def write(stamp, {first}, {", ".join(f"{name}=()" for name in others)}):',
+            f'    seconds, nanoseconds = divmod(stamp, {NANOSECONDS})',
+        ]
+        bound: dict[str, Any] = {}
+        for size in range(len(others), -1, -1):
+            for number, filled in enumerate(combinations(others, size)):
+                numbers = {name: f'*{name}' for name in (first, *filled)}
+                call = self.call(numbers, f'pack{size}{number}_')
+                condition = f'if {" and ".join(filled)}: ' if filled else ''
+                lines.append(f'    {condition}return {call.lines[0]}')
+                bound |= call.bound
+        self.write = written('\n'.join(lines), 'write', bound)
+
+    def call(self, numbers: Mapping[str, str], name: str = 'pack') -> Lines:
+        """
+        Return an expression for a message, of ``seconds``, ``nanoseconds`` and numbers.
+
+        Parameters
+        ----------
+        numbers
+            By the names of the arrays that are not empty, their numbers as expressions, separated
+            by commas.
+        name
+            The names in it that are bound begin with this.
+
+        """
+        (joints,) = self._names.values()
+        values = dict.fromkeys((self._arrays[array] for array in numbers), (0.0,) * len(joints))
+        within = {self._within: [values]} if self._within else values
+        message = packed(self._fields, {**self._names, **within})
+        found = parsed(message, self._fields)
+        places = found[self._within][0] if self._within else found
+        pack, constants = packing(
+            message, [(places[field].first, f'{len(joints)}d') for field in values]
+        )
+        bound = {f'{name}{i}': constant for i, constant in enumerate(constants)}
+        encapsulation, head, *behind = bound
+        parts = [encapsulation, 'seconds', 'nanoseconds', head]
+        for expression, constant in zip_longest(numbers.values(), behind):
+            parts += [expression, *([constant] if constant else [])]
+        return Lines([f'{name}({", ".join(parts)})'], {name: pack, **bound})

@@ -1,0 +1,173 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+MarkerArray messages as bytes (CDR): packed once; each next message changes only what moves.
+
+``visualization_msgs/msg/MarkerArray`` is what RViz and Foxglove draw. Of its fields those stay
+empty that hold textures, meshes and colours of single points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import cos, sin
+from struct import Struct
+from typing import Any, NamedTuple
+
+from linkage_ros.messages.layout import declared, NANOSECONDS, Numbers, packed, parsed
+
+ARROW, LINE_STRIP, LINE_LIST, SPHERE_LIST = 0, 4, 5, 7
+TEXT_VIEW_FACING, TRIANGLE_LIST = 9, 11
+"""Types of markers, as Marker.msg numbers them."""
+
+ADD, DELETE = 0, 2
+"""Actions on a marker."""
+
+Colour = tuple[float, float, float, float]
+"""Red, green, blue and opacity, from 0 to 1."""
+
+Place = tuple[float, float, float]
+"""x, y and z, in [m]."""
+
+
+class Marker(NamedTuple):
+    """
+    A marker as it is packed.
+
+    Attributes
+    ----------
+    ns, number
+        Together they identify the marker.
+    kind
+        Its type.
+    scale
+        Widths and lengths of its kind, in [m].
+    colour
+        Its colour.
+    points
+        In its own frame.
+    at, z
+        Where its frame's origin is, in [m].
+    text
+        The text, of a text marker.
+    action
+        `ADD` or `DELETE`.
+    lifetime
+        After which it goes if it does not come again, in [ns]; 0 for never.
+
+    """
+
+    ns: str
+    number: int
+    kind: int
+    scale: Place
+    colour: Colour
+    points: Sequence[Place] = ()
+    at: complex = 0j
+    z: float = 0.0
+    text: str = ''
+    action: int = ADD
+    lifetime: int = 0
+
+
+_COUNT = Struct('<I')
+_STAMP = Struct('<iI')
+_COLOUR = Struct('<4f')
+_XY = _TURN = Struct('<2d')
+
+MARKER_ARRAY = declared(
+    'Marker[] markers',
+    Marker=declared(
+        'Time stamp, string frame_id, string ns, int32 id, int32 type, int32 action, Pose pose, '
+        'Vector3 scale, ColorRGBA color, Duration lifetime, bool frame_locked, Point[] points, '
+        'ColorRGBA[] colors, string texture_resource, CompressedImage texture, '
+        'UVCoordinate[] uv_coordinates, string text, string mesh_resource, MeshFile mesh_file, '
+        'bool mesh_use_embedded_materials',
+        CompressedImage=declared('Time stamp, string frame_id, string format, uint8[] data'),
+        MeshFile=declared('string filename, uint8[] data'),
+    ),
+)
+
+
+def _values(frame: str, marker: Marker) -> dict[str, Any]:
+    """Return the fields of a marker that are neither zero nor empty."""
+    return {
+        'frame_id': frame,
+        'ns': marker.ns,
+        'id': marker.number,
+        'type': marker.kind,
+        'action': marker.action,
+        'pose': (marker.at.real, marker.at.imag, marker.z, 0.0, 0.0, 0.0, 1.0),
+        'scale': marker.scale,
+        'color': marker.colour,
+        'lifetime': divmod(marker.lifetime, NANOSECONDS),
+        'points': marker.points,
+        'text': marker.text,
+    }
+
+
+class MarkerArrayWriter:
+    """
+    Writes the same markers again and again.
+
+    What is changed stays so until it is changed again.
+
+    Parameters
+    ----------
+    frame
+        In which all of them stand.
+    markers
+        The markers, in their order.
+
+    """
+
+    __slots__ = ('_buffer', '_where')
+
+    def __init__(self, frame: str, markers: Sequence[Marker]) -> None:
+        message = packed(MARKER_ARRAY, {'markers': [_values(frame, one) for one in markers]})
+        self._buffer = bytearray(message)
+        self._where = [
+            {name: field.first for name, field in marker.items() if isinstance(field, Numbers)}
+            for marker in parsed(message, MARKER_ARRAY)['markers']
+        ]
+
+    def message(self, stamp: int) -> bytes:
+        """Return the message of a state at a time in [ns]."""
+        time = divmod(stamp, NANOSECONDS)
+        for where in self._where:
+            _STAMP.pack_into(self._buffer, where['stamp'], *time)
+        return bytes(self._buffer)
+
+    def show(self, number: int, shown: bool) -> None:
+        """Add a marker, or delete it."""
+        _COUNT.pack_into(self._buffer, self._where[number]['action'], ADD if shown else DELETE)
+
+    def place(self, number: int, place: complex, angle: float) -> None:
+        """Move a marker's frame to a place in [m], turned by an angle in [rad]."""
+        at = self._where[number]['pose']
+        _XY.pack_into(self._buffer, at, place.real, place.imag)
+        _TURN.pack_into(self._buffer, at + 40, sin(0.5 * angle), cos(0.5 * angle))
+
+    def paint(self, number: int, colour: Colour) -> None:
+        """Give a marker another colour."""
+        _COLOUR.pack_into(self._buffer, self._where[number]['color'], *colour)
+
+    def draw(self, number: int, places: Iterable[complex]) -> None:
+        """Move the points of a marker, which stay as many, to places in its frame, in [m]."""
+        at = self._where[number]['points']
+        for place in places:
+            _XY.pack_into(self._buffer, at, place.real, place.imag)
+            at += 24
