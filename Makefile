@@ -102,14 +102,18 @@ demo: $(DEMO)
 	@$(BIN)/linkage demo $(if $(filter command,$(origin SECONDS)),--seconds $(SECONDS))
 
 # The tests run even when lint finds something, so that one run tells all. Each test that starts
-# nodes has a graph to itself; those that measure nodes have the processors, too.
+# nodes has a graph to itself; those that measure nodes have the processors, too. Only files that
+# have such tests are collected for them.
+PYTEST := $(BIN)/python -m pytest --durations 25
+BY_FILE := --dist loadfile --no-loadscope-reorder
+marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)' test)
 test: $(STAMP)
 	@status=0; \
 	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory lint || status=$$?; \
-	$(BIN)/python -m pytest -m 'not ros' --numprocesses auto --dist loadfile || status=$$?; \
-	$(BIN)/python -m pytest -m 'ros and not alone' --numprocesses 2 --dist loadfile || status=$$?; \
-	$(BIN)/python -m pytest -m alone || status=$$?; \
+	$(PYTEST) -m 'not ros' --numprocesses auto $(BY_FILE) || status=$$?; \
+	$(PYTEST) -m 'ros and not alone' --numprocesses 2 $(BY_FILE) test/ros $(call marked,ros) || status=$$?; \
+	$(PYTEST) -m alone $(call marked,alone) || status=$$?; \
 	exit $$status
 
 bench: $(STAMP)
