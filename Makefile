@@ -1,7 +1,13 @@
 PYTHON ?= python3
 BIN := .venv/bin
+DEMO := .venv/.demo_installed
 STAMP := .venv/.installed
-INSTALL := pip --quiet --disable-pip-version-check install
+LOG := .venv/install.log
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+# A lock file lists every package, so nothing is resolved. Python compiles a module at its first
+# import.
+PIP_INSTALL := $(PIP) install --no-deps --no-compile
+UV_INSTALL := $(BIN)/python -m uv pip install --quiet --python $(BIN)/python --no-deps
 LOCK := uv pip compile --quiet --upgrade --universal --python-version 3.10 --generate-hashes \
   --no-header --no-annotate setup.py
 
@@ -20,6 +26,7 @@ unexport ROS_SECURITY_ENCLAVE_OVERRIDE
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 # These send pip's or Python's eyes out of the environment made here.
 unexport VIRTUAL_ENV PIP_USER PIP_TARGET PIP_PREFIX PIP_ROOT PIP_PYTHON PIP_NO_DEPS MYPYPATH
+unexport UV_SYSTEM_PYTHON UV_TARGET UV_PREFIX UV_CONSTRAINT UV_OVERRIDE UV_EXCLUDE_NEWER
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -55,33 +62,58 @@ help:
 	@echo 'make clean     remove what make and colcon have built; recorded runs stay'
 	@echo 'PYTHON=...     the Python to build .venv with, 3.10 or newer (now: $(PYTHON))'
 
-$(STAMP): setup.py requirements/dev.txt
+# uv installs several times faster than pip; pip brings it, and does the rest itself where uv
+# cannot reach an index that only pip's settings name. $(1): the lock file.
+install_by = { { sed -n '/^uv==/,/[^\\]$$/p' $(1) | $(PIP_INSTALL) --require-hashes --requirement /dev/stdin \
+    && $(UV_INSTALL) --require-hashes --requirement $(1); } \
+  || $(PIP_INSTALL) --require-hashes --requirement $(1); } >$(LOG) 2>&1 || { \
+    echo "$(1): not installed: $$(grep -i error $(LOG) | tail -n 1); more in $(LOG);" \
+      'offline? Behind a proxy set HTTPS_PROXY, for a mirror PIP_INDEX_URL' >&2; \
+    exit 1; }
+say_size = echo ".venv: $$(ls -d .venv/lib/python*/site-packages/*.dist-info | wc -l) packages, $$(du -sm .venv | cut -f1) MB"
+
+$(DEMO): setup.py requirements/demo.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null || { \
 	  echo '$(PYTHON): not Python 3.10 or newer; install one and name it: make PYTHON=python3.12' >&2; \
 	  exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
 	  echo '$(PYTHON): cannot make virtual environments; on Debian and Ubuntu: apt install python3-venv' >&2; \
 	  exit 1; }
-	@$(BIN)/python -c 'import pip' 2>/dev/null || $(PYTHON) -m venv --clear .venv
-	$(BIN)/python -m $(INSTALL) --require-hashes --requirement requirements/dev.txt
-	$(BIN)/python -m $(INSTALL) --no-deps --no-build-isolation --editable .
+	@$(BIN)/python -c 'import pip' 2>/dev/null || { \
+	  echo '.venv: creating a virtual environment with $(PYTHON)'; \
+	  $(PYTHON) -m venv --clear .venv; }
+	@echo '.venv: installing ROS 2 Jazzy, numpy and matplotlib (some 400 MB)'
+	@$(call install_by,requirements/demo.txt)
+	@echo '.venv: installing this checkout'
+	@$(PIP_INSTALL) --no-build-isolation --editable .
+	@$(say_size)
+	@touch $@
+
+$(STAMP): $(DEMO) requirements/dev.txt
+	@echo '.venv: installing what tests, measurements and documentation need (some 2 GB more)'
+	@$(call install_by,requirements/dev.txt)
+	@$(say_size)
 	@touch $@
 
 # One simple command: make starts it without a shell between, so that Ctrl-C reaches it and make
 # waits until it has ended by itself. SECONDS counts only from the command line: a shell may
 # export its own.
-demo: $(STAMP)
+demo: $(DEMO)
 	@$(BIN)/linkage demo $(if $(filter command,$(origin SECONDS)),--seconds $(SECONDS))
 
 # The tests run even when lint finds something, so that one run tells all. Each test that starts
-# nodes has a graph to itself; those that measure nodes have the processors, too.
+# nodes has a graph to itself; those that measure nodes have the processors, too. Only files that
+# have such tests are collected for them.
+PYTEST := $(BIN)/python -m pytest --durations 25
+BY_FILE := --dist loadfile --no-loadscope-reorder
+marked = $$(grep -rl --include='test_*.py' 'mark\.$(1)' test)
 test: $(STAMP)
 	@status=0; \
 	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory lint || status=$$?; \
-	$(BIN)/python -m pytest -m 'not ros' --numprocesses auto --dist loadfile || status=$$?; \
-	$(BIN)/python -m pytest -m 'ros and not alone' --numprocesses 2 --dist loadfile || status=$$?; \
-	$(BIN)/python -m pytest -m alone || status=$$?; \
+	$(PYTEST) -m 'not ros' --numprocesses auto $(BY_FILE) || status=$$?; \
+	$(PYTEST) -m 'ros and not alone' --numprocesses 2 $(BY_FILE) test/ros $(call marked,ros) || status=$$?; \
+	$(PYTEST) -m alone $(call marked,alone) || status=$$?; \
 	exit $$status
 
 bench: $(STAMP)
@@ -154,15 +186,16 @@ docs: $(STAMP)
 
 lock: $(STAMP)
 	$(BIN)/$(LOCK) --extra dev --output-file requirements/dev.txt
+	$(BIN)/$(LOCK) --constraint requirements/dev.txt --extra demo --output-file requirements/demo.txt
 	$(BIN)/$(LOCK) --constraint requirements/dev.txt --output-file requirements/run.txt
 
 # What the wheel needs in an environment of its own, since .venv has much more.
 sbom: $(STAMP)
 	rm -rf build/sbom dist
-	$(BIN)/python -m pip --quiet wheel --no-deps --no-build-isolation --wheel-dir dist .
+	$(PIP) wheel --no-deps --no-build-isolation --wheel-dir dist .
 	$(BIN)/python -m venv --without-pip build/sbom
-	$(BIN)/python -m $(INSTALL:pip=pip --python build/sbom) --require-hashes --requirement requirements/run.txt
-	$(BIN)/python -m $(INSTALL:pip=pip --python build/sbom) --no-deps --no-index --find-links dist linkage_ros
+	$(PIP) --python build/sbom install --require-hashes --requirement requirements/run.txt
+	$(PIP) --python build/sbom install --no-deps --no-index --find-links dist linkage_ros
 	$(BIN)/cyclonedx-py environment --output-reproducible --output-format JSON \
 	  --output-file "$$(ls dist/*.whl).cdx.json" build/sbom/bin/python
 

@@ -52,6 +52,8 @@ def shared(folder):
 
 # ROS is an extra: on a robot rclpy comes from apt and pip must leave it alone.
 ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1,<7.2', 'ros-jazzy-common-interfaces>=5.3,<5.4']
+# From 70.1 it builds wheels by itself; 80 took the develop command that --symlink-install needs.
+SETUPTOOLS = 'setuptools>=70.1,<80'
 # What is measured and told: pictures, tables, pages, and the reference of fifty digits.
 REPORT = [
     'matplotlib>=3.6,<4',
@@ -60,6 +62,8 @@ REPORT = [
     'python-flint>=0.6,<1',
     'rich>=13,<16',
 ]
+# What `make demo` runs, a node, tables and a picture, and what installs it.
+DEMO = [*ROS, 'matplotlib>=3.6,<4', 'rich>=13,<16', SETUPTOOLS, 'uv']
 # Where a linkage is fitted or searched for; exact synthesis needs numpy only.
 DESIGN = ['scipy>=1.11,<2']
 # Bags as Parquet; as CSV they need nothing. From 26 on pyarrow refuses numpy 1.x, which Ubuntu
@@ -95,8 +99,8 @@ TEST = [
 ]
 # What the speed of the kinematics is measured against. Pinocchio (pin) walks robot models too.
 BENCH = ['pylinkage[numba]>=1.3,<1.4; python_version >= "3.11"', 'casadi', 'pin']
-# What makes the lock file, and the bill of materials of a release.
-RELEASE = ['uv', 'cyclonedx-bom>=7']
+# What makes the bill of materials of a release.
+RELEASE = ['cyclonedx-bom>=7']
 STYLE = [
     'mypy',
     'ruff',
@@ -121,9 +125,6 @@ COLCON = [
     'colcon-package-selection',
     'colcon-ros',
     'colcon-test-result',
-    # From 70.1 it builds wheels by itself; 80 took the develop command that --symlink-install
-    # needs.
-    'setuptools>=70.1,<80',
 ]
 
 setup(
@@ -153,6 +154,7 @@ setup(
     install_requires=['numpy>=1.26,<3', 'mcap>=1.2,<2', 'PyYAML>=6,<7'],
     extras_require={
         'ros': ROS,
+        'demo': DEMO,
         'report': REPORT,
         'design': DESIGN,
         'dask': DASK,
@@ -160,7 +162,7 @@ setup(
         'export': EXPORT,
         'test': TEST,
         'dev': [
-            *(*ROS, *REPORT, *DESIGN, *DASK, *DOCS, *EXPORT, *TEST, *BENCH, *STYLE, *COLCON),
+            *(*DEMO, *REPORT, *DESIGN, *DASK, *DOCS, *EXPORT, *TEST, *BENCH, *STYLE, *COLCON),
             *RELEASE,
         ],
     },

@@ -13,9 +13,17 @@
 # limitations under the License.
 
 
-"""What holds for all tests: a property is not judged by how long an example takes."""
+"""What holds for all tests: how examples are judged, and which files come first."""
 
 from hypothesis import HealthCheck, settings
+import pytest
 
+# A property is not judged by how long an example takes.
 settings.register_profile('unhurried', deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('unhurried')
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files with slow tests first: xdist hands out files in this order, one a worker."""
+    slow = {item.path for item in items if item.get_closest_marker('slow')}
+    items.sort(key=lambda item: item.path not in slow)

@@ -22,6 +22,7 @@ The accelerations' reference differentiates the closing equation twice, in 70 di
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from math import inf, nan, pi, remainder
 from typing import Any
 import warnings
@@ -93,6 +94,7 @@ def solved(closure: Closure, phi: Any, rate: Any = 1.0, acceleration: Any = 0.0)
     return [*closure.solve(phi, rates=rate, accelerations=acceleration)]
 
 
+@cache  # asked for by both half angles
 def accelerations(case: FourBarCase) -> list[Quantity]:
     """Return α3 and α4 at a crank rate of 1; κ from differences."""
     *inputs, phi, side_of_b = case
@@ -132,20 +134,25 @@ def _accelerations(x: list[mpf], side_of_b: int) -> tuple[mpf, mpf]:
     return two(-1j * (crank + coupler * omega3**2 - rocker * omega4**2))
 
 
+@cache  # asked for by both half angles
+def truths(family: str) -> list[tuple[FourBarCase, Any]]:
+    return [(case, four_bar(*case)) for case in four_bars(family, COUNT)]
+
+
 @pytest.fixture(params=['tangent', 'sine and cosine'])
 def half_angle(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     by_tangent = request.param == 'tangent' and array_form._BY_TANGENT
     monkeypatch.setattr(array_form, '_BY_TANGENT', by_tangent)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('half_angle')
 @pytest.mark.parametrize('family', FOUR_BARS)
 def test_all_is_right_in_every_family(family: str) -> None:
     worst = Worst()
     closed = 0
-    for case in four_bars(family, COUNT):
+    for case, truth in truths(family):
         *lengths, phi, sign = case
-        truth = four_bar(*case)
         closure = four_bars_of(*lengths, sign, phi)
         (code,), position, velocity, acceleration = solved(closure, [phi])
         gap = float(max(truth.gap, 0))

@@ -70,7 +70,7 @@ def wanted(root, extra):
             yield requirement
 
 
-@pytest.mark.parametrize('name', ['dev.txt', 'run.txt'])
+@pytest.mark.parametrize('name', ['dev.txt', 'demo.txt', 'run.txt'])
 def test_every_entry_of_a_lock_file_is_one_version_with_hashes(root, name):
     found = pins(root / 'requirements' / name)
     assert found
@@ -82,7 +82,10 @@ def test_every_entry_of_a_lock_file_is_one_version_with_hashes(root, name):
 
 
 @pytest.mark.parametrize('python', PYTHONS)
-@pytest.mark.parametrize(('name', 'extra'), [('dev.txt', 'dev'), ('dev.txt', ''), ('run.txt', '')])
+@pytest.mark.parametrize(
+    ('name', 'extra'),
+    [('dev.txt', 'dev'), ('dev.txt', ''), ('demo.txt', 'demo'), ('demo.txt', ''), ('run.txt', '')],
+)
 def test_a_lock_file_installs_all_that_setup_py_asks_for_once(root, name, extra, python):
     installed = installed_by(root / 'requirements' / name, python)
     versions = dict(installed)
@@ -110,12 +113,28 @@ def test_every_npm_package_of_the_tests_is_known_by_its_hash(root, folder):
     assert all(of['integrity'].startswith('sha512-') for of in packages.values())
 
 
-def test_make_installs_by_the_lock_file_and_nothing_beside_it(root):
+@pytest.mark.parametrize('python', PYTHONS)
+@pytest.mark.parametrize('name', ['demo.txt', 'run.txt'])
+def test_make_test_adds_to_what_make_demo_installed_and_replaces_nothing(root, name, python):
+    part, whole = (root / 'requirements' / each for each in (name, 'dev.txt'))
+    assert set(installed_by(part, python)) <= set(installed_by(whole, python))
+    hashes = {(pin.name, str(pin.specifier)): known for pin, known in pins(whole)}
+    assert all(hashes[pin.name, str(pin.specifier)] == known for pin, known in pins(part))
+
+
+def test_make_installs_by_the_lock_files_and_nothing_beside_them(root):
     made = (root / 'Makefile').read_text('utf-8')
-    lines = [line.split('$(INSTALL)')[1] for line in made.splitlines() if '-m $(INSTALL)' in line]
-    assert lines == [
-        ' --require-hashes --requirement requirements/dev.txt',
-        ' --no-deps --no-build-isolation --editable .',
+    by_hash = '--require-hashes --requirement'
+    assert re.findall(r'\$\((?:PIP|UV)_INSTALL\) ([^;|}\n]*?)\s*[;|}\n]', made) == [
+        f'{by_hash} /dev/stdin \\',
+        f'{by_hash} $(1)',
+        f'{by_hash} $(1)',
+        '--no-build-isolation --editable .',
+    ]
+    assert re.findall(r'_INSTALL := .* (--no-deps)\b', made) == ['--no-deps', '--no-deps']
+    assert re.findall(r'call install_by,(\S+)\)', made) == [
+        'requirements/demo.txt',
+        'requirements/dev.txt',
     ]
 
 
