@@ -27,13 +27,13 @@ from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.drives.bag import BagParameters, build
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
-from linkage_ros.errors import BagError, DefinitionError, FileError
+from linkage_ros.errors import BagError, DefinitionError
 from linkage_ros.joint_state import CrankSample, JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest
 
-from .contexts import one_input, pipeline, readings, two_inputs
+from .contexts import one_input, readings, two_inputs
 
 MS = 1_000_000
 RECORDED = 1_600_000_000_000_000_000
@@ -358,20 +358,3 @@ def test_in_a_scene_the_bag_lies_relative_to_it(tmp_path):
     assert readings(built, *times) == [(0.5, 2.0), (pytest.approx(0.6), 2.0), (3.0, -1.0)]
     assert built.tick(BEGIN + 351 * MS).message == b''
     assert (built.newest_stamp, built.max_age) == (BEGIN + 150 * MS, 200 * MS)
-
-
-@pytest.mark.parametrize(
-    ('drive', 'said'),
-    [
-        ('bag: {}', "drive.bag: the key 'file' is missing"),
-        ('bag: {file: 3}', 'drive.bag.file: 3 is not a text'),
-        ('bag: {file: b, topc: x}', "drive.bag.topc: unknown key; did you mean 'topic'?"),
-        ('bag: {file: b, pace: slow}', "drive.bag.pace: 'slow' is none; write recorded or fast"),
-        ('bag: {file: b, max_age: 0}', 'drive.bag.max_age: 0 is out of bounds'),
-    ],
-)
-def test_what_a_scene_cannot_say(drive, said):
-    with pytest.raises(FileError) as caught:
-        pipeline(drive)
-    assert said in str(caught.value)
-    assert '\n' not in str(caught.value)

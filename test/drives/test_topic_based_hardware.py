@@ -34,7 +34,7 @@ from linkage_ros.scene.load import parse_scene
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
-from ..test_joint_effort import serialized  # noqa: TID252
+from ..support.messages import joint_state as serialized
 
 PAGE = (Path(__file__).parents[2] / 'docs' / 'how_to' / 'stand_in.md').read_text('utf-8')
 SYSTEM = re.search(r'```xml\n(.*?)```', PAGE, re.DOTALL)[1]
@@ -89,7 +89,7 @@ class Hardware:
         if off <= self._threshold:
             return None
         efforts = [self.effort for commands in self._joints.values() for _ in commands]
-        return serialized(list(self._joints), efforts)
+        return serialized(list(self._joints), efforts=efforts)
 
 
 def pipeline():

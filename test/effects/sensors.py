@@ -24,7 +24,6 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.read import parts_of, read_parameters
 from linkage_ros.scene.yaml_file import parse_yaml
 from mpmath import gammainc
 
@@ -51,12 +50,6 @@ def context(loop=ANGLES, seed='seed'):
 
 def reading(now, *joints, rates=(), accelerations=(), efforts=()):
     return Reading(now, joints, rates, accelerations, efforts)
-
-
-def written(effect, text):
-    """Return an effect's parameters as a scene writes them."""
-    content = parse_yaml(text.encode(), 'scene.yaml')
-    return read_parameters(content, effect.PARAMETERS, parts_of(ANGLES.linkage))
 
 
 def published(effects, ticks=100, seed=0, rate=10.0):

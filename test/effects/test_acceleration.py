@@ -23,10 +23,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import acceleration, velocity
-from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS, Reading
+from linkage_ros.effects.stage import Motion, Reading
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.parameters import declared
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
@@ -131,16 +130,6 @@ def test_the_message_is_the_motion_at_one_point():
     assert tuple(point.accelerations) == accelerations
     assert len(point.effort) == 0
     assert (point.time_from_start.sec, point.time_from_start.nanosec) == (0, 0)
-
-
-def test_it_has_no_parameters():
-    assert declared(acceleration.PARAMETERS) == []
-
-
-def test_it_is_registered_behind_velocity_which_it_needs():
-    assert EFFECTS['acceleration'] == acceleration.__name__
-    assert list(EFFECTS).index('acceleration') > list(EFFECTS).index('velocity')
-    assert NEEDS['acceleration'] == ('velocity',)
 
 
 CRANK = CrankState((1.0,), (2.0,), (0.0,), 0)

@@ -22,12 +22,9 @@ from math import hypot, sqrt
 
 from linkage_ros.effects import clearance
 from linkage_ros.effects.clearance import ClearanceParameters
-from linkage_ros.effects.stage import EFFECTS, NEEDS
-from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.errors import DefinitionError
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.read import parts_of, read_parameters
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
@@ -217,21 +214,6 @@ def test_a_slider_is_refused(name):
         clearance.stage(ClearanceParameters({name: 1e-5}), context(SLIDER_CRANK))
 
 
-def test_it_is_read_from_a_scene():
-    def read(text):
-        section = parse_yaml(text.encode(), 'scene.yaml')
-        return read_parameters(section, ClearanceParameters, parts_of(SLIDER_CRANK))
-
-    assert read('pins: {A: 2.0e-5, B: 0}') == ClearanceParameters({'A': 2e-5, 'B': 0.0})
-    for text, message in (
-        ('{}', "the key 'pins' is missing"),
-        ('pins: {A: -1}', 'pins.A: -1 is out of bounds; .*at least 0'),
-        ('pins: {G: 1}', "pins.G: there is no pin 'G'; there are: "),
-    ):
-        with pytest.raises(FileError, match=message):
-            read(text)
-
-
 def test_a_scene_publishes_the_leaning_joints_and_the_rates_without_play():
     def tick(effects):
         files = {
@@ -249,10 +231,3 @@ def test_a_scene_publishes_the_leaning_joints_and_the_rates_without_play():
     assert list(worn.position - tight.position) == pytest.approx(expected, abs=1e-15)
     assert max(map(abs, expected)) > 1e-5
     assert list(worn.velocity) == list(tight.velocity)
-
-
-def test_it_is_registered_behind_the_forces_that_it_needs():
-    assert EFFECTS['clearance'] == clearance.__name__
-    assert NEEDS['clearance'] == ('velocity', 'acceleration', 'pin_forces')
-    order = list(EFFECTS)
-    assert order.index('clearance') > order.index('compliance') > order.index('pin_forces')

@@ -21,13 +21,10 @@ from dataclasses import replace
 
 from linkage_ros.effects import compliance
 from linkage_ros.effects.compliance import ComplianceParameters
-from linkage_ros.effects.stage import EFFECTS, NEEDS
-from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.read import parts_of, read_parameters
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
@@ -178,22 +175,6 @@ def test_what_is_no_bar_between_two_pins_is_refused(of, link, reason):
         compliance.stage(ComplianceParameters({link: 1e4}), context(of))
 
 
-def test_it_is_read_from_a_scene():
-    def read(text):
-        section = parse_yaml(text.encode(), 'scene.yaml')
-        return read_parameters(section, ComplianceParameters, parts_of(FOUR_BAR))
-
-    assert read('links: {coupler: 2.0e6}') == ComplianceParameters({'coupler': 2e6})
-    for text, message in (
-        ('{}', "the key 'links' is missing"),
-        ('links: {coupler: 0}', 'links.coupler: 0 is out of bounds; .*more than 0'),
-        ('links: {ground: 1}', "links.ground: there is no link 'ground'; there are: crank, "),
-        ('links: {copler: 1}', r"links.copler: there is no link 'copler'; did you mean 'coupler'"),
-    ):
-        with pytest.raises(FileError, match=message):
-            read(text)
-
-
 def test_a_scene_publishes_the_shifted_joints_and_not_what_they_come_from():
     def tick(effects):
         files = {
@@ -215,10 +196,3 @@ def test_a_scene_publishes_the_shifted_joints_and_not_what_they_come_from():
     expected = (0.0, *shift(context(FOUR_BAR), (2.5, -6.0, 0.0), {'coupler': 1e4}))
     assert list(one.position - other.position) == pytest.approx(expected, abs=1e-15)
     assert max(map(abs, expected)) > 1e-6
-
-
-def test_it_is_registered_behind_the_forces_that_it_needs():
-    assert EFFECTS['compliance'] == compliance.__name__
-    assert NEEDS['compliance'] == ('velocity', 'acceleration', 'pin_forces')
-    order = list(EFFECTS)
-    assert all(order.index(need) < order.index('compliance') for need in NEEDS['compliance'])

@@ -22,11 +22,10 @@ from math import ceil, inf, log
 
 from linkage_ros.effects import dropout
 from linkage_ros.effects.dropout import DropoutParameters
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.errors import DefinitionError
 import pytest
 
-from .sensors import BEGIN, chi_square, context, likely, MS, published, reading, UNLIKELY, written
+from .sensors import BEGIN, chi_square, context, likely, MS, published, reading, UNLIKELY
 
 N = 100_000
 
@@ -196,23 +195,3 @@ def test_the_burst_that_is_advised_is_taken(hundredths):
     advised = float(raised.value.remedy.split()[1])
     assert advised == pytest.approx(hundredths / (100 - hundredths), rel=1e-5)
     line(hundredths / 100, advised)
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('{}', 'probability'),
-        ('probability: 1.1', 'at most 1'),
-        ('probability: -0.1', 'at least 0'),
-        ('{probability: 0.1, burst: -1}', 'at least 0'),
-        ('{probability: 0.1, hold: last}', 'silent or repeat'),
-    ],
-)
-def test_what_it_is_given_is_checked(text, message):
-    with pytest.raises(FileError, match=message):
-        written(dropout, text)
-
-
-def test_what_a_scene_writes():
-    assert written(dropout, 'probability: 0.1') == DropoutParameters(0.1, 0.0, 'silent')
-    assert EFFECTS['dropout'] == dropout.__name__

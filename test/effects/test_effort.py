@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.dynamics.loads import Friction, JointFriction
 from linkage_ros.effects import effort
-from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS
+from linkage_ros.effects.stage import Motion
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline
@@ -210,11 +210,3 @@ def test_without_masses_it_is_refused_in_one_line():
     with pytest.raises(FileError, match=r"masses.*'crank' has no mass") as caught:
         scene(b'effects: {effort: {}}', b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
     assert '\n' not in str(caught.value)
-
-
-def test_it_is_registered_behind_what_it_needs():
-    assert EFFECTS['effort'] == effort.__name__
-    assert NEEDS['effort'] == ('velocity', 'acceleration')
-    assert all(
-        list(EFFECTS).index(need) < list(EFFECTS).index('effort') for need in NEEDS['effort']
-    )

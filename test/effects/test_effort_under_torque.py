@@ -28,7 +28,7 @@ from linkage_ros.scene.load import parse_scene
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
-from ..test_joint_effort import serialized  # noqa: TID252
+from ..support.messages import joint_state as serialized
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 MS = 1_000_000
@@ -89,7 +89,7 @@ def timeline(linkage, torque, commands, until, friction=''):
     for time in range(until):
         now = BEGIN + time * MS
         if time in commands:
-            assert pipeline.offer(serialized([joint], [commands[time]]), now) is None
+            assert pipeline.offer(serialized([joint], efforts=[commands[time]]), now) is None
         state = STORE.deserialize_cdr(pipeline.tick(now).message, 'sensor_msgs/msg/JointState')
         found[time] = state.position[0], state.velocity[0], state.effort[0]
     return found

@@ -57,21 +57,6 @@ def test_a_scene_names_pins_and_sliders():
     )
 
 
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('{}', "the key 'joints' is missing"),
-        ('joints: {cylindr: {}}', r"there is no pin 'cylindr'; did you mean 'cylinder'\?"),
-        ('joints: {A: {viscous: -1}}', 'joints.A.viscous: -1 is out of bounds; .*at least 0'),
-        ('joints: {A: 0.1}', 'joints.A: 0.1 is not a mapping'),
-        ('joints: {A: {coulmb: 1}}', r"joints.A.coulmb: unknown key; did you mean 'coulomb'\?"),
-    ],
-)
-def test_what_is_wrong_is_said_in_one_line(text, message):
-    with pytest.raises(FileError, match=message):
-        read(text)
-
-
 @pytest.mark.parametrize('rate', [5.0, -5.0])
 def test_a_cylinder_that_rubs_takes_that_much_more_power(rate):
     # The piston's rate is the slope of its place over time: the rod's pin on its line.

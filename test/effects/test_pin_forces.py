@@ -22,7 +22,7 @@ from cmath import rect
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.effects import pin_forces
-from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS, Reading
+from linkage_ros.effects.stage import Motion, Reading
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
@@ -143,10 +143,3 @@ def test_without_it_no_forces_are_computed(effects):
     at_work.tick(10**9)
     assert all('reactions' not in vars(line.context) for line in at_work.lines)
     assert '~/pin_forces' not in [each.topic for each in at_work.extras]
-
-
-def test_it_is_registered_behind_what_it_needs():
-    assert EFFECTS['pin_forces'] == pin_forces.__name__
-    assert NEEDS['pin_forces'] == ('velocity', 'acceleration')
-    order = list(EFFECTS)
-    assert all(order.index(need) < order.index('pin_forces') for need in NEEDS['pin_forces'])

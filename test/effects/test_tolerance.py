@@ -24,7 +24,6 @@ from pathlib import Path
 from random import Random
 
 from linkage_ros.effects import tolerance
-from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.effects.tolerance import alter, ToleranceParameters
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics.closure import Closure
@@ -223,29 +222,6 @@ def test_what_does_not_close_any_more_is_refused(parameters, reason):
         made(parameters)
 
 
-def test_it_is_read_from_a_scene():
-    assert read('{}') == ToleranceParameters()
-    assert read(
-        '{standard_deviation: 2.0e-5, links: [ground, coupler], given: {coupler.B: [0.0001, 0]}}'
-    ) == ToleranceParameters(2e-5, ('ground', 'coupler'), {'coupler.B': (1e-4, 0.0)})
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('standard_deviation: -1', r'1: standard_deviation: -1 is out of bounds; .*at least 0'),
-        ('links: [couplr]', r"1: links: there is no body 'couplr'; did you mean 'coupler'\?"),
-        ('given: {coupler.C: [0, 0]}', r"1: given.coupler.C: there is no point 'coupler.C'; did"),
-        ('given: {coupler.B: 0.1}', r'1: given.coupler.B: 0.1 is not a point; write two finite'),
-        ('given: {coupler.B: [0, 2e9]}', r'1: given.coupler.B: \[0, 2000000000.0\] is out of'),
-        ('sigma: 1', r'1: sigma: unknown key; known: given, links, standard_deviation'),
-    ],
-)
-def test_what_is_wrong_is_said_in_one_line(text, message):
-    with pytest.raises(FileError, match=message):
-        read(text)
-
-
 def published(scene):
     files = {
         'scene.yaml': b'linkage: l.yaml\ndrive: {constant_rate: {rate: 3}}\n' + scene.encode(),
@@ -267,9 +243,3 @@ def test_a_scene_that_does_not_close_says_file_and_line():
         FileError, match=r'^here: scene.yaml:3: effects.tolerance: with its deviations the linkage'
     ):
         published('effects: {tolerance: {given: {coupler.B: [0.2, 0]}}}')
-
-
-def test_it_is_registered_before_all_that_move():
-    assert next(iter(EFFECTS)) == 'tolerance'
-    assert EFFECTS['tolerance'] == tolerance.__name__
-    assert tolerance.PARAMETERS is ToleranceParameters

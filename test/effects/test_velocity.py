@@ -23,10 +23,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import velocity
-from linkage_ros.effects.stage import EFFECTS, Motion
+from linkage_ros.effects.stage import Motion
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.parameters import declared
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
@@ -93,11 +92,3 @@ def test_the_rest_of_the_motion_is_passed_on():
     motion = moved(FOUR_BAR, 1.0, 2.0)
     assert motion[:2] == (CrankState((1.0,), (2.0,), (0.0,), 0), position)
     assert motion.velocity == FOUR_BAR.velocity(position, 2.0)
-
-
-def test_it_has_no_parameters():
-    assert declared(velocity.PARAMETERS) == []
-
-
-def test_it_is_registered():
-    assert EFFECTS['velocity'] == velocity.__name__

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from math import isnan
 
-from linkage_ros.errors import FileError
 from linkage_ros.faults.fault import Fault
 from linkage_ros.faults.freeze import FreezeParameters
 from linkage_ros.faults.injection import Change, Injection
@@ -190,28 +189,3 @@ def test_several_faults_at_once():
     late = 'late: {time_jump: {by: 1}, at: [0.01], seconds: 0.03}'
     messages = run(f'{TURNING}faults: {{{quiet}, {late}}}', TIMES)
     assert stamps(messages) == [0, 1010, 1020, NOTHING, 40, 50]
-
-
-@pytest.mark.parametrize(
-    ('faults', 'expected'),
-    [
-        ('{mine: {silense: {}}}', "faults.mine.silense: unknown key; did you mean 'silence'?"),
-        ('{mine: {}}', 'faults.mine: 0 kinds; name one of'),
-        ('{my own: {silence: {}}}', "faults.my own: 'my own' is no ROS name; use letters"),
-        ('{1st: {silence: {}}}', "faults.1st: '1st' is no ROS name; use letters"),
-        ('{mine: {silence: {}, freeze: {}}}', 'faults.mine: 2 kinds; name one of'),
-        ('{mine: {stuck: {joint: rokker_joint}}}', "did you mean 'rocker_joint'?"),
-        ('{mine: {stuck: {}}}', "faults.mine.stuck: the key 'joint' is missing"),
-        ('{mine: {broken_link: {link: ground}}}', "there is no link 'ground'"),
-        ('{mine: {silence: {}, at: [-1], seconds: 1}}', 'begins before the first tick'),
-        ('{mine: {silence: {}, at: [1]}}', "the key 'seconds' is missing"),
-        ('{mine: {silence: {}, at: [1], seconds: 0}}', 'out of bounds'),
-        ('{mine: {time_jump: {by: 1e9}}}', 'out of bounds'),
-        ('{mine: {not_a_number: {}}}', 'not_a_number spoils messages, and constant_rate has none'),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_injected_is_refused_in_a_line(faults, expected):
-    with pytest.raises(FileError) as caught:
-        Pipeline(scene(f'{TURNING}faults: {faults}'))
-    assert expected in str(caught.value)
-    assert '\n' not in str(caught.value)

@@ -30,7 +30,7 @@ from linkage_ros.report.run import Run, Window
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
-from ..ros.ticked import Moment, run  # noqa: TID252
+from ..ros.ticked import Moment, run
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000

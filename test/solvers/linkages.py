@@ -27,8 +27,8 @@ from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 from mpmath import mp, mpf
 
-from ..kinematics.linkages import four_bar_linkage  # noqa: TID252
-from ..kinematics.reference import four_bar, turned  # noqa: TID252
+from ..kinematics.linkages import four_bar_linkage
+from ..kinematics.reference import four_bar, turned
 
 GALLERY = sorted((Path(__file__).parents[2] / 'config' / 'linkages').glob('*.yaml'))
 Lengths = tuple[float, float, float, float]

@@ -41,7 +41,7 @@ from .linkages import (
     true_joints,
     worst_error,
 )
-from ..kinematics.linkages import four_bar_linkage  # noqa: TID252
+from ..kinematics.linkages import four_bar_linkage
 
 STARTS = {'from knots': None, 'warm': True, 'cold': False}
 

@@ -30,7 +30,7 @@ import numpy as np
 import pytest
 
 from .linkages import crank_rocker, crank_rockers, Lengths, shipped, true_joints
-from ..kinematics.reference import turned  # noqa: TID252
+from ..kinematics.reference import turned
 
 reals = st.floats(-3.0, 3.0)
 radii = st.floats(0.0, 0.5)

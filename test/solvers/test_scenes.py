@@ -37,7 +37,7 @@ from linkage_ros.solvers.table import TableClosure
 import pytest
 
 from .linkages import apart
-from ..bag.test_replay import Run, sample  # noqa: TID252
+from ..bag.test_replay import Run, sample
 
 FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'

@@ -36,7 +36,7 @@ from .linkages import (
     shipped,
     worst_error,
 )
-from ..kinematics.linkages import four_bar_linkage  # noqa: TID252
+from ..kinematics.linkages import four_bar_linkage
 
 # Between the knots, so that no doubling of these meets them.
 PLACES = [tau * (k + 0.137) / 97.0 for k in range(97)]
