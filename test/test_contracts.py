@@ -61,8 +61,11 @@ READ = [
     (
         'friction',
         'slider_crank',
-        '{joints: {cylinder: {viscous: 0.1}}}',
-        FrictionParameters({'cylinder': OneJoint(0.1, 0.0)}),
+        # B is a pin too: of the rod and the block that the slot in the cylinder stands for.
+        '{joints: {A: {viscous: 0.002}, B: {coulomb: 0.1}, cylinder: {viscous: 3, coulomb: 4}}}',
+        FrictionParameters(
+            {'A': OneJoint(0.002), 'B': OneJoint(0.0, 0.1), 'cylinder': OneJoint(3.0, 4.0)}
+        ),
     ),
     (
         'compliance',

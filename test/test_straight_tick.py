@@ -20,8 +20,9 @@ from pathlib import Path
 
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.pipeline import Look, Pipeline
-from linkage_ros.scene.load import parse_scene
 import pytest
+
+from .support.scenes import pipeline_of, scene_of
 
 ROOT = Path(__file__).parents[1]
 GALLERY = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
@@ -42,8 +43,7 @@ DRIVES = {
 
 
 def pipeline(linkage, scene):
-    files = {'scene.yaml': f'linkage: l\n{scene}\n'.encode(), 'linkage.yaml': linkage}
-    return Pipeline(parse_scene('s', 's', files))
+    return pipeline_of(scene, linkage)
 
 
 def ticks(work):
@@ -89,11 +89,7 @@ def test_the_usual_tick_is_straight(effects):
 
 
 def test_a_reset_compiles_nothing(monkeypatch):
-    files = {
-        'scene.yaml': b'linkage: l\ndrive: {constant_rate: {rate: 1.0}}',
-        'linkage.yaml': b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}',
-    }
-    scene = parse_scene('s', 's', files)
+    scene = scene_of('drive: {constant_rate: {rate: 1.0}}')
     first = Pipeline(scene)
     message = first.tick(BEGIN).message
     monkeypatch.setattr('linkage_ros.kinematics.compiled.linkage.traced', None)

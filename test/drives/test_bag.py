@@ -142,7 +142,7 @@ TIMELINES = {
 
 @pytest.mark.parametrize('begin', [BEGIN, 0, 1])
 @pytest.mark.parametrize('name', TIMELINES)
-def test_timeline(tmp_path, name, begin):
+def test_samples_of_the_bag_turn_the_crank_as_the_timeline_says(tmp_path, name, begin):
     parameters, messages, steps = TIMELINES[name]
     drive = build(BagParameters(write(tmp_path / 'bag', messages), **parameters), one_input())
     if steps[0][0]:
@@ -242,7 +242,9 @@ def test_what_the_topic_would_refuse_is_skipped_and_counted(tmp_path):
         ('fast', True, False, True),
     ],
 )
-def test_without_rates(tmp_path, pace, carry_forward, needs_rate, good):
+def test_samples_without_rates_are_taken_where_no_rate_is_needed(
+    tmp_path, pace, carry_forward, needs_rate, good
+):
     file = write(tmp_path / 'bag', crank(sample(0, 0.5, None), sample(1, 0.6, None)))
     parameters = BagParameters(file, pace=pace, carry_forward=carry_forward)
     if good:
@@ -282,7 +284,7 @@ RUN = json.dumps({'scene': 's', 'crank_topic': '/b/crank'}).encode()
         'the account of the run is none',
     ],
 )
-def test_the_topic_is(tmp_path, messages, run, topic, angle):
+def test_the_topic_that_is_taken(tmp_path, messages, run, topic, angle):
     file = write(tmp_path / 'bag', messages, run=run)
     drive = build(BagParameters(file, topic=topic), one_input())
     assert drive.state(BEGIN).angles == (angle,)

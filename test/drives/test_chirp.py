@@ -154,7 +154,7 @@ def test_it_sweeps_from_the_first_frequency_to_the_last(name):
         assert swing == pytest.approx(parameters.amplitude, rel=1e-12)
 
 
-def test_through_build():
+def test_the_first_tick_is_time_zero_and_at_the_end_it_rests():
     drive = build(ChirpParameters(0.5, 2.0, 2.0, seconds=1.0, mean=0.1), one_input())
     assert (drive.stamp, drive.max_age) == (0, 0)
     begin = 1_700_000_000_000_000_000
@@ -164,7 +164,7 @@ def test_through_build():
     assert drive.state(begin + SECOND) == CrankState((0.1,), (0.0,), (0.0,), 0)
 
 
-def test_in_a_scene():
+def test_a_scene_publishes_the_chirp():
     built = pipeline(
         'chirp: {amplitude: 0.5, start_frequency: 0.25, end_frequency: 0.75, seconds: 2}'
     )

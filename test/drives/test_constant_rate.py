@@ -52,7 +52,7 @@ def exact(start, rate, time):
         (0.1, 0.1, 3 * SECOND, 0.4),  # as doubles 0.1 + 0.1·3 is 0.4 + 5.6e-17
     ],
 )
-def test_by_hand(start, rate, time, angle):
+def test_angles_are_those_worked_out_by_hand(start, rate, time, angle):
     assert curve(ConstantRate(rate, start))(time) == (angle, rate, 0.0)
 
 

@@ -123,7 +123,7 @@ TIMELINES = {
 
 
 @pytest.mark.parametrize('name', TIMELINES)
-def test_timeline(name):
+def test_a_profile_passes_as_the_timeline_says(name):
     parameters, steps = TIMELINES[name]
     profile = curve(parameters)
     for time, expected in steps:
@@ -255,7 +255,7 @@ def test_a_table_that_is_none_is_refused(table, reason):
     assert '\n' not in str(caught.value)
 
 
-def test_in_a_scene():
+def test_a_scene_publishes_the_profile():
     built = pipeline('profile: {table: [[0, 0.5], [1, 1], [2, 0.5]], interpolation: linear}')
     times = (SECOND, SECOND + 500 * MS, 2 * SECOND + 500 * MS, 4 * SECOND)
     assert readings(built, *times) == [(0.5, 0.5), (0.75, 0.5), (0.75, -0.5), (0.5, 0.0)]

@@ -100,6 +100,6 @@ def test_of_several_inputs_each_has_its_own():
     assert age == 0
 
 
-def test_in_a_scene():
+def test_a_scene_publishes_the_sine():
     built = pipeline('sine: {amplitude: 0.5, frequency: 0.25, mean: 1}')
     assert readings(built, SECOND, 2 * SECOND) == [(1.0, 0.25 * pi), (1.5, pytest.approx(0.0))]

@@ -37,14 +37,13 @@ from linkage_ros.joint_state import Rejection
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Mass
 from linkage_ros.kinematics.status import Status
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
 import pytest
 
 from .contexts import two_inputs
 from ..dynamics.loaded import FOLDER, four_bar, shipped
 from ..kinematics.defects import defect
 from ..support.messages import joint_state as serialized
+from ..support.scenes import pipeline_of
 
 MS = 1_000_000
 SECOND = 1000 * MS
@@ -175,7 +174,7 @@ TIMELINES = {
 
 
 @pytest.mark.parametrize('name', TIMELINES)
-def test_timeline(name):
+def test_commands_move_the_wheel_as_the_timeline_says(name):
     parameters, steps = TIMELINES[name]
     turned = wheel(**parameters)
     for time, effort, expected in steps:
@@ -424,11 +423,8 @@ def test_where_nothing_has_inertia_nothing_starts():
 
 
 def scene(drive_text, effects=''):
-    text = (
-        f'linkage: l.yaml\ndrive: {{torque: {drive_text}}}\neffects: {{velocity: {{}}{effects}}}'
-    )
-    linkage = (FOLDER / 'four_bar.yaml').read_bytes()
-    return Pipeline(parse_scene('test', 'here', {'scene.yaml': text.encode(), 'l.yaml': linkage}))
+    text = f'drive: {{torque: {drive_text}}}\neffects: {{velocity: {{}}{effects}}}'
+    return pipeline_of(text, (FOLDER / 'four_bar.yaml').read_bytes())
 
 
 def test_a_scene_is_driven_by_commands():

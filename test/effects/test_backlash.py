@@ -18,7 +18,6 @@
 from __future__ import annotations
 
 from math import pi, remainder, sin, tau
-from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,25 +25,14 @@ from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import backlash
 from linkage_ros.effects.backlash import BacklashParameters
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
+from ..support.messages import read_joint_state
+from ..support.scenes import closure_of, pipeline_of, shipped
 
-
-def closure(text):
-    return Closure(read_linkage(parse_yaml(text.encode(), 'linkage.yaml')))
-
-
-FOUR_BAR = closure('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
-TWO_CRANKS = closure(
-    (Path(__file__).parents[2] / 'config' / 'linkages' / 'five_bar.yaml').read_text()
-)
-CYLINDER = closure("""
+FOUR_BAR = closure_of('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
+TWO_CRANKS = Closure(shipped('five_bar'))
+CYLINDER = closure_of("""
 links:
   ground: {K: [0, 0], I: [1, 0]}
   tube: {K: [0, 0]}
@@ -176,16 +164,14 @@ def test_the_age_of_the_sample_is_passed_on():
 
 
 def test_a_scene_publishes_the_crank_behind_its_motor():
-    files = {
-        'scene.yaml': b'linkage: l.yaml\ndrive: {sine: {mean: 1, amplitude: 0.5, frequency: 1}}\n'
-        b'effects: {backlash: {play: 0.2}, velocity: {}}',
-        'linkage.yaml': b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}',
-    }
-    pipeline = Pipeline(parse_scene('scene', 'here', files))
+    pipeline = pipeline_of(
+        'drive: {sine: {mean: 1, amplitude: 0.5, frequency: 1}}\n'
+        'effects: {backlash: {play: 0.2}, velocity: {}}'
+    )
     cranks, rates = [], []
     for i in range(100):
         message = pipeline.tick(10**9 + i * 10**7).message
-        state = STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+        state = read_joint_state(message)
         assert state.name[0] == 'crank_joint'
         cranks.append(state.position[0])
         rates.append(list(state.velocity))

@@ -50,7 +50,7 @@ def test_the_rest_of_the_reading_is_passed_on():
     assert sensor(BEGIN, reading(BEGIN, 1.0, 2.0)) == reading(BEGIN, 1.0, 2.25)
 
 
-def test_in_a_scene():
+def test_a_scene_publishes_biased_joints_and_true_rates():
     ideal = published('')
     for i, off in zip(ideal, published('bias: {joints: {coupler_joint: 0.5}}'), strict=True):
         assert off.joints == (i.joints[0] + 0.5, i.joints[1])

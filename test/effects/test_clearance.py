@@ -23,16 +23,14 @@ from math import hypot, sqrt
 from linkage_ros.effects import clearance
 from linkage_ros.effects.clearance import ClearanceParameters
 from linkage_ros.errors import DefinitionError
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
 from .four_bar_by_hand import FourBar
-from .loaded import context, GRAVITY, linkage, linkage_of, LINKAGES, moved, SINGULAR
+from .loaded import context, GRAVITY, moved, SINGULAR
+from ..support.messages import read_joint_state
+from ..support.scenes import linkage_of, LINKAGES, pipeline_of, shipped
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-FOUR_BAR, SLIDER_CRANK = linkage('four_bar'), linkage('slider_crank')
+FOUR_BAR, SLIDER_CRANK = shipped('four_bar'), shipped('slider_crank')
 PINS = ('O2', 'A', 'B', 'O4')
 MOTIONS = [(1.0, 0.0, 0.0), (0.4, 0.0, 20.0), (2.5, -6.0, 30.0), (-1.2, 12.0, -80.0)]
 
@@ -216,13 +214,9 @@ def test_a_slider_is_refused(name):
 
 def test_a_scene_publishes_the_leaning_joints_and_the_rates_without_play():
     def tick(effects):
-        files = {
-            'scene.yaml': b'linkage: l\ndrive: {constant_rate: {rate: -6, start: 2.5}}\n'
-            + effects,
-            'linkage.yaml': (LINKAGES / 'four_bar.yaml').read_bytes(),
-        }
-        message = Pipeline(parse_scene('scene', 'here', files)).tick(10**9).message
-        return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+        scene = b'drive: {constant_rate: {rate: -6, start: 2.5}}\n' + effects
+        built = pipeline_of(scene, (LINKAGES / 'four_bar.yaml').read_bytes())
+        return read_joint_state(built.tick(10**9).message)
 
     loads = b'\nloads: {gravity: [0, -9.81]}'
     worn = tick(b'effects: {velocity: {}, clearance: {pins: {A: 1.0e-5, B: 2.0e-5}}}' + loads)

@@ -53,7 +53,7 @@ TIMELINES = [
 
 
 @pytest.mark.parametrize(('seconds', 'between', 'stamp', 'expected'), TIMELINES)
-def test_timeline(seconds, between, stamp, expected):
+def test_readings_come_as_late_as_the_timeline_says(seconds, between, stamp, expected):
     sensor = delayed(seconds, between=between, stamp=stamp)
     found = []
     for ms in range(5):

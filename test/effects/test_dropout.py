@@ -107,7 +107,7 @@ def test_without_bursts_losses_are_independent():
 
 
 @pytest.mark.parametrize(('probability', 'expected'), [(0.0, {False}), (1.0, {True})])
-def test_none_and_all(probability, expected):
+def test_probabilities_of_zero_and_one_lose_none_and_all(probability, expected):
     assert set(losses(probability, n=1000)) == expected
 
 
@@ -164,7 +164,7 @@ def test_the_seed_decides():
     assert losses(0.3, 2.0, 200) != losses(0.3, 2.0, 200, seed='other')
 
 
-def test_in_a_scene():
+def test_a_scene_loses_some_readings_and_alters_none():
     ideal, text = published('', 150), 'dropout: {probability: 0.3, burst: 4}'
     lossy = published(text, 150)
     assert all(found in {None, read} for found, read in zip(lossy, ideal, strict=True))

@@ -162,7 +162,7 @@ def test_the_rest_of_the_reading_is_passed_on():
     assert found == reading(BEGIN + 5, 1.0, found.joints[1], **rest)
 
 
-def test_in_a_scene():
+def test_a_scene_has_the_noise_that_it_names_and_no_other():
     text = 'noise: {joints: {rocker_joint: {white: 0.01, walk: 0.1}}}'
     ideal, first = published('', 2000 // 10), published(text, 2000 // 10)
     errors = [a.joints[1] - b.joints[1] for a, b in zip(first, ideal, strict=True)]

@@ -27,14 +27,14 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
 from .four_bar_by_hand import FourBar
-from .loaded import context, GRAVITY, linkage, linkage_of, LINKAGES, moved, SINGULAR
+from .loaded import context, GRAVITY, moved, SINGULAR
+from ..support.messages import read_joint_state, STORE
+from ..support.scenes import linkage_of, LINKAGES, shipped
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
 TYPE = 'sensor_msgs/msg/MultiDOFJointState'
-FOUR_BAR = linkage('four_bar')
+FOUR_BAR = shipped('four_bar')
 PENDULUM = linkage_of("""
 links:
   ground: {O: [0, 0], X: [1, 0]}
@@ -112,7 +112,7 @@ def test_they_are_published_beside_the_joint_states():
     for i in range(10):
         now = begin + i * 10_000_000
         tick = at_work.tick(now)
-        state = STORE.deserialize_cdr(tick.message, 'sensor_msgs/msg/JointState')
+        state = read_joint_state(tick.message)
         (extra,) = tick.extras
         message = STORE.deserialize_cdr(extra, TYPE)
         assert message.header == state.header

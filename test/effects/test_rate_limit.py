@@ -54,7 +54,7 @@ def sampled_at(rate, times):
         pytest.param(0.001, [0, 1, 999_999, 1_000_000], [0, 0, 0, 1_000_000], id='slow'),
     ],
 )
-def test_timeline(rate, ticks, samples):
+def test_samples_are_taken_as_the_timeline_says(rate, ticks, samples):
     assert sampled_at(rate, [ms * MS for ms in ticks]) == [ms * MS for ms in samples]
 
 
@@ -102,7 +102,7 @@ def test_silent_between_samples():
     assert found[4].stamp == BEGIN + 4 * MS
 
 
-def test_in_a_scene():
+def test_a_scene_holds_readings_or_is_silent_between_samples():
     ideal = published('')
     for n, held in enumerate(published('rate_limit: {rate: 100}')):
         assert held == ideal[n // 10 * 10]._replace(stamp=BEGIN + n * MS)

@@ -24,21 +24,15 @@ from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import velocity
 from linkage_ros.effects.stage import Motion
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
+from ..support.scenes import closure_of
 
-def closure(text):
-    return Closure(read_linkage(parse_yaml(text.encode(), 'linkage.yaml')))
-
-
-FOUR_BAR = closure('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
-SLIDER = closure('inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}')
-STRETCHED_AT_0 = closure('four_bar: {a: 1, b: 1, c: 1, d: 3}')
-EVERY_OTHER = closure('four_bar: {a: 1, b: 1, c: 1, d: 2}')
+FOUR_BAR = closure_of('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
+SLIDER = closure_of('inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}')
+STRETCHED_AT_0 = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 3}')
+EVERY_OTHER = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 2}')
 
 
 def moved(loop, angle, rate):
