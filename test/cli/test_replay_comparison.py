@@ -22,10 +22,11 @@ from math import inf, nan, nextafter, sqrt, tau, ulp
 
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
-from linkage_ros.cli.message_values import JOINT_STATE
 from linkage_ros.cli.replay_comparison import At, Comparison, ulps
 from linkage_ros.joint_state import JointStateWriter
 import pytest
+
+from .recorded import JOINT_STATE
 
 NAMES = ['crank', 'slide']
 WRITE = JointStateWriter(NAMES).write
