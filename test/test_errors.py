@@ -23,9 +23,9 @@ from pkgutil import walk_packages
 import linkage_ros
 from linkage_ros.errors import FileError, LinkageError, listed
 from linkage_ros.models.part import PartError
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
+
+from .support.scenes import linkage_of
 
 TEXTS = 'where', 'reason', 'remedy'
 ARGUMENTS = {FileError: ('file', 'key', 'reason', 'remedy', 7), PartError: (3, *TEXTS)}
@@ -79,7 +79,7 @@ input: {{joint: crank, parent: ground, child: unheard of}}
 joints: {{j: {{parent: ground, child: {names[0]}}}}}
 """
     with pytest.raises(FileError) as caught:
-        read_linkage(parse_yaml(text.encode(), 'l.yaml'))
+        linkage_of(text)
     assert caught.value.remedy.startswith('name one of 0000_xxx')
     assert caught.value.remedy.endswith(' more')
     assert len(caught.value.remedy) < 1000

@@ -22,9 +22,11 @@ from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
+from .support.messages import read_joint_state as read
+from .support.messages import STORE
+from .support.scenes import pipeline_of
+
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
@@ -52,15 +54,6 @@ def load(tmp_path):
     return load
 
 
-def alone(linkage, text='effects: {velocity: {}}'):
-    files = {'scene.yaml': f'linkage: l\n{text}'.encode(), 'linkage.yaml': linkage.encode()}
-    return Pipeline(parse_scene('alone', 'here', files))
-
-
-def read(message):
-    return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
-
-
 def crank(now, **angles):
     names = list(angles)
     return JointStateWriter(names).write(now, list(angles.values()), [1.0] * len(names))
@@ -68,7 +61,10 @@ def crank(now, **angles):
 
 def test_each_is_as_it_would_be_alone(load):
     both = Pipeline(load(TWO))
-    left, right = alone(FOUR_BAR), alone(HALF_OPEN)
+    left, right = (
+        pipeline_of('effects: {velocity: {}}', FOUR_BAR),
+        pipeline_of('effects: {velocity: {}}', HALF_OPEN),
+    )
     for number in range(200):
         now = BEGIN + number * MS
         one, two = 0.03 * number, 0.001 * number
@@ -224,7 +220,7 @@ def test_a_hundred_of_them(load):
     assert scene.offer(crank(BEGIN, **cranks), BEGIN) is None
     state = read(scene.tick(BEGIN).message)
     assert len(state.name) == len(state.position) == 200
-    one = alone(FOUR_BAR)
+    one = pipeline_of('effects: {velocity: {}}', FOUR_BAR)
     for i in (0, 17, 99):
         one.offer(crank(BEGIN, crank_joint=0.01 * i), BEGIN)
         found = [state.position[2 * i], state.position[2 * i + 1]]

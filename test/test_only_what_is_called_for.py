@@ -12,71 +12,90 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 What a scene does not call for is not imported, not built, and not in the trace of a tick.
 
-One scene for each effect, drive and fault, with that alone: what it brings along is written beside
-it, and everything else has to be absent.
+One scene for each effect, drive, fault and solver, with that alone, in a process of its own: its
+arrays, stages and topics are those that were asked for, and so is what Python has loaded.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 import subprocess
 import sys
+from typing import NamedTuple
 
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.faults.fault import FAULTS
+from linkage_ros.solvers.registry import SOLVERS
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from .support.messages import read_joint_state
+from .support.scenes import LINKAGES, ROOT
 
 BARE = 'drive: {constant_rate: {rate: 2.0}}\n'
-KINEMATICS = {'effects.velocity', 'effects.acceleration'}
-FORCES = {*KINEMATICS, 'dynamics.mechanics', 'dynamics.reactions', 'effects.pin_forces'}
-PINS = {'messages.multi_dof_joint_state'}
-DRAWN = {
-    'effects.marker_arrows',
-    'effects.marker_shapes',
-    'messages.marker_array',
-    'drawing.curves',
-    'drawing.figure',
-    'drawing.labels',
-    'drawing.painting',
-    'drawing.shapes',
-}
 
-# Name: (scene, modules that are there beside those of the empty scene).
+
+class Expected(NamedTuple):
+    """
+    A scene with one effect, and what it has that the empty scene has not.
+
+    Attributes
+    ----------
+    text
+        What the scene says to the effect.
+    brings
+        Effects that it starts from.
+    arrays
+        Arrays of the joint state that are not empty.
+    packages
+        Packages of ours of which more is imported; that of the effects always is.
+    topics
+        Further topics.
+    numpy
+        Whether numpy is imported.
+
+    """
+
+    text: str
+    brings: tuple[str, ...] = ()
+    arrays: tuple[str, ...] = ()
+    packages: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()
+    numpy: bool = False
+
+
+RATES = ('velocity', 'acceleration')
+FORCES = (*RATES, 'pin_forces')
 SCENES = {
-    'tolerance': ('effects: {tolerance: {standard_deviation: 1.0e-5}}', set()),
-    'backlash': ('effects: {backlash: {play: 0.01}}', set()),
-    'velocity': ('effects: {velocity: {}}', set()),
-    'acceleration': (
-        'effects: {acceleration: {}}',
-        {'effects.velocity', 'messages.joint_trajectory'},
+    'tolerance': Expected('{standard_deviation: 1.0e-5}'),
+    'backlash': Expected('{play: 0.01}'),
+    'velocity': Expected('{}', arrays=('velocity',)),
+    'acceleration': Expected('{}', ('velocity',), ('velocity',), (), ('~/motion',)),
+    'friction': Expected(
+        '{joints: {A: {viscous: 0.1}}}, effort: {}',
+        (*RATES, 'effort'),
+        ('effort',),
+        ('dynamics',),
     ),
-    'friction': (
-        'effects: {effort: {}, friction: {joints: {A: {viscous: 0.1}}}}',
-        {*KINEMATICS, 'effects.effort', 'dynamics.mechanics'},
-    ),
-    'effort': ('effects: {effort: {}}', {*KINEMATICS, 'dynamics.mechanics'}),
-    'pin_forces': ('effects: {pin_forces: {}}', FORCES | PINS),
-    'compliance': ('effects: {compliance: {links: {coupler: 1.0e6}}}', FORCES),
-    'clearance': ('effects: {clearance: {pins: {A: 1.0e-5}}}', FORCES),
-    'jitter': ('effects: {jitter: {seconds: 0.001}}', {'effects.history', 'effects.velocity'}),
-    'bias': ('effects: {bias: {joints: {rocker_joint: 0.1}}}', set()),
-    'noise': ('effects: {noise: {joints: {rocker_joint: {white: 0.001}}}}', set()),
-    'encoder': ('effects: {encoder: {joints: {rocker_joint: {counts: 4096}}}}', set()),
-    'rate_limit': ('effects: {rate_limit: {rate: 100}}', set()),
-    'dropout': ('effects: {dropout: {probability: 0.1}}', set()),
-    'delay': ('effects: {delay: {seconds: 0.002}}', {'effects.history', 'effects.velocity'}),
-    'markers': ('effects: {markers: {}}', DRAWN),
+    'effort': Expected('{}', RATES, ('effort',), ('dynamics',)),
+    'pin_forces': Expected('{}', RATES, (), ('dynamics',), ('~/pin_forces',), numpy=True),
+    'compliance': Expected('{links: {coupler: 1.0e6}}', FORCES, (), ('dynamics',), numpy=True),
+    'clearance': Expected('{pins: {A: 1.0e-5}}', FORCES, (), ('dynamics',), numpy=True),
+    'jitter': Expected('{seconds: 0.001}', ('velocity',)),
+    'bias': Expected('{joints: {rocker_joint: 0.1}}'),
+    'noise': Expected('{joints: {rocker_joint: {white: 0.001}}}'),
+    'encoder': Expected('{joints: {rocker_joint: {counts: 4096}}}'),
+    'rate_limit': Expected('{rate: 100}'),
+    'dropout': Expected('{probability: 0.1}'),
+    'delay': Expected('{seconds: 0.002}', ('velocity',)),
+    'markers': Expected('{}', (), (), ('drawing',), ('~/markers',)),
 }
-SILENT = {'not_a_number': 'drive: {topic: {}}\n'}
+ALTERING = {'tolerance', 'friction'}
+"""Effects that change what is built, and have no part in a tick."""
 FAULT_SCENES = {
     'time_jump': 'time_jump: {by: 1.0}',
     'not_a_number': 'not_a_number: {}',
@@ -86,35 +105,21 @@ FAULT_SCENES = {
     'silence': 'silence: {}',
 }
 DRIVE_SCENES = {
-    'topic': ('topic: {}', set()),
-    'constant_rate': ('constant_rate: {rate: 2.0}', set()),
-    'profile': ('profile: {table: [[0, 0.0], [1, 1.0]]}', set()),
-    'sine': ('sine: {amplitude: 1.0, frequency: 1.0}', set()),
-    'chirp': (
-        'chirp: {amplitude: 1.0, start_frequency: 1.0, end_frequency: 5.0, seconds: 10.0}',
-        set(),
-    ),
-    'torque': ('torque: {}', set()),
+    'topic': 'topic: {}',
+    'constant_rate': 'constant_rate: {rate: 2.0}',
+    'profile': 'profile: {table: [[0, 0.0], [1, 1.0]]}',
+    'sine': 'sine: {amplitude: 1.0, frequency: 1.0}',
+    'chirp': 'chirp: {amplitude: 1.0, start_frequency: 1.0, end_frequency: 5.0, seconds: 10.0}',
+    'torque': 'torque: {}',
 }
-
 SOLVER_SCENES = {
-    'solver: closed_form': set(),
-    'solver: {newton: {tolerance: 1.0e-9}}': {
-        'solvers.newton',
-        'solvers.loops',
-        'solvers.solver',
-    },
-    'solver: {table: {tolerance: 1.0e-3}}': {
-        'solvers.table',
-        'solvers.proof',
-        'solvers.validated_enclosure',
-        'solvers.loops',
-        'solvers.solver',
-    },
+    'closed_form': 'solver: closed_form',
+    'newton': 'solver: {newton: {tolerance: 1.0e-9}}',
+    'table': 'solver: {table: {tolerance: 1.0e-3}}',
 }
 
-# Run in a process of its own: builds the scene, says what was imported, and which files the tick
-# then passed through.
+# Run in a process of its own: builds the scene, says what was imported, what the tick then
+# published, and which files it passed through.
 PROGRAM = """
 import json, sys
 from linkage_ros.pipeline import Pipeline
@@ -123,19 +128,20 @@ pipeline = Pipeline(load_scene(sys.argv[1]))
 modules = sorted(sys.modules)
 seen = set()
 sys.setprofile(lambda frame, event, _: seen.add(frame.f_code.co_filename))
-for number in range(4):
-    pipeline.tick(1_700_000_000_000_000_000 + number * 1_000_000)
+ticks = [pipeline.tick(1_700_000_000_000_000_000 + number * 1_000_000) for number in range(4)]
 sys.setprofile(None)
-stages = [line.stages for line in pipeline.lines][0]
-print(json.dumps([modules, sorted(seen), stages, sorted(sys.modules)]))
+print(json.dumps({
+    'modules': modules, 'after': sorted(sys.modules), 'files': sorted(seen),
+    'messages': [tick.message.hex() for tick in ticks if tick.message],
+    'stages': pipeline.lines[0].stages, 'topics': [extra.topic for extra in pipeline.extras],
+}))
 """
 
 
-def look(folder, scene):
-    """Return what is imported, what a tick passes through, and the stages that are held."""
-    (folder / 'scene.yaml').write_text(f'linkage: {ROOT}/config/linkages/four_bar.yaml\n{scene}\n')
+def run_python(*arguments):
+    """Return what a Python process of its own prints."""
     done = subprocess.run(
-        [sys.executable, '-c', PROGRAM, str(folder / 'scene.yaml')],
+        [sys.executable, '-c', *arguments],
         cwd=ROOT,
         env=os.environ | {'PYTHONPATH': str(ROOT)},
         capture_output=True,
@@ -143,120 +149,125 @@ def look(folder, scene):
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    modules, files, stages, modules_after = json.loads(done.stdout)
-    assert modules_after == modules, 'a tick has imported something'
-    prefix = 'linkage_ros.'
-    ours = {name.removeprefix(prefix) for name in modules if name.startswith(prefix)}
-    package = str(ROOT / 'linkage_ros')
-    passed = {
-        file.removeprefix(f'{package}/').removesuffix('.py').replace('/', '.')
-        for file in files
-        if file.startswith(package)
-    }
-    return ours, passed, set(stages), set(modules)
+    return done.stdout
 
 
-OPTIONAL = {
-    name.removeprefix('linkage_ros.')
-    for registry in (EFFECTS, DRIVES, FAULTS)
-    for name in registry.values()
-} | {
-    *FORCES,
-    *PINS,
-    *DRAWN,
-    'effects.history',
-    'messages.joint_trajectory',
-    'faults.injection',
-    'messages.joint_effort',
-}
-"""Modules that a scene may or may not have; the rest is always there."""
+class Look:
+    """What a scene has: imports, files that a tick passes through, arrays, stages, topics."""
+
+    def __init__(self, folder, scene):
+        file = folder / 'scene.yaml'
+        file.write_text(f'linkage: {LINKAGES}/four_bar.yaml\n{scene}\n')
+        told = json.loads(run_python(PROGRAM, str(file)))
+        assert told['after'] == told['modules'], 'a tick has imported something'
+        self.modules = set(told['modules'])
+        package = f'{ROOT}/'
+        self.passed = {
+            file.removeprefix(package).removesuffix('.py').replace('/', '.')
+            for file in told['files']
+            if file.startswith(f'{package}linkage_ros/')
+        }
+        messages = [read_joint_state(bytes.fromhex(each)) for each in told['messages']]
+        self.arrays = {
+            name
+            for name in ('velocity', 'effort')
+            for each in messages
+            if len(getattr(each, name))
+        }
+        self.topics = told['topics']
+        self.stages = set(told['stages'])
+        assert 'rclpy' not in self.modules
 
 
-def test_every_effect_and_fault_has_its_scene():
+COMMON = {'kinematics', 'messages'}
+OPTIONAL = {'drawing', 'dynamics', 'faults', 'models', 'solvers', 'synthesis'}
+"""Packages of which nothing is in a tick, unless the scene asks for it."""
+
+
+def of_registry(names, modules):
+    """Return which effects, drives, faults or solvers have their module among some."""
+    return {name for name, module in names.items() if module in modules}
+
+
+def packages(modules):
+    """Return which packages of ours modules lie in; messages are there for their topics."""
+    parts = (module.split('.') for module in modules)
+    return {part[1] for part in parts if part[0] == 'linkage_ros' and len(part) > 2} - COMMON
+
+
+@pytest.fixture(scope='module')
+def bare(tmp_path_factory):
+    return Look(tmp_path_factory.mktemp('bare'), BARE)
+
+
+def test_everything_has_its_scene():
     assert set(SCENES) == set(EFFECTS)
     assert set(FAULT_SCENES) == set(FAULTS)
     assert {*DRIVE_SCENES, 'bag'} == set(DRIVES)
+    assert set(SOLVER_SCENES) == set(SOLVERS)
 
 
-def test_an_empty_scene_has_nothing(tmp_path):
-    modules, passed, stages, everything = look(tmp_path, BARE)
-    assert modules & OPTIONAL == {'drives.constant_rate'}
-    assert passed & OPTIONAL == {'drives.constant_rate'}
-    assert solvers_of(modules) == {'solvers.registry'}
-    assert not solvers_of(passed)
-    assert stages == set()
-    assert not everything & {'numpy', 'rclpy'}
+def test_an_empty_scene_has_nothing(bare):
+    for found in (bare.modules, bare.passed):
+        assert not of_registry(EFFECTS | FAULTS | SOLVERS, found)
+        assert of_registry(DRIVES, found) == {'constant_rate'}
+    assert not packages(bare.passed) & OPTIONAL
+    assert not bare.stages
+    assert not bare.arrays
+    assert not bare.topics
+    assert 'numpy' not in bare.modules
 
 
 @pytest.mark.parametrize('effect', SCENES)
-def test_a_scene_with_one_effect_has_no_other(tmp_path, effect):
-    scene, beside = SCENES[effect]
-    modules, passed, stages, everything = look(tmp_path, BARE + scene)
-    allowed = {f'effects.{effect}', 'drives.constant_rate', *beside}
-    assert modules & OPTIONAL == allowed
-    assert passed & OPTIONAL <= allowed
-    assert f'effects.{effect}' in passed or effect in ('tolerance', 'friction')
-    assert stages == {name.split('.')[1] for name in allowed if name in EFFECT_MODULES}
-    assert ('numpy' in everything) == ('dynamics.reactions' in beside)
+def test_a_scene_with_one_effect_has_no_other(tmp_path, bare, effect):
+    expected = SCENES[effect]
+    look = Look(tmp_path, f'{BARE}effects: {{{effect}: {expected.text}}}')
+    effects = {effect, *expected.brings}
+    assert look.stages == effects
+    assert of_registry(EFFECTS, look.modules) == effects
+    assert of_registry(EFFECTS, look.passed) <= effects
+    assert effect in of_registry(EFFECTS, look.passed) or effect in ALTERING
+    assert look.arrays == set(expected.arrays)
+    assert look.topics == list(expected.topics)
+    assert packages(look.modules - bare.modules) == {'effects', *expected.packages}
+    assert packages(look.passed) & OPTIONAL <= set(expected.packages)
+    assert of_registry(DRIVES | FAULTS, look.modules) == {'constant_rate'}
+    assert ('numpy' in look.modules) == expected.numpy
 
 
-def solvers_of(modules):
-    """Return those modules that are of the solvers' room."""
-    return {name for name in modules if name.startswith('solvers.')}
-
-
-@pytest.mark.parametrize('scene', SOLVER_SCENES)
-def test_a_scene_with_one_solver_has_no_other(tmp_path, scene):
-    modules, passed, _, everything = look(tmp_path, BARE + scene)
-    allowed = SOLVER_SCENES[scene]
-    assert solvers_of(modules) == {'solvers.registry', *allowed}
-    # What proves a table, or knows the closed form, has no part in a tick.
-    assert solvers_of(passed) <= {'solvers.newton', 'solvers.table'} & allowed
-    assert ('numpy' in everything) == ('solvers.table' in allowed)
-
-
-EFFECT_MODULES = {name.removeprefix('linkage_ros.') for name in EFFECTS.values()}
+@pytest.mark.parametrize('solver', SOLVER_SCENES)
+def test_a_scene_with_one_solver_has_no_other(tmp_path, solver):
+    look = Look(tmp_path, BARE + SOLVER_SCENES[solver])
+    assert of_registry(SOLVERS, look.modules) == {solver}
+    # What knows the closed form has no part in a tick.
+    assert of_registry(SOLVERS, look.passed) == {solver} - {'closed_form'}
+    assert ('numpy' in look.modules) == (solver == 'table')
 
 
 @pytest.mark.parametrize('drive', DRIVE_SCENES)
-def test_a_scene_with_one_drive_has_no_other(tmp_path, drive):
-    scene, _ = DRIVE_SCENES[drive]
-    modules, passed, _, everything = look(tmp_path, f'drive: {{{scene}}}')
-    drives = {name for name in OPTIONAL if name.startswith('drives.')}
-    assert modules & drives == {f'drives.{drive}'}
+def test_a_scene_with_one_drive_has_no_other(tmp_path, bare, drive):
+    look = Look(tmp_path, f'drive: {{{DRIVE_SCENES[drive]}}}')
+    assert of_registry(DRIVES, look.modules) == {drive}
     # The lines of the topic drive stand in the tick that is written for the scene.
-    assert passed & drives == ({f'drives.{drive}'} - {'drives.topic'})
-    assert (
-        ('dynamics.mechanics' in modules)
-        == ('messages.joint_effort' in modules)
-        == (drive == 'torque')
-    )
-    assert 'numpy' not in everything
+    assert of_registry(DRIVES, look.passed) == {drive} - {'topic'}
+    assert ('dynamics' in packages(look.modules - bare.modules)) == (drive == 'torque')
+    assert 'numpy' not in look.modules
 
 
 @pytest.mark.parametrize('fault', FAULT_SCENES)
 def test_a_scene_with_one_fault_has_no_other(tmp_path, fault):
-    drive = SILENT.get(fault, BARE)
-    modules, passed, _, _ = look(tmp_path, f'{drive}faults: {{mine: {{{FAULT_SCENES[fault]}}}}}')
-    faults = {name for name in OPTIONAL if name.startswith('faults.')}
-    assert modules & faults == {f'faults.{fault}', 'faults.injection'}
-    assert passed & faults <= {f'faults.{fault}', 'faults.injection'}
+    drive = 'drive: {topic: {}}\n' if fault == 'not_a_number' else BARE
+    look = Look(tmp_path, f'{drive}faults: {{mine: {{{FAULT_SCENES[fault]}}}}}')
+    assert of_registry(FAULTS, look.modules) == {fault}
+    assert of_registry(FAULTS, look.passed) <= {fault}
 
 
 def test_a_robot_model_is_made_where_it_is_asked_for_alone(tmp_path):
     """Neither building a scene nor the node's own modules bring it: configuring the node does."""
     for scene in ('', 'robot_description: true\n'):
-        modules, passed, _, _ = look(tmp_path, BARE + scene)
-        assert not {name for name in modules | passed if name.startswith('models')}
+        look = Look(tmp_path, BARE + scene)
+        assert 'models' not in packages(look.modules | look.passed)
     pytest.importorskip('rclpy')
-    done = subprocess.run(
-        [sys.executable, '-c', 'import sys, linkage_ros.ros.node; print(*sys.modules)'],
-        cwd=ROOT,
-        env=os.environ | {'PYTHONPATH': str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    loaded = done.stdout.split()
-    assert 'linkage_ros.ros.scene_topics' in loaded
-    assert not [name for name in loaded if name.startswith('linkage_ros.models')]
+    loaded = run_python('import sys, linkage_ros.ros.node; print(*sys.modules)').split()
+    assert 'linkage_ros.ros.node' in loaded
+    assert 'models' not in packages(loaded)

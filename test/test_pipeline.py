@@ -27,14 +27,14 @@ import sys
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.pipeline import Look, Pipeline
-from linkage_ros.scene.load import parse_scene
+from linkage_ros.pipeline import Look
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
 from .ros.loops import FIVE_BAR
+from .support.messages import read_joint_state as read
+from .support.messages import STORE
+from .support.scenes import pipeline_of
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
 CRANK = JointStateWriter(['crank_joint'])
@@ -45,8 +45,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def pipeline(scene=b'effects: {velocity: {}}', linkage=FOUR_BAR):
-    files = {'scene.yaml': b'linkage: linkage.yaml\n' + scene, 'linkage.yaml': linkage}
-    return Pipeline(parse_scene('test', 'test', files))
+    return pipeline_of(scene, linkage)
 
 
 def turn(pipeline, angle_at, seconds=3.0, wrap=False):
@@ -61,10 +60,6 @@ def turn(pipeline, angle_at, seconds=3.0, wrap=False):
             assert pipeline.offer(CRANK.write(now, [angle], [rate]), now) is None
         messages.append(pipeline.tick(now).message)
     return messages
-
-
-def read(message):
-    return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
 
 
 def swinging(t):
@@ -100,7 +95,10 @@ def test_over_several_turns_angles_run_on_or_stay_wrapped(wrap_input, direction,
         turns = (long.position - short.position) / tau
         assert turns == pytest.approx([round(turn) for turn in turns], abs=1e-9)
         assert not slides or turns[1] == 0.0
-    first, last = read(continuous[0]).position, read(continuous[-1]).position
+    first, last = (
+        read(continuous[0]).position,
+        read(continuous[-1]).position,
+    )
     # In 33 rad the coupler falls behind the crank by five turns, but in a drag link it goes along.
     assert abs(last[0] - first[0]) > 5 * tau or abs(last[1] - first[1]) > 5 * tau
 

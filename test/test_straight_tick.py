@@ -29,6 +29,8 @@ from linkage_ros.scene.load import parse_scene
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
+from .support.scenes import pipeline_of
+
 ROOT = Path(__file__).parents[1]
 GALLERY = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
 BEGIN, MS = 1_700_000_000_000_000_000, 1_000_000
@@ -49,8 +51,7 @@ FORCES = ('{velocity: {}, effort: {}, backlash: {play: 0.01}}', '{pin_forces: {}
 
 
 def pipeline(linkage, scene):
-    files = {'scene.yaml': f'linkage: l\n{scene}\n'.encode(), 'linkage.yaml': linkage}
-    return Pipeline(parse_scene('s', 's', files))
+    return pipeline_of(scene, linkage)
 
 
 def ticks(work):

@@ -24,8 +24,8 @@ from linkage_ros.accuracy.page.files import PAGE, write_page
 import pytest
 
 from .shown import DIAGRAMS, EMPTY, FAILED, LONG, MANY, METHODS, POSITION, RESULTS
-from ..browser.chromium import browser as chromium  # noqa: TID252
-from ..browser.opened import opened  # noqa: TID252
+from ..browser.chromium import browser as chromium
+from ..browser.opened import opened
 
 pytest.importorskip('matplotlib', reason='draws the pictures')
 pytest.importorskip('plotly', reason='is within the page')

@@ -56,7 +56,7 @@ FINITE = strategies.floats(-1e308, 1e308)
         (nan, 'nan'),
     ],
 )
-def test_a_cell_as_text(cell, text):
+def test_a_cell_is_written_with_the_digits_that_tell_something(cell, text):
     assert cell_text(cell) == text
 
 

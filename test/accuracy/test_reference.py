@@ -41,8 +41,8 @@ from linkage_ros.kinematics.survey import usual_inputs
 from mpmath import mp, mpf
 import pytest
 
-from ..kinematics import reference as algebra  # noqa: TID252
-from ..kinematics.samples import four_bars  # noqa: TID252
+from ..kinematics import reference as algebra
+from ..kinematics.samples import four_bars
 
 SHIPPED = sorted(
     path.stem for path in (Path(__file__).parents[2] / 'config/linkages').glob('*.yaml')

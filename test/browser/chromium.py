@@ -25,7 +25,7 @@ from typing import Any
 
 import pytest
 
-from ..node_packages import BROWSER  # noqa: TID252
+from ..node_packages import BROWSER
 
 _NAMES = ('chromium', 'chromium-headless-shell', 'chromium-browser', 'google-chrome')
 _REMEDY = (

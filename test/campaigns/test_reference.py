@@ -34,8 +34,8 @@ from mpmath import mp, mpf
 import pytest
 
 from .newton import DIGITS, Newton
-from ..kinematics import reference as elsewhere  # noqa: TID252
-from ..kinematics.samples import (  # noqa: TID252
+from ..kinematics import reference as elsewhere
+from ..kinematics.samples import (
     FOUR_BARS,
     four_bars,
     inverted_slider_cranks,

@@ -33,9 +33,9 @@ from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 from rosbags.highlevel import AnyReader
-from rosbags.typesys import get_typestore, Stores
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
+from ..support.messages import STORE
+
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 SECOND = 1_000_000_000
 BEGIN = 1_700_000_000 * SECOND

@@ -20,12 +20,10 @@ from pathlib import Path
 import re
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
 from .conftest import Run
+from ..support.scenes import closure_of
 
 ATTACKS = Path(__file__).parent / 'attacks'
 
@@ -105,7 +103,7 @@ def test_points_that_are_hardly_apart_are_refused_in_a_line_or_solved(file: Path
         beside = f'{one}, {name}: [{x if float(x) else "5e-324"}, {y}]'
         changed = text.replace(found[0], beside)
         try:
-            Closure(read_linkage(parse_yaml(changed.encode(), file.name)))
+            closure_of(changed)
             answers.append('')
         except LinkageError as error:
             answers.append(str(error))

@@ -324,7 +324,7 @@ def test_only_what_lies_between_the_marks_is_written():
     ],
     ids=str,
 )
-def test_wrong_input(linkage: Run, tmp_path, typed, said):
+def test_wrong_input_is_refused_in_a_line(linkage: Run, tmp_path, typed, said):
     (tmp_path / 'good.yaml').write_text(f'linkage: {FOUR_BAR}\n')
     (tmp_path / 'bad.yaml').write_text(f'linkage: {FOUR_BAR}\nrtae: 5\n')
     answer = linkage('cost', *typed)

@@ -51,7 +51,9 @@ KINDS = {'pipe': 'a pipe', 'socket': 'a socket', 'device': 'a device'}
 
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('read', READS)
-def test_it_is_refused(linkage: Run, tmp_path: Path, read: str, kind: str) -> None:
+def test_what_is_no_regular_file_is_refused(
+    linkage: Run, tmp_path: Path, read: str, kind: str
+) -> None:
     for name in ('bag', 'bag_of_one'):
         (tmp_path / name).mkdir()
     (tmp_path / 'scene.yaml').write_text('linkage: odd\n')

@@ -43,9 +43,9 @@ from .recorded import (
     MS,
     Recorded,
     scene_file,
-    STORE,
     topic,
 )
+from ..support.messages import read_joint_state
 
 TICKS = 300
 LINKAGE = (Path(__file__).parents[2] / 'config/linkages/four_bar.yaml').read_text()
@@ -161,7 +161,7 @@ def test_two_linkages_that_withhold_at_one_tick_say_so_twice(tmp_path, capsys):
 
 def spoil(data: bytes, place: int, bits: int) -> tuple[bytes, float, float]:
     """Return a message with bits of a position flipped; and the position, before and after."""
-    value = float(STORE.deserialize_cdr(data, JOINT_STATE).position[place])
+    value = float(read_joint_state(data).position[place])
     (raw,) = unpack('<q', pack('<d', value))
     (other,) = unpack('<d', pack('<q', raw ^ bits))
     assert data.count(pack('<d', value)) == 1

@@ -24,8 +24,9 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from linkage_ros.cli.replay_comparison import At, Comparison, ulps
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.messages.joint_values import JOINT_STATE
 import pytest
+
+from .recorded import JOINT_STATE
 
 NAMES = ['crank', 'slide']
 WRITE = JointStateWriter(NAMES).write

@@ -203,7 +203,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(('scene', 'drawn', 'said'), WRONG, ids=[row[2][0][:40] for row in WRONG])
-def test_wrong_files(linkage: Run, tmp_path, scene, drawn, said):
+def test_wrong_files_are_refused_in_a_line(linkage: Run, tmp_path, scene, drawn, said):
     pytest.importorskip('jsonschema')
     (tmp_path / 's.yaml').write_text(scene)
     (tmp_path / 'l.yaml').write_text(drawn)

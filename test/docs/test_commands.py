@@ -165,7 +165,7 @@ def test_what_is_not_run_says_why_and_is_counted():
     assert {reason: reasons.count(reason) for reason in sorted({*reasons})} == NOT_RUN
 
 
-def test_most_is_run():
+def test_most_blocks_of_the_documentation_are_run():
     assert len(ALL) - sum(NOT_RUN.values()) >= 30
 
 

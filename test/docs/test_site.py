@@ -30,8 +30,8 @@ from linkage_ros.scene.schema import linkage_schema, scene_schema
 import pytest
 
 from .blocks import ROOT
-from ..browser.chromium import browser as chromium  # noqa: TID252
-from ..browser.opened import opened  # noqa: TID252
+from ..browser.chromium import browser as chromium
+from ..browser.opened import opened
 
 for needed in ('sphinx', 'myst_parser', 'furo', 'matplotlib'):
     pytest.importorskip(needed, reason="pip install '.[docs]'")

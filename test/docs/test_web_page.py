@@ -24,7 +24,7 @@ import sys
 from threading import Thread
 
 from .blocks import blocks, ROOT
-from ..browser.chromium import browser as chromium  # noqa: TID252
+from ..browser.chromium import browser as chromium
 
 
 class Quiet(SimpleHTTPRequestHandler):

@@ -18,21 +18,18 @@
 from __future__ import annotations
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.yaml_file import parse_yaml
+
+from ..support.scenes import closure_of, FOUR_BAR, pipeline_of
 
 
 def _context(linkage: str, *, needs_rate: bool) -> Context:
-    closure = Closure(read_linkage(parse_yaml(linkage.encode(), 'linkage.yaml')))
-    return Context(closure, 1000.0, needs_rate, 'seed', None, None)
+    return Context(closure_of(linkage), 1000.0, needs_rate, 'seed', None, None)
 
 
 def one_input(*, needs_rate: bool = True) -> Context:
     """Return a four-bar's: its input is ``crank_joint``."""
-    return _context('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}', needs_rate=needs_rate)
+    return _context(FOUR_BAR, needs_rate=needs_rate)
 
 
 def two_inputs(*, needs_rate: bool = True) -> Context:
@@ -58,10 +55,7 @@ joints:
 
 def pipeline(drive: str) -> Pipeline:
     """Return a four-bar's, of a scene with rates and this drive, as a scene file says it."""
-    scene = f'linkage: linkage.yaml\neffects: {{velocity: {{}}}}\ndrive: {{{drive}}}\n'
-    linkage = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
-    files = {'scene.yaml': scene.encode(), 'linkage.yaml': linkage.encode()}
-    return Pipeline(parse_scene('test', 'here', files))
+    return pipeline_of(f'effects: {{velocity: {{}}}}\ndrive: {{{drive}}}\n')
 
 
 def readings(built: Pipeline, *times: int) -> list[tuple[float, float]]:

@@ -27,13 +27,13 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.drives.bag import BagParameters, build
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
-from linkage_ros.errors import BagError, DefinitionError, FileError
+from linkage_ros.errors import BagError, DefinitionError
 from linkage_ros.messages.joint_state import CrankSample, JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest
 
-from .contexts import one_input, pipeline, readings, two_inputs
+from .contexts import one_input, readings, two_inputs
 
 MS = 1_000_000
 RECORDED = 1_600_000_000_000_000_000
@@ -142,7 +142,7 @@ TIMELINES = {
 
 @pytest.mark.parametrize('begin', [BEGIN, 0, 1])
 @pytest.mark.parametrize('name', TIMELINES)
-def test_timeline(tmp_path, name, begin):
+def test_samples_of_the_bag_turn_the_crank_as_the_timeline_says(tmp_path, name, begin):
     parameters, messages, steps = TIMELINES[name]
     drive = build(BagParameters(write(tmp_path / 'bag', messages), **parameters), one_input())
     if steps[0][0]:
@@ -242,7 +242,9 @@ def test_what_the_topic_would_refuse_is_skipped_and_counted(tmp_path):
         ('fast', True, False, True),
     ],
 )
-def test_without_rates(tmp_path, pace, carry_forward, needs_rate, good):
+def test_samples_without_rates_are_taken_where_no_rate_is_needed(
+    tmp_path, pace, carry_forward, needs_rate, good
+):
     file = write(tmp_path / 'bag', crank(sample(0, 0.5, None), sample(1, 0.6, None)))
     parameters = BagParameters(file, pace=pace, carry_forward=carry_forward)
     if good:
@@ -282,7 +284,7 @@ RUN = json.dumps({'scene': 's', 'crank_topic': '/b/crank'}).encode()
         'the account of the run is none',
     ],
 )
-def test_the_topic_is(tmp_path, messages, run, topic, angle):
+def test_the_topic_that_is_taken(tmp_path, messages, run, topic, angle):
     file = write(tmp_path / 'bag', messages, run=run)
     drive = build(BagParameters(file, topic=topic), one_input())
     assert drive.state(BEGIN).angles == (angle,)
@@ -358,20 +360,3 @@ def test_in_a_scene_the_bag_lies_relative_to_it(tmp_path):
     assert readings(built, *times) == [(0.5, 2.0), (pytest.approx(0.6), 2.0), (3.0, -1.0)]
     assert built.tick(BEGIN + 351 * MS).message == b''
     assert (built.newest_stamp, built.max_age) == (BEGIN + 150 * MS, 200 * MS)
-
-
-@pytest.mark.parametrize(
-    ('drive', 'said'),
-    [
-        ('bag: {}', "drive.bag: the key 'file' is missing"),
-        ('bag: {file: 3}', 'drive.bag.file: 3 is not a text'),
-        ('bag: {file: b, topc: x}', "drive.bag.topc: unknown key; did you mean 'topic'?"),
-        ('bag: {file: b, pace: slow}', "drive.bag.pace: 'slow' is none; write recorded or fast"),
-        ('bag: {file: b, max_age: 0}', 'drive.bag.max_age: 0 is out of bounds'),
-    ],
-)
-def test_what_a_scene_cannot_say(drive, said):
-    with pytest.raises(FileError) as caught:
-        pipeline(drive)
-    assert said in str(caught.value)
-    assert '\n' not in str(caught.value)

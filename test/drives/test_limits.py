@@ -23,9 +23,9 @@ from linkage_ros.drives.profile import curve, extent, ProfileParameters
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_effort import EffortCommand
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
 import pytest
+
+from ..support.scenes import pipeline_of
 
 MS = 1_000_000
 BEGIN = 1_700_000_000 * 1_000 * MS
@@ -52,9 +52,7 @@ def four_bar(limits):
 
 
 def pipeline(drive, linkage):
-    scene = f'linkage: linkage.yaml\ndrive: {{{drive}}}'
-    files = {'scene.yaml': scene.encode(), 'linkage.yaml': linkage.encode()}
-    return Pipeline(parse_scene('s', 's', files))
+    return pipeline_of(f'drive: {{{drive}}}', linkage)
 
 
 CHIRP = 'chirp: {amplitude: 0.6, mean: 1, start_frequency: 0.01, end_frequency: 0.02, seconds: 5}'

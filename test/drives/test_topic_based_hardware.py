@@ -32,9 +32,9 @@ from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-from ..test_joint_effort import serialized  # noqa: TID252
+from ..support.messages import joint_state as serialized
+from ..support.messages import read_joint_state
 
 PAGE = (Path(__file__).parents[2] / 'docs' / 'how_to' / 'stand_in.md').read_text('utf-8')
 SYSTEM = re.search(r'```xml\n(.*?)```', PAGE, re.DOTALL)[1]
@@ -45,7 +45,6 @@ SCENE, LINKAGE = (
 ALWAYS = '<param name="trigger_joint_command_threshold">-1</param>'
 MS = 1_000_000
 INTERFACES = ('position', 'velocity', 'effort')
-STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 class Hardware:
@@ -70,7 +69,7 @@ class Hardware:
         self.effort = nan
 
     def read(self, message):
-        state = STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+        state = read_joint_state(message)
         for place, name in enumerate(state.name):
             if name in self._joints:
                 for interface in INTERFACES:
@@ -89,7 +88,7 @@ class Hardware:
         if off <= self._threshold:
             return None
         efforts = [self.effort for commands in self._joints.values() for _ in commands]
-        return serialized(list(self._joints), efforts)
+        return serialized(list(self._joints), efforts=efforts)
 
 
 def pipeline():

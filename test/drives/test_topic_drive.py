@@ -138,7 +138,7 @@ TIMELINES = {
 
 
 @pytest.mark.parametrize('name', TIMELINES)
-def test_timeline(name):
+def test_samples_turn_the_crank_as_the_timeline_says(name):
     parameters, steps = TIMELINES[name]
     drive = TopicDrive(parameters, needs_rate=False)
     for time, offered, expected in steps:
@@ -191,7 +191,7 @@ def test_the_largest_numbers_are_good(angle):
     ('parameters', 'needs_rate', 'good'),
     [(CARRIED, False, False), (CARRIED, True, False), (HELD, True, False), (HELD, False, True)],
 )
-def test_without_a_rate(parameters, needs_rate, good):
+def test_a_sample_without_a_rate_is_taken_where_no_rate_is_needed(parameters, needs_rate, good):
     drive = TopicDrive(parameters, needs_rate)
     rejection = drive.offer(CrankSample(NOW, (0.5,), None), NOW)
     if good:

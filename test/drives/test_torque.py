@@ -37,14 +37,13 @@ from linkage_ros.kinematics.linkage import Mass
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_effort import EffortCommand
 from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
 import pytest
 
 from .contexts import two_inputs
-from ..dynamics.loaded import FOLDER, four_bar, shipped  # noqa: TID252
-from ..kinematics.defects import defect  # noqa: TID252
-from ..test_joint_effort import serialized  # noqa: TID252
+from ..dynamics.loaded import FOLDER, four_bar, shipped
+from ..kinematics.defects import defect
+from ..support.messages import joint_state as serialized
+from ..support.scenes import pipeline_of
 
 MS = 1_000_000
 SECOND = 1000 * MS
@@ -175,7 +174,7 @@ TIMELINES = {
 
 
 @pytest.mark.parametrize('name', TIMELINES)
-def test_timeline(name):
+def test_commands_move_the_wheel_as_the_timeline_says(name):
     parameters, steps = TIMELINES[name]
     turned = wheel(**parameters)
     for time, effort, expected in steps:
@@ -424,11 +423,8 @@ def test_where_nothing_has_inertia_nothing_starts():
 
 
 def scene(drive_text, effects=''):
-    text = (
-        f'linkage: l.yaml\ndrive: {{torque: {drive_text}}}\neffects: {{velocity: {{}}{effects}}}'
-    )
-    linkage = (FOLDER / 'four_bar.yaml').read_bytes()
-    return Pipeline(parse_scene('test', 'here', {'scene.yaml': text.encode(), 'l.yaml': linkage}))
+    text = f'drive: {{torque: {drive_text}}}\neffects: {{velocity: {{}}{effects}}}'
+    return pipeline_of(text, (FOLDER / 'four_bar.yaml').read_bytes())
 
 
 def test_a_scene_is_driven_by_commands():
@@ -436,12 +432,12 @@ def test_a_scene_is_driven_by_commands():
     assert pipeline.topic == TOPIC
     first = pipeline.tick(BEGIN).looks[0].reading
     assert first.joints[0] == 0.5, 'the input is published first'
-    message = serialized(['other', 'crank_joint'], [9.0, 0.02])
+    message = serialized(['other', 'crank_joint'], efforts=[9.0, 0.02])
     assert pipeline.offer(message, BEGIN) is GOOD
     moved = pipeline.tick(BEGIN + 100 * MS).looks[0].reading
     assert moved.joints[0] > 0.6
     assert moved.rates[0] > 1.0
-    spoilt = serialized(['crank_joint'], [nan])
+    spoilt = serialized(['crank_joint'], efforts=[nan])
     assert pipeline.offer(spoilt, BEGIN + 100 * MS) is Rejection.EFFORT_NOT_FINITE
     assert pipeline.newest_stamp == BEGIN
 
@@ -452,7 +448,7 @@ def test_two_runs_of_a_scene_give_the_same_bytes():
         for k in range(100):
             now = BEGIN + k * MS
             if k % 7 == 0:
-                pipeline.offer(serialized(['crank_joint'], [0.001 * k]), now)
+                pipeline.offer(serialized(['crank_joint'], efforts=[0.001 * k]), now)
             yield pipeline.tick(now).message
 
     first = list(messages())
@@ -471,7 +467,7 @@ def test_what_is_wrong_in_a_scene_has_its_line():
 
 def test_it_reads_the_input_by_the_name_that_messages_have():
     context = replace(two_inputs(), prefix='left/')
-    assert reader(context)(serialized(['left/left_crank'], [2.0])).effort == 2.0
+    assert reader(context)(serialized(['left/left_crank'], efforts=[2.0])).effort == 2.0
 
 
 @pytest.mark.parametrize('start', [0.0, pi])

@@ -18,27 +18,14 @@
 from __future__ import annotations
 
 from importlib import import_module
-from pathlib import Path
 
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.effects import velocity
 from linkage_ros.effects.stage import EFFECTS, Motion
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
 
 GRAVITY = 9.81
-LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
-
-
-def linkage(name):
-    """Return a linkage of the gallery."""
-    return read_linkage(parse_yaml((LINKAGES / f'{name}.yaml').read_bytes(), f'{name}.yaml'))
-
-
-def linkage_of(text):
-    return read_linkage(parse_yaml(text.encode(), 'linkage.yaml'))
 
 
 def context(of, friction=None, gravity=(0.0, -GRAVITY), drive_inertia=0.0):

@@ -19,30 +19,20 @@ from __future__ import annotations
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.parameters import read_parameters
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.scene import parts_of
-from linkage_ros.scene.yaml_file import parse_yaml
 from mpmath import gammainc
+
+from ..support.scenes import closure_of, FOUR_BAR, pipeline_of
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
 
-FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
 SLIDER_CRANK = b'inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}'
 
 
-def closure(text):
-    return Closure(read_linkage(parse_yaml(text, 'linkage.yaml')))
-
-
-ANGLES = closure(FOUR_BAR)
+ANGLES = closure_of(FOUR_BAR)
 """Publishes coupler_joint and rocker_joint, both angles."""
-SLIDE = closure(SLIDER_CRANK)
+SLIDE = closure_of(SLIDER_CRANK)
 """Publishes rod_joint, an angle, and rod_slide, a slide."""
 
 
@@ -54,17 +44,9 @@ def reading(now, *joints, rates=(), accelerations=(), efforts=()):
     return Reading(now, joints, rates, accelerations, efforts)
 
 
-def written(effect, text):
-    """Return an effect's parameters as a scene writes them."""
-    content = parse_yaml(text.encode(), 'scene.yaml')
-    return read_parameters(content, effect.PARAMETERS, parts_of(ANGLES.linkage))
-
-
 def published(effects, ticks=100, seed=0, rate=10.0):
     """Return what is read in a four-bar's scene, at each ms; the crank turns, in [rad/s]."""
-    scene = f'linkage: linkage.yaml\nseed: {seed}\neffects: {{velocity: {{}}, {effects}}}'
-    files = {'scene.yaml': scene.encode(), 'linkage.yaml': FOUR_BAR}
-    pipeline = Pipeline(parse_scene('test', 'test', files))
+    pipeline = pipeline_of(f'seed: {seed}\neffects: {{velocity: {{}}, {effects}}}')
     crank = JointStateWriter(['crank_joint']).write(BEGIN, [0.5], [rate], [])
     assert pipeline.offer(crank, BEGIN) is None
     return [pipeline.tick(BEGIN + i * MS).looks[0].reading for i in range(ticks)]

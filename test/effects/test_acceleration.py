@@ -24,26 +24,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import acceleration, velocity
-from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS, Reading
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.effects.stage import Motion, Reading
 from linkage_ros.kinematics.status import Status
-from linkage_ros.parameters import declared
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
+from ..support.messages import STORE
+from ..support.scenes import closure_of
 
-
-def closure(text):
-    return Closure(read_linkage(parse_yaml(text.encode(), 'linkage.yaml')))
-
-
-FOUR_BAR = closure('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
-SLIDER = closure('inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}')
-STRETCHED_AT_0 = closure('four_bar: {a: 1, b: 1, c: 1, d: 3}')
-EVERY_OTHER = closure('four_bar: {a: 1, b: 1, c: 1, d: 2}')
+FOUR_BAR = closure_of('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
+SLIDER = closure_of('inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}')
+STRETCHED_AT_0 = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 3}')
+EVERY_OTHER = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 2}')
 
 
 def moved(loop, angle, rate, alpha=0.0):
@@ -133,16 +124,6 @@ def test_the_message_is_the_motion_at_one_point():
     assert tuple(point.accelerations) == accelerations
     assert len(point.effort) == 0
     assert (point.time_from_start.sec, point.time_from_start.nanosec) == (0, 0)
-
-
-def test_it_has_no_parameters():
-    assert declared(acceleration.PARAMETERS) == []
-
-
-def test_it_is_registered_behind_velocity_which_it_needs():
-    assert EFFECTS['acceleration'] == acceleration.__name__
-    assert list(EFFECTS).index('acceleration') > list(EFFECTS).index('velocity')
-    assert NEEDS['acceleration'] == ('velocity',)
 
 
 CRANK = CrankState((1.0,), (2.0,), (0.0,), 0)

@@ -22,16 +22,14 @@ used for them.
 
 from __future__ import annotations
 
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
 from mpmath import MPContext
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
 from .four_bar_by_hand import FourBar
-from .loaded import GRAVITY, linkage, LINKAGES
+from .loaded import GRAVITY
+from ..support.messages import read_joint_state, STORE
+from ..support.scenes import LINKAGES, pipeline_of, shipped
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
 
@@ -82,11 +80,7 @@ TEXTBOOKS = {
 
 
 def pipeline(name, text):
-    files = {
-        'scene.yaml': f'linkage: l.yaml\npublish_input: false\n{DRIVE}{text}'.encode(),
-        'linkage.yaml': (LINKAGES / f'{name}.yaml').read_bytes(),
-    }
-    return Pipeline(parse_scene('t', 't', files))
+    return pipeline_of(text, (LINKAGES / f'{name}.yaml').read_bytes())
 
 
 def doubles(values):
@@ -95,11 +89,12 @@ def doubles(values):
 
 @pytest.mark.parametrize('name', TEXTBOOKS)
 def test_rates_and_accelerations_are_derivatives_of_the_textbooks_pose(name):
-    built = pipeline(name, 'effects: {velocity: {}, acceleration: {}}')
+    effects = 'effects: {velocity: {}, acceleration: {}}'
+    built = pipeline(name, f'publish_input: false\n{DRIVE}{effects}')
     solved = TEXTBOOKS[name]
     for number in range(0, 400, 9):
         tick = built.tick(BEGIN + number * MS)
-        state = STORE.deserialize_cdr(tick.message, 'sensor_msgs/msg/JointState')
+        state = read_joint_state(tick.message)
         (extra,) = tick.extras
         motion = STORE.deserialize_cdr(extra, 'trajectory_msgs/msg/JointTrajectory')
         t = mpf(number) / 1000
@@ -126,11 +121,7 @@ def test_friction_of_a_piston_and_of_pins_takes_the_power_that_it_burns():
     joints = ', '.join(f'{n}: {{viscous: {c}, coulomb: {t}}}' for n, (c, t) in rubbing.items())
     efforts = []
     for effects in ('', f', friction: {{joints: {{{joints}}}}}'):
-        files = {
-            'scene.yaml': f'linkage: l.yaml\n{DRIVE}effects: {{effort: {{}}{effects}}}'.encode(),
-            'linkage.yaml': (LINKAGES / 'slider_crank.yaml').read_bytes(),
-        }
-        built = Pipeline(parse_scene('t', 't', files))
+        built = pipeline('slider_crank', f'{DRIVE}effects: {{effort: {{}}{effects}}}')
         ticks = [built.tick(BEGIN + number * 7 * MS) for number in range(40)]
         efforts.append([tick.looks[0].reading.efforts[0] for tick in ticks])
     for number, (bare, rubbed) in enumerate(zip(*efforts, strict=True)):
@@ -146,7 +137,7 @@ def test_friction_of_a_piston_and_of_pins_takes_the_power_that_it_burns():
 def test_a_link_that_stretches_makes_the_four_bar_of_the_longer_link(link):
     # The tension is that of the balance by hand, the pose that of the textbook with another
     # length. The effect is right to first order: its error falls with the square of the stretch.
-    drawn = linkage('four_bar')
+    drawn = shipped('four_bar')
     at, rate, pull = 1.0, 9.0, 0.0
     by_hand = FourBar(drawn, (at, rate, pull), GRAVITY)
     _, coupler, rocker = (complex(mp.cos(a), mp.sin(a)) for a in map(mpf, by_hand.angles(0)))
@@ -156,15 +147,12 @@ def test_a_link_that_stretches_makes_the_four_bar_of_the_longer_link(link):
     rigid = doubles(by_hand.angles(0))
     errors = []
     for stiffness in (2e3, 4e3):
-        files = {
-            'scene.yaml': (
-                'linkage: l.yaml\npublish_input: false\nloads: {gravity: [0, -9.81]}\n'
-                f'drive: {{constant_rate: {{rate: {rate}, start: {at}}}}}\n'
-                f'effects: {{compliance: {{links: {{{link}: {stiffness}}}}}}}'
-            ).encode(),
-            'linkage.yaml': (LINKAGES / 'four_bar.yaml').read_bytes(),
-        }
-        reading = Pipeline(parse_scene('t', 't', files)).tick(BEGIN).looks[0].reading
+        scene = (
+            'publish_input: false\nloads: {gravity: [0, -9.81]}\n'
+            f'drive: {{constant_rate: {{rate: {rate}, start: {at}}}}}\n'
+            f'effects: {{compliance: {{links: {{{link}: {stiffness}}}}}}}'
+        )
+        reading = pipeline('four_bar', scene).tick(BEGIN).looks[0].reading
         stretched = FourBar(drawn, (at, rate, pull), GRAVITY)
         if link == 'coupler':
             stretched.b += tension / stiffness

@@ -18,37 +18,21 @@
 from __future__ import annotations
 
 from math import pi, remainder, sin, tau
-from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import backlash
 from linkage_ros.effects.backlash import BacklashParameters
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.parameters import read_parameters
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.scene import parts_of
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
+from ..support.messages import read_joint_state
+from ..support.scenes import closure_of, pipeline_of, shipped
 
-
-def closure(text):
-    return Closure(read_linkage(parse_yaml(text.encode(), 'linkage.yaml')))
-
-
-FOUR_BAR = closure('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
-TWO_CRANKS = closure(
-    (Path(__file__).parents[2] / 'config' / 'linkages' / 'five_bar.yaml').read_text()
-)
-CYLINDER = closure("""
+FOUR_BAR = closure_of('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
+TWO_CRANKS = Closure(shipped('five_bar'))
+CYLINDER = closure_of("""
 links:
   ground: {K: [0, 0], I: [1, 0]}
   tube: {K: [0, 0]}
@@ -179,35 +163,15 @@ def test_the_age_of_the_sample_is_passed_on():
     assert stage(0.2)(crank(1.0, age=123)).age == 123
 
 
-def test_it_is_read_from_a_scene():
-    def read(text):
-        section = parse_yaml(text.encode(), 'scene.yaml')
-        return read_parameters(section, BacklashParameters, parts_of(TWO_CRANKS.linkage))
-
-    right = TWO_CRANKS.linkage.inputs[1].joint
-    assert read(f'{{play: 0.01, inputs: {{{right}: 0.02}}}}') == BacklashParameters(
-        0.01, {right: 0.02}
-    )
-    for text, message in (
-        ('{}', "the key 'play' is missing; add play: a number in .rad or m."),
-        ('play: -0.1', 'play: -0.1 is out of bounds; .*at least 0 and at most 6'),
-        ('{play: 0.1, inputs: {x: 0.1}}', "inputs.x: there is no input 'x'; there are: "),
-    ):
-        with pytest.raises(FileError, match=message):
-            read(text)
-
-
 def test_a_scene_publishes_the_crank_behind_its_motor():
-    files = {
-        'scene.yaml': b'linkage: l.yaml\ndrive: {sine: {mean: 1, amplitude: 0.5, frequency: 1}}\n'
-        b'effects: {backlash: {play: 0.2}, velocity: {}}',
-        'linkage.yaml': b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}',
-    }
-    pipeline = Pipeline(parse_scene('scene', 'here', files))
+    pipeline = pipeline_of(
+        'drive: {sine: {mean: 1, amplitude: 0.5, frequency: 1}}\n'
+        'effects: {backlash: {play: 0.2}, velocity: {}}'
+    )
     cranks, rates = [], []
     for i in range(100):
         message = pipeline.tick(10**9 + i * 10**7).message
-        state = STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+        state = read_joint_state(message)
         assert state.name[0] == 'crank_joint'
         cranks.append(state.position[0])
         rates.append(list(state.velocity))
@@ -221,9 +185,3 @@ def test_a_scene_publishes_the_crank_behind_its_motor():
     assert {cranks[i] for i in waiting} == {cranks[25]}
     assert all(rates[i] == [0.0, 0.0, 0.0] for i in waiting)
     assert min(cranks) == pytest.approx(0.6)
-
-
-def test_it_is_registered_before_the_crank_moves_anything():
-    assert list(EFFECTS)[:2] == ['tolerance', 'backlash']
-    assert EFFECTS['backlash'] == backlash.__name__
-    assert backlash.PARAMETERS is BacklashParameters

@@ -19,11 +19,9 @@ from __future__ import annotations
 
 from linkage_ros.effects import bias
 from linkage_ros.effects.bias import BiasParameters
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import FileError
 import pytest
 
-from .sensors import BEGIN, context, MS, published, reading, SLIDE, written
+from .sensors import BEGIN, context, MS, published, reading, SLIDE
 
 
 @pytest.mark.parametrize(
@@ -52,28 +50,8 @@ def test_the_rest_of_the_reading_is_passed_on():
     assert sensor(BEGIN, reading(BEGIN, 1.0, 2.0)) == reading(BEGIN, 1.0, 2.25)
 
 
-def test_in_a_scene():
+def test_a_scene_publishes_biased_joints_and_true_rates():
     ideal = published('')
     for i, off in zip(ideal, published('bias: {joints: {coupler_joint: 0.5}}'), strict=True):
         assert off.joints == (i.joints[0] + 0.5, i.joints[1])
         assert off.rates == i.rates
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('{}', 'joints'),
-        ('joints: {rocker: 0.1}', "there is no joint 'rocker'; did you mean 'rocker_joint'"),
-        ('joints: {rocker_joint: .nan}', 'finite'),
-        ('joints: {rocker_joint: 1.0e+7}', 'at most 1e\\+06'),
-        ('joints: {rocker_joint: much}', 'not a number'),
-    ],
-)
-def test_what_it_is_given_is_checked(text, message):
-    with pytest.raises(FileError, match=message):
-        written(bias, text)
-
-
-def test_what_a_scene_writes():
-    assert written(bias, 'joints: {rocker_joint: -1}') == BiasParameters({'rocker_joint': -1.0})
-    assert EFFECTS['bias'] == bias.__name__

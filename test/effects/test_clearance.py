@@ -22,21 +22,15 @@ from math import hypot, sqrt
 
 from linkage_ros.effects import clearance
 from linkage_ros.effects.clearance import ClearanceParameters
-from linkage_ros.effects.stage import EFFECTS, NEEDS
-from linkage_ros.errors import DefinitionError, FileError
-from linkage_ros.parameters import read_parameters
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.scene import parts_of
-from linkage_ros.scene.yaml_file import parse_yaml
+from linkage_ros.errors import DefinitionError
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
 from .four_bar_by_hand import FourBar
-from .loaded import context, GRAVITY, linkage, linkage_of, LINKAGES, moved, SINGULAR
+from .loaded import context, GRAVITY, moved, SINGULAR
+from ..support.messages import read_joint_state
+from ..support.scenes import linkage_of, LINKAGES, pipeline_of, shipped
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-FOUR_BAR, SLIDER_CRANK = linkage('four_bar'), linkage('slider_crank')
+FOUR_BAR, SLIDER_CRANK = shipped('four_bar'), shipped('slider_crank')
 PINS = ('O2', 'A', 'B', 'O4')
 MOTIONS = [(1.0, 0.0, 0.0), (0.4, 0.0, 20.0), (2.5, -6.0, 30.0), (-1.2, 12.0, -80.0)]
 
@@ -218,30 +212,11 @@ def test_a_slider_is_refused(name):
         clearance.stage(ClearanceParameters({name: 1e-5}), context(SLIDER_CRANK))
 
 
-def test_it_is_read_from_a_scene():
-    def read(text):
-        section = parse_yaml(text.encode(), 'scene.yaml')
-        return read_parameters(section, ClearanceParameters, parts_of(SLIDER_CRANK))
-
-    assert read('pins: {A: 2.0e-5, B: 0}') == ClearanceParameters({'A': 2e-5, 'B': 0.0})
-    for text, message in (
-        ('{}', "the key 'pins' is missing"),
-        ('pins: {A: -1}', 'pins.A: -1 is out of bounds; .*at least 0'),
-        ('pins: {G: 1}', "pins.G: there is no pin 'G'; there are: "),
-    ):
-        with pytest.raises(FileError, match=message):
-            read(text)
-
-
 def test_a_scene_publishes_the_leaning_joints_and_the_rates_without_play():
     def tick(effects):
-        files = {
-            'scene.yaml': b'linkage: l\ndrive: {constant_rate: {rate: -6, start: 2.5}}\n'
-            + effects,
-            'linkage.yaml': (LINKAGES / 'four_bar.yaml').read_bytes(),
-        }
-        message = Pipeline(parse_scene('scene', 'here', files)).tick(10**9).message
-        return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+        scene = b'drive: {constant_rate: {rate: -6, start: 2.5}}\n' + effects
+        built = pipeline_of(scene, (LINKAGES / 'four_bar.yaml').read_bytes())
+        return read_joint_state(built.tick(10**9).message)
 
     loads = b'\nloads: {gravity: [0, -9.81]}'
     worn = tick(b'effects: {velocity: {}, clearance: {pins: {A: 1.0e-5, B: 2.0e-5}}}' + loads)
@@ -250,10 +225,3 @@ def test_a_scene_publishes_the_leaning_joints_and_the_rates_without_play():
     assert list(worn.position - tight.position) == pytest.approx(expected, abs=1e-15)
     assert max(map(abs, expected)) > 1e-5
     assert list(worn.velocity) == list(tight.velocity)
-
-
-def test_it_is_registered_behind_the_forces_that_it_needs():
-    assert EFFECTS['clearance'] == clearance.__name__
-    assert NEEDS['clearance'] == ('velocity', 'acceleration', 'pin_forces')
-    order = list(EFFECTS)
-    assert order.index('clearance') > order.index('compliance') > order.index('pin_forces')

@@ -21,22 +21,16 @@ from dataclasses import replace
 
 from linkage_ros.effects import compliance
 from linkage_ros.effects.compliance import ComplianceParameters
-from linkage_ros.effects.stage import EFFECTS, NEEDS
-from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.parameters import read_parameters
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.scene import parts_of
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
 from .four_bar_by_hand import FourBar, mp, turn
-from .loaded import context, GRAVITY, linkage, linkage_of, LINKAGES, moved, SINGULAR
+from .loaded import context, GRAVITY, moved, SINGULAR
+from ..support.messages import read_joint_state
+from ..support.scenes import linkage_of, LINKAGES, pipeline_of, shipped
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-FOUR_BAR, SLIDER_CRANK, WATT = (linkage(name) for name in ('four_bar', 'slider_crank', 'watt_1'))
+FOUR_BAR, SLIDER_CRANK, WATT = (shipped(name) for name in ('four_bar', 'slider_crank', 'watt_1'))
 SHARED_PIN = linkage_of("""
 links:
   ground: {O: [0, 0], D: [0.1, 0], E: [0.2, 0.02]}
@@ -170,8 +164,8 @@ def test_it_is_added_to_a_shift_and_the_rest_is_passed_on():
     ('of', 'link', 'reason'),
     [
         (WATT, 'coupler', "'coupler' has the pins A, B, C, and is no bar between two"),
-        (linkage('excavator_bucket'), 'cylinder_rod', "has the slider 'bore', and is no bar"),
-        (linkage('excavator_bucket'), 'cylinder_tube', "has the slider 'bore', and is no bar"),
+        (shipped('excavator_bucket'), 'cylinder_rod', "has the slider 'bore', and is no bar"),
+        (shipped('excavator_bucket'), 'cylinder_tube', "has the slider 'bore', and is no bar"),
     ],
 )
 def test_what_is_no_bar_between_two_pins_is_refused(of, link, reason):
@@ -179,47 +173,18 @@ def test_what_is_no_bar_between_two_pins_is_refused(of, link, reason):
         compliance.stage(ComplianceParameters({link: 1e4}), context(of))
 
 
-def test_it_is_read_from_a_scene():
-    def read(text):
-        section = parse_yaml(text.encode(), 'scene.yaml')
-        return read_parameters(section, ComplianceParameters, parts_of(FOUR_BAR))
-
-    assert read('links: {coupler: 2.0e6}') == ComplianceParameters({'coupler': 2e6})
-    for text, message in (
-        ('{}', "the key 'links' is missing"),
-        ('links: {coupler: 0}', 'links.coupler: 0 is out of bounds; .*more than 0'),
-        ('links: {ground: 1}', "links.ground: there is no link 'ground'; there are: crank, "),
-        ('links: {copler: 1}', r"links.copler: there is no link 'copler'; did you mean 'coupler'"),
-    ):
-        with pytest.raises(FileError, match=message):
-            read(text)
-
-
 def test_a_scene_publishes_the_shifted_joints_and_not_what_they_come_from():
     def tick(effects):
-        files = {
-            'scene.yaml': b'linkage: l\ndrive: {constant_rate: {rate: -6, start: 2.5}}\n'
-            + effects,
-            'linkage.yaml': (LINKAGES / 'four_bar.yaml').read_bytes(),
-        }
-        return Pipeline(parse_scene('scene', 'here', files)).tick(10**9)
+        scene = b'drive: {constant_rate: {rate: -6, start: 2.5}}\n' + effects
+        return pipeline_of(scene, (LINKAGES / 'four_bar.yaml').read_bytes()).tick(10**9)
 
     loads = b'\nloads: {gravity: [0, -9.81]}'
     soft = tick(b'effects: {compliance: {links: {coupler: 1.0e4}}}' + loads)
     rigid = tick(b'effects: {}')
     assert soft.extras == ()
-    one, other = (
-        STORE.deserialize_cdr(each.message, 'sensor_msgs/msg/JointState') for each in (soft, rigid)
-    )
+    one, other = (read_joint_state(each.message) for each in (soft, rigid))
     assert len(one.velocity) == len(one.effort) == 0
     # The crank is held, and published first.
     expected = (0.0, *shift(context(FOUR_BAR), (2.5, -6.0, 0.0), {'coupler': 1e4}))
     assert list(one.position - other.position) == pytest.approx(expected, abs=1e-15)
     assert max(map(abs, expected)) > 1e-6
-
-
-def test_it_is_registered_behind_the_forces_that_it_needs():
-    assert EFFECTS['compliance'] == compliance.__name__
-    assert NEEDS['compliance'] == ('velocity', 'acceleration', 'pin_forces')
-    order = list(EFFECTS)
-    assert all(order.index(need) < order.index('compliance') for need in NEEDS['compliance'])

@@ -23,11 +23,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.effects import delay
 from linkage_ros.effects.delay import DelayParameters
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import FileError
 import pytest
 
-from .sensors import ANGLES, BEGIN, context, MS, published, reading, written
+from .sensors import ANGLES, BEGIN, context, MS, published, reading
 
 
 def delayed(seconds, **parameters):
@@ -55,7 +53,7 @@ TIMELINES = [
 
 
 @pytest.mark.parametrize(('seconds', 'between', 'stamp', 'expected'), TIMELINES)
-def test_timeline(seconds, between, stamp, expected):
+def test_readings_come_as_late_as_the_timeline_says(seconds, between, stamp, expected):
     sensor = delayed(seconds, between=between, stamp=stamp)
     found = []
     for ms in range(5):
@@ -216,25 +214,3 @@ def test_between_ticks_a_scene_is_where_the_crank_then_was():
         assert found.joints == pytest.approx(position.joints, abs=3.1e4 * 0.001**4 / 384)
         rates = ANGLES.velocity(position, 10.0).joints
         assert found.rates == pytest.approx(rates, abs=2.3e3 * 0.001**2 / 8)
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('{}', 'seconds'),
-        ('seconds: -0.001', 'at least 0'),
-        ('seconds: 11', 'at most 10'),
-        ('seconds: .inf', 'finite'),
-        ('{seconds: 1, between: extrapolated}', 'interpolated or sampled or automatic'),
-        ('{seconds: 1, stamp: late}', 'arrival or measured'),
-        ('{seconds: 1, second: 2}', 'unknown key'),
-    ],
-)
-def test_what_it_is_given_is_checked(text, message):
-    with pytest.raises(FileError, match=message):
-        written(delay, text)
-
-
-def test_what_a_scene_writes():
-    assert written(delay, 'seconds: 0.002') == DelayParameters(0.002, 'automatic', 'arrival')
-    assert EFFECTS['delay'] == delay.__name__

@@ -22,11 +22,10 @@ from math import ceil, inf, log
 
 from linkage_ros.effects import dropout
 from linkage_ros.effects.dropout import DropoutParameters
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.errors import DefinitionError
 import pytest
 
-from .sensors import BEGIN, chi_square, context, likely, MS, published, reading, UNLIKELY, written
+from .sensors import BEGIN, chi_square, context, likely, MS, published, reading, UNLIKELY
 
 N = 100_000
 
@@ -108,7 +107,7 @@ def test_without_bursts_losses_are_independent():
 
 
 @pytest.mark.parametrize(('probability', 'expected'), [(0.0, {False}), (1.0, {True})])
-def test_none_and_all(probability, expected):
+def test_probabilities_of_zero_and_one_lose_none_and_all(probability, expected):
     assert set(losses(probability, n=1000)) == expected
 
 
@@ -165,7 +164,7 @@ def test_the_seed_decides():
     assert losses(0.3, 2.0, 200) != losses(0.3, 2.0, 200, seed='other')
 
 
-def test_in_a_scene():
+def test_a_scene_loses_some_readings_and_alters_none():
     ideal, text = published('', 150), 'dropout: {probability: 0.3, burst: 4}'
     lossy = published(text, 150)
     assert all(found in {None, read} for found, read in zip(lossy, ideal, strict=True))
@@ -196,23 +195,3 @@ def test_the_burst_that_is_advised_is_taken(hundredths):
     advised = float(raised.value.remedy.split()[1])
     assert advised == pytest.approx(hundredths / (100 - hundredths), rel=1e-5)
     line(hundredths / 100, advised)
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('{}', 'probability'),
-        ('probability: 1.1', 'at most 1'),
-        ('probability: -0.1', 'at least 0'),
-        ('{probability: 0.1, burst: -1}', 'at least 0'),
-        ('{probability: 0.1, hold: last}', 'silent or repeat'),
-    ],
-)
-def test_what_it_is_given_is_checked(text, message):
-    with pytest.raises(FileError, match=message):
-        written(dropout, text)
-
-
-def test_what_a_scene_writes():
-    assert written(dropout, 'probability: 0.1') == DropoutParameters(0.1, 0.0, 'silent')
-    assert EFFECTS['dropout'] == dropout.__name__

@@ -24,20 +24,18 @@ from hypothesis import strategies as st
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.dynamics.loads import Friction, JointFriction
 from linkage_ros.effects import effort
-from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS
+from linkage_ros.effects.stage import Motion
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
 import numpy as np
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
 from .four_bar_by_hand import FourBar, mp
-from .loaded import context, GRAVITY, linkage, linkage_of, LINKAGES, moved, SINGULAR
+from .loaded import context, GRAVITY, moved, SINGULAR
+from ..support.messages import read_joint_state, STORE
+from ..support.scenes import linkage_of, LINKAGES, pipeline_of, shipped
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-FOUR_BAR = linkage('four_bar')
+FOUR_BAR = shipped('four_bar')
 HANGING = linkage_of("""
 links:
   ground: {O: [0, 0], X: [1, 0]}
@@ -153,13 +151,8 @@ def test_forces_in_the_pins_are_not_computed_for_it():
     assert 'reactions' not in vars(within)
 
 
-def scene(text, linkage_text):
-    files = {'scene.yaml': b'linkage: l.yaml\n' + text, 'linkage.yaml': linkage_text}
-    return Pipeline(parse_scene('scene', 'here', files))
-
-
 def test_it_is_published_as_that_of_the_input_joint():
-    pipeline = scene(
+    pipeline = pipeline_of(
         b'drive: {sine: {mean: 1, amplitude: 0.5, frequency: 2}}\n'
         b'effects: {effort: {}}\nloads: {gravity: [0, -9.81]}',
         (LINKAGES / 'four_bar.yaml').read_bytes(),
@@ -167,7 +160,7 @@ def test_it_is_published_as_that_of_the_input_joint():
     within = context(FOUR_BAR)
     for i in range(1, 20):
         tick = pipeline.tick(i * 50_000_000)
-        message = STORE.deserialize_cdr(tick.message, 'sensor_msgs/msg/JointState')
+        message = read_joint_state(tick.message)
         assert message.name[0] == 'crank_joint'
         # What it starts from is computed, but published only where it is named.
         assert len(message.velocity) == 0
@@ -183,7 +176,7 @@ def test_it_is_published_as_that_of_the_input_joint():
 
 
 def test_under_the_torque_drive_it_is_the_torque_that_moves_the_linkage():
-    pipeline = scene(
+    pipeline = pipeline_of(
         b'drive: {torque: {start: 1}}\neffects: {effort: {}}\nloads: {gravity: [0, -9.81]}',
         (LINKAGES / 'four_bar.yaml').read_bytes(),
     )
@@ -199,7 +192,7 @@ def test_under_the_torque_drive_it_is_the_torque_that_moves_the_linkage():
         )
         data = bytes(STORE.serialize_cdr(message, 'sensor_msgs/msg/JointState'))
         assert pipeline.offer(data, now) is None
-        state = STORE.deserialize_cdr(pipeline.tick(now).message, 'sensor_msgs/msg/JointState')
+        state = read_joint_state(pipeline.tick(now).message)
         found.append((state.effort[0], torque, state.position[0]))
     for effort_there, torque, _ in found:
         assert effort_there == pytest.approx(torque, abs=1e-12)
@@ -208,13 +201,5 @@ def test_under_the_torque_drive_it_is_the_torque_that_moves_the_linkage():
 
 def test_without_masses_it_is_refused_in_one_line():
     with pytest.raises(FileError, match=r"masses.*'crank' has no mass") as caught:
-        scene(b'effects: {effort: {}}', b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
+        pipeline_of(b'effects: {effort: {}}', b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
     assert '\n' not in str(caught.value)
-
-
-def test_it_is_registered_behind_what_it_needs():
-    assert EFFECTS['effort'] == effort.__name__
-    assert NEEDS['effort'] == ('velocity', 'acceleration')
-    assert all(
-        list(EFFECTS).index(need) < list(EFFECTS).index('effort') for need in NEEDS['effort']
-    )

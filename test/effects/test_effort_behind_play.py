@@ -25,12 +25,12 @@ from __future__ import annotations
 from math import cos, sin, tau
 
 from linkage_ros.errors import FileError
-from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
+from ..support.messages import read_joint_state
+from ..support.scenes import pipeline_of, scene_of
+
 GRAVITY = 9.81
 MS = 1_000_000
 SECOND = 1000 * MS
@@ -62,12 +62,11 @@ FRICTION = 'friction: {joints: {O: {viscous: 0.02, coulomb: 0.3}}}'
 
 def published(linkage, text, times):
     """Return position and effort of each joint at times in [ns]."""
-    files = {'scene.yaml': f'linkage: l.yaml\n{text}'.encode(), 'linkage.yaml': linkage.encode()}
-    pipeline = Pipeline(parse_scene('scene', 'here', files))
+    pipeline = pipeline_of(text, linkage)
     found = []
     for time in times:
         message = pipeline.tick(SECOND + time).message
-        state = STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+        state = read_joint_state(message)
         found.append((list(state.position), list(state.effort)))
     return found
 
@@ -262,12 +261,8 @@ masses: {ram: {mass: 4, center: [0, 0], inertia: 0.001}}
 
 def test_torque_with_backlash_is_refused_in_one_line():
     for effects in ('{backlash: {play: 0.1}}', '{velocity: {}, backlash: {play: 0}}'):
-        files = {
-            'scene.yaml': f'linkage: l\ndrive: {{torque: {{}}}}\neffects: {effects}'.encode(),
-            'linkage.yaml': CRANK.encode(),
-        }
         with pytest.raises(FileError) as refused:
-            parse_scene('scene', 'here', files)
+            scene_of(f'drive: {{torque: {{}}}}\neffects: {effects}', CRANK)
         assert str(refused.value) == (
             'here: scene.yaml:3: effects.backlash: needs a model of motor and crank as two '
             'masses, and torque moves them as one; leave backlash out, or name another drive '

@@ -23,14 +23,12 @@ from __future__ import annotations
 
 from math import cos, pi
 
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-from ..test_joint_effort import serialized  # noqa: TID252
+from ..support.messages import joint_state as serialized
+from ..support.messages import read_joint_state
+from ..support.scenes import pipeline_of
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
 WEIGHT = 2.0 * 9.81 * 0.3
@@ -82,15 +80,14 @@ def timeline(linkage, torque, commands, until, friction=''):
     """
     text = f'drive: {{torque: {torque}}}\nloads: {{gravity: [0, -9.81], drive_inertia: 0.02}}\n'
     text += f'effects: {{velocity: {{}}, effort: {{}}{friction and ", friction: " + friction}}}\n'
-    files = {'scene.yaml': f'linkage: l.yaml\n{text}'.encode(), 'linkage.yaml': linkage.encode()}
-    pipeline = Pipeline(parse_scene('t', 't', files))
+    pipeline = pipeline_of(text, linkage)
     (joint,) = pipeline.lines[0].member.inputs
     found = {}
     for time in range(until):
         now = BEGIN + time * MS
         if time in commands:
-            assert pipeline.offer(serialized([joint], [commands[time]]), now) is None
-        state = STORE.deserialize_cdr(pipeline.tick(now).message, 'sensor_msgs/msg/JointState')
+            assert pipeline.offer(serialized([joint], efforts=[commands[time]]), now) is None
+        state = read_joint_state(pipeline.tick(now).message)
         found[time] = state.position[0], state.velocity[0], state.effort[0]
     return found
 

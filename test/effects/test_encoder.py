@@ -25,11 +25,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from linkage_ros.effects import encoder
 from linkage_ros.effects.encoder import EncoderParameters, JointEncoder
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import DefinitionError, FileError
+from linkage_ros.errors import DefinitionError
 import pytest
 
-from .sensors import ANGLES, BEGIN, context, MS, published, reading, SLIDE, written
+from .sensors import ANGLES, BEGIN, context, MS, published, reading, SLIDE
 
 EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')
 
@@ -303,29 +302,3 @@ def test_turns_are_counted_by_an_absolute_encoder_of_an_angle_only():
 def test_an_absolute_encoder_is_not_told_of_a_mark():
     with pytest.raises(DefinitionError, match=r'effects.encoder.joints.rocker_joint.index: '):
         angle_encoder(counts=8, index=False)
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('{}', 'joints'),
-        ('joints: {rocker_joint: {}}', 'counts'),
-        ('joints: {rocker_joint: 4096}', 'joints.rocker_joint'),
-        ('joints: {rocker_joint: {counts: 0}}', 'at least 1'),
-        ('joints: {rocker_joint: {counts: 10.5}}', '10.5 is not whole'),
-        ('joints: {rocker_joint: {counts: 8, offset: .nan}}', 'finite'),
-        ('joints: {rocker_joint: {counts: 8, incremental: 1}}', 'true or false'),
-        ('joints: {crank_joint: {counts: 8}}', "no joint 'crank_joint'"),
-        ('{joints: {rocker_joint: {counts: 8}}, rates: true}', 'differenced or exact'),
-    ],
-)
-def test_what_it_is_given_is_checked(text, message):
-    with pytest.raises(FileError, match=message):
-        written(encoder, text)
-
-
-def test_what_a_scene_writes():
-    assert written(encoder, 'joints: {rocker_joint: {counts: 4096}}') == EncoderParameters(
-        {'rocker_joint': JointEncoder(4096, 0.0, False, True)}, 'differenced'
-    )
-    assert EFFECTS['encoder'] == encoder.__name__

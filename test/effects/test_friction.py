@@ -20,33 +20,18 @@ from __future__ import annotations
 from linkage_ros.dynamics.loads import Friction, JointFriction
 from linkage_ros.effects import friction
 from linkage_ros.effects.friction import FrictionParameters, OneJoint
-from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import FileError
-from linkage_ros.parameters import read_parameters
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.scene import parts_of
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-from .loaded import context, linkage, LINKAGES, moved
+from .loaded import context, moved
+from ..support.messages import read_joint_state
+from ..support.scenes import LINKAGES, pipeline_of, shipped
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-SLIDER_CRANK = linkage('slider_crank')
-
-
-def read(text):
-    section = parse_yaml(text.encode(), 'scene.yaml')
-    return read_parameters(section, FrictionParameters, parts_of(SLIDER_CRANK))
+SLIDER_CRANK = shipped('slider_crank')
 
 
-def test_a_scene_names_pins_and_sliders():
-    # B is a pin too: of the rod and the block that the slot in the cylinder stands for.
-    parameters = read(
-        'joints: {A: {viscous: 0.002}, B: {coulomb: 0.1}, cylinder: {viscous: 3, coulomb: 4}}'
-    )
-    assert parameters == FrictionParameters(
+def test_each_joint_has_its_own_friction():
+    parameters = FrictionParameters(
         {'A': OneJoint(viscous=0.002), 'B': OneJoint(coulomb=0.1), 'cylinder': OneJoint(3.0, 4.0)}
     )
     assert parameters.friction == Friction(
@@ -58,25 +43,10 @@ def test_a_scene_names_pins_and_sliders():
     )
 
 
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('{}', "the key 'joints' is missing"),
-        ('joints: {cylindr: {}}', r"there is no pin 'cylindr'; did you mean 'cylinder'\?"),
-        ('joints: {A: {viscous: -1}}', 'joints.A.viscous: -1 is out of bounds; .*at least 0'),
-        ('joints: {A: 0.1}', 'joints.A: 0.1 is not a mapping'),
-        ('joints: {A: {coulmb: 1}}', r"joints.A.coulmb: unknown key; did you mean 'coulomb'\?"),
-    ],
-)
-def test_what_is_wrong_is_said_in_one_line(text, message):
-    with pytest.raises(FileError, match=message):
-        read(text)
-
-
 @pytest.mark.parametrize('rate', [5.0, -5.0])
 def test_a_cylinder_that_rubs_takes_that_much_more_power(rate):
     # The piston's rate is the slope of its place over time: the rod's pin on its line.
-    rubbing = read('joints: {cylinder: {viscous: 3, coulomb: 4}}').friction
+    rubbing = FrictionParameters({'cylinder': OneJoint(3.0, 4.0)}).friction
     with_it, without = (
         moved(context(SLIDER_CRANK, by), (1.0, rate, 7.0), {'effort': ()})
         for by in (rubbing, None)
@@ -90,13 +60,10 @@ def test_a_cylinder_that_rubs_takes_that_much_more_power(rate):
 
 
 def efforts_of(effects):
-    files = {
-        'scene.yaml': b'linkage: l.yaml\ndrive: {constant_rate: {rate: 3}}\n' + effects,
-        'linkage.yaml': (LINKAGES / 'slider_crank.yaml').read_bytes(),
-    }
-    pipeline = Pipeline(parse_scene('scene', 'here', files))
+    scene = b'drive: {constant_rate: {rate: 3}}\n' + effects
+    pipeline = pipeline_of(scene, (LINKAGES / 'slider_crank.yaml').read_bytes())
     ticks = [pipeline.tick(10**9 + i * 10**6) for i in range(50)]
-    messages = [STORE.deserialize_cdr(t.message, 'sensor_msgs/msg/JointState') for t in ticks]
+    messages = [read_joint_state(t.message) for t in ticks]
     return [message.effort[0] for message in messages]
 
 
@@ -111,8 +78,6 @@ def test_where_nothing_asks_for_forces_it_is_refused():
         efforts_of(b'effects: {velocity: {}, friction: {joints: {O2: {coulomb: 0.5}}}}')
 
 
-def test_it_is_registered_and_has_no_stage():
-    assert EFFECTS['friction'] == friction.__name__
-    assert friction.PARAMETERS is FrictionParameters
+def test_it_has_no_stage():
     for part in ('alter', 'drive_stage', 'stage', 'sensor', 'writer'):
         assert not hasattr(friction, part)

@@ -23,16 +23,13 @@ from __future__ import annotations
 
 from cmath import rect
 from math import pi, sin
-from pathlib import Path
 
 from linkage_ros.effects.delay import Delay, DelayParameters
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.shipped import shipped
 import pytest
 
 from .sensors import BEGIN, MS, reading
+from ..support.scenes import LINKAGES, pipeline_of
 
 A, B, C, D = 0.2, 0.15, 0.18, 0.25
 DOUBLE_ROCKER = b"""
@@ -68,9 +65,7 @@ def closes(crank):
 
 
 def pipeline(effects, drive=SINE, faults=''):
-    scene = f'linkage: linkage.yaml\nrate: 1000\n{drive}effects: {{{effects}}}\n{faults}'
-    files = {'scene.yaml': scene.encode(), 'linkage.yaml': DOUBLE_ROCKER}
-    return Pipeline(parse_scene('test', 'test', files))
+    return pipeline_of(f'rate: 1000\n{drive}effects: {{{effects}}}\n{faults}', DOUBLE_ROCKER)
 
 
 def run(effects, ticks=4000):
@@ -227,13 +222,8 @@ def test_a_replay_of_the_ticks_that_count_gives_the_same_messages(effects):
 
 def test_the_shipped_double_rocker_opens_and_arrives_whole():
     # The case that was met: of 1,178 messages 551 had stamps at which there was no pose.
-    scene = (
-        f'linkage: linkage.yaml\nrate: 1000\n{SINE}'
-        'effects: {delay: {seconds: 0.1, stamp: measured}}\n'
-    )
-    linkage = Path(shipped('linkages/double_rocker.yaml')).read_bytes()
-    files = {'scene.yaml': scene.encode(), 'linkage.yaml': linkage}
-    work = Pipeline(parse_scene('test', 'test', files))
+    scene = f'rate: 1000\n{SINE}effects: {{delay: {{seconds: 0.1, stamp: measured}}}}\n'
+    work = pipeline_of(scene, (LINKAGES / 'double_rocker.yaml').read_bytes())
     looks = [work.tick(BEGIN + i * MS).looks[0] for i in range(4000)]
     posed = {BEGIN + i * MS for i, look in enumerate(looks) if look.position.joints}
     stamps = [look.reading.stamp for look in looks if look.reading is not None]

@@ -22,11 +22,9 @@ from math import erf, sqrt
 
 from linkage_ros.effects import jitter
 from linkage_ros.effects.jitter import JitterParameters
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import FileError
 import pytest
 
-from .sensors import BEGIN, chi_square, context, MS, published, reading, UNLIKELY, written
+from .sensors import BEGIN, chi_square, context, MS, published, reading, UNLIKELY
 
 
 def earlier(seconds, distribution='uniform', seed='seed', n=20_000, period=MS):
@@ -134,22 +132,3 @@ def test_a_scene_is_misread_by_no_more_than_its_rates_make_of_it():
     assert 0.5e-3 * fastest < max(errors) <= 1e-3 * fastest
     assert published('jitter: {seconds: 0.001}') == shaken
     assert published('jitter: {seconds: 0.001}', seed=1) != shaken
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('{}', 'seconds'),
-        ('seconds: -1', 'at least 0'),
-        ('seconds: 2', 'at most 1'),
-        ('{seconds: 0.1, distribution: normal}', 'uniform or half_normal'),
-    ],
-)
-def test_what_it_is_given_is_checked(text, message):
-    with pytest.raises(FileError, match=message):
-        written(jitter, text)
-
-
-def test_what_a_scene_writes():
-    assert written(jitter, 'seconds: 0.002') == JitterParameters(0.002, 'uniform')
-    assert EFFECTS['jitter'] == jitter.__name__

@@ -32,11 +32,10 @@ from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-from .loaded import LINKAGES
+from ..support.messages import read_joint_state, STORE
+from ..support.scenes import LINKAGES, pipeline_of
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
 TYPE = 'visualization_msgs/msg/MarkerArray'
 SECOND = 1_000_000_000
 MS = 1_000_000
@@ -47,11 +46,7 @@ RED = (0.88, 0.14, 0.11)
 
 
 def built(linkage, text):
-    name = LINKAGES / f'{linkage}.yaml'
-    scene = f'linkage: {name.name}\n{text}\n'
-    return Pipeline(
-        parse_scene('scene', 'here', {'scene.yaml': scene.encode(), name.name: name.read_bytes()})
-    )
+    return pipeline_of(f'{text}\n', (LINKAGES / f'{linkage}.yaml').read_bytes())
 
 
 def extra(pipeline, tick, topic='~/markers'):
@@ -301,7 +296,7 @@ def test_what_does_not_move_comes_once_a_second():
         ('30', 'rate: 0.5', 6.0, 6.0),
     ],
 )
-def test_lifetimes(rate, scene, moves, stays):
+def test_markers_live_as_long_as_they_are_due(rate, scene, moves, stays):
     ((_, message),) = ticked(f'markers: {{rate: {rate}}}', [0], scene)
     for marker in message.markers:
         lifetime = marker.lifetime.sec + marker.lifetime.nanosec * 1e-9
@@ -338,7 +333,7 @@ def test_sensors_change_nothing_of_it():
 @pytest.mark.parametrize(
     ('said', 'frame'), [('markers: {}', 'ground'), ('markers: {frame: base_link}', 'base_link')]
 )
-def test_the_frame(said, frame):
+def test_markers_lie_in_the_frame_that_the_scene_says(said, frame):
     assert {marker.header.frame_id for marker in Held('four_bar', said).markers(1.0)} == {frame}
 
 
@@ -491,7 +486,7 @@ def test_an_effort_is_an_arc_the_way_it_pushes(start):
     effects = 'effects: {effort: {}, markers: {force_scale: 0.02}}'
     pipeline = built('four_bar', LOADED % (start, 0.0) + effects)
     tick = pipeline.tick(BEGIN)
-    state = STORE.deserialize_cdr(tick.message, 'sensor_msgs/msg/JointState')
+    state = read_joint_state(tick.message)
     markers = extra(pipeline, tick).markers
     (arc,) = named(markers, 'efforts')
     size = named(markers, 'pins')[0].scale.x / 1.1
@@ -511,7 +506,7 @@ def test_the_effort_of_a_cylinder_is_straight():
         'effects: {effort: {}, markers: {force_scale: 1.0e-4}}',
     )
     tick = pipeline.tick(BEGIN)
-    effort = STORE.deserialize_cdr(tick.message, 'sensor_msgs/msg/JointState').effort[0]
+    effort = read_joint_state(tick.message).effort[0]
     begin, end = places(named(extra(pipeline, tick).markers, 'efforts')[0])[:2]
     (line,) = pipeline.lines
     points = line.closure.points(line.closure.position(1.0))
@@ -532,11 +527,7 @@ def test_at_a_toggle_there_are_no_forces():
         drive = f'drive: {{profile: {{table: [[0, {value!r}], [9, {value!r}]]}}}}\n'
         loads = 'loads: {gravity: [0, -9.81]}\n'
         effects = f'{loads}effects: {{pin_forces: {{}}, effort: {{}}, markers: {{}}}}'
-        files = {
-            'scene.yaml': f'linkage: l.yaml\n{drive}{effects}\n'.encode(),
-            'l.yaml': f'{linkage}masses:\n{masses}'.encode(),
-        }
-        pipeline = Pipeline(parse_scene('scene', 'here', files))
+        pipeline = pipeline_of(f'{drive}{effects}\n', f'{linkage}masses:\n{masses}')
         markers = extra(pipeline, pipeline.tick(BEGIN)).markers
         arrows = [*named(markers, 'forces'), *named(markers, 'efforts')]
         assert [marker.action for marker in arrows] == [action] * 5

@@ -22,11 +22,9 @@ from math import sqrt
 
 from linkage_ros.effects import noise
 from linkage_ros.effects.noise import JointNoise, NoiseParameters
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import FileError
 import pytest
 
-from .sensors import BEGIN, context, likely, MS, published, reading, SLIDE, written
+from .sensors import BEGIN, context, likely, MS, published, reading, SLIDE
 
 N = 20_000
 REGULAR = [BEGIN + i * MS for i in range(N)]
@@ -164,7 +162,7 @@ def test_the_rest_of_the_reading_is_passed_on():
     assert found == reading(BEGIN + 5, 1.0, found.joints[1], **rest)
 
 
-def test_in_a_scene():
+def test_a_scene_has_the_noise_that_it_names_and_no_other():
     text = 'noise: {joints: {rocker_joint: {white: 0.01, walk: 0.1}}}'
     ideal, first = published('', 2000 // 10), published(text, 2000 // 10)
     errors = [a.joints[1] - b.joints[1] for a, b in zip(first, ideal, strict=True)]
@@ -174,27 +172,3 @@ def test_in_a_scene():
     assert [read.joints[0] for read in first] == [read.joints[0] for read in ideal]
     assert published(text, 200) == first
     assert published(text, 200, seed=1) != first
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('{}', 'joints'),
-        ('joints: {rocker_joint: {white: -1}}', 'at least 0'),
-        ('joints: {rocker_joint: {walk: .inf}}', 'finite'),
-        ('joints: {rocker_joint: {whte: 1}}', 'whte: unknown key'),
-        ('joints: {crank: {white: 1}}', "there is no joint 'crank'"),
-        ('joints: {rocker_joint: 0.1}', 'joints.rocker_joint'),
-    ],
-)
-def test_what_it_is_given_is_checked(text, message):
-    with pytest.raises(FileError, match=message):
-        written(noise, text)
-
-
-def test_what_a_scene_writes():
-    found = written(noise, 'joints: {rocker_joint: {white: 0.1}, coupler_joint: {walk: 2}}')
-    assert found == NoiseParameters(
-        {'rocker_joint': JointNoise(0.1, 0.0, 0.0), 'coupler_joint': JointNoise(0.0, 2.0, 0.0)}
-    )
-    assert EFFECTS['noise'] == noise.__name__

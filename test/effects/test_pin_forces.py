@@ -22,19 +22,19 @@ from cmath import rect
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.effects import pin_forces
-from linkage_ros.effects.stage import EFFECTS, Motion, NEEDS, Reading
+from linkage_ros.effects.stage import Motion, Reading
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
 from .four_bar_by_hand import FourBar
-from .loaded import context, GRAVITY, linkage, linkage_of, LINKAGES, moved, SINGULAR
+from .loaded import context, GRAVITY, moved, SINGULAR
+from ..support.messages import read_joint_state, STORE
+from ..support.scenes import linkage_of, LINKAGES, shipped
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
 TYPE = 'sensor_msgs/msg/MultiDOFJointState'
-FOUR_BAR = linkage('four_bar')
+FOUR_BAR = shipped('four_bar')
 PENDULUM = linkage_of("""
 links:
   ground: {O: [0, 0], X: [1, 0]}
@@ -112,7 +112,7 @@ def test_they_are_published_beside_the_joint_states():
     for i in range(10):
         now = begin + i * 10_000_000
         tick = at_work.tick(now)
-        state = STORE.deserialize_cdr(tick.message, 'sensor_msgs/msg/JointState')
+        state = read_joint_state(tick.message)
         (extra,) = tick.extras
         message = STORE.deserialize_cdr(extra, TYPE)
         assert message.header == state.header
@@ -143,10 +143,3 @@ def test_without_it_no_forces_are_computed(effects):
     at_work.tick(10**9)
     assert all('reactions' not in vars(line.context) for line in at_work.lines)
     assert '~/pin_forces' not in [each.topic for each in at_work.extras]
-
-
-def test_it_is_registered_behind_what_it_needs():
-    assert EFFECTS['pin_forces'] == pin_forces.__name__
-    assert NEEDS['pin_forces'] == ('velocity', 'acceleration')
-    order = list(EFFECTS)
-    assert all(order.index(need) < order.index('pin_forces') for need in NEEDS['pin_forces'])

@@ -24,11 +24,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.effects import rate_limit
 from linkage_ros.effects.rate_limit import RateLimitParameters
-from linkage_ros.effects.stage import EFFECTS
-from linkage_ros.errors import FileError
 import pytest
 
-from .sensors import BEGIN, context, MS, published, reading, written
+from .sensors import BEGIN, context, MS, published, reading
 
 
 def limited(rate, hold='repeat'):
@@ -56,7 +54,7 @@ def sampled_at(rate, times):
         pytest.param(0.001, [0, 1, 999_999, 1_000_000], [0, 0, 0, 1_000_000], id='slow'),
     ],
 )
-def test_timeline(rate, ticks, samples):
+def test_samples_are_taken_as_the_timeline_says(rate, ticks, samples):
     assert sampled_at(rate, [ms * MS for ms in ticks]) == [ms * MS for ms in samples]
 
 
@@ -104,28 +102,9 @@ def test_silent_between_samples():
     assert found[4].stamp == BEGIN + 4 * MS
 
 
-def test_in_a_scene():
+def test_a_scene_holds_readings_or_is_silent_between_samples():
     ideal = published('')
     for n, held in enumerate(published('rate_limit: {rate: 100}')):
         assert held == ideal[n // 10 * 10]._replace(stamp=BEGIN + n * MS)
     silent = published('rate_limit: {rate: 100, hold: silent}')
     assert silent == [read if n % 10 == 0 else None for n, read in enumerate(ideal)]
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('{}', 'rate'),
-        ('rate: 0', 'at least 0.001'),
-        ('rate: 30000', 'at most 20000'),
-        ('{rate: 10, hold: forget}', 'repeat or silent'),
-    ],
-)
-def test_what_it_is_given_is_checked(text, message):
-    with pytest.raises(FileError, match=message):
-        written(rate_limit, text)
-
-
-def test_what_a_scene_writes():
-    assert written(rate_limit, 'rate: 100') == RateLimitParameters(100.0, 'repeat')
-    assert EFFECTS['rate_limit'] == rate_limit.__name__

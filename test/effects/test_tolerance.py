@@ -24,27 +24,18 @@ from pathlib import Path
 from random import Random
 
 from linkage_ros.effects import tolerance
-from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.effects.tolerance import alter, ToleranceParameters
 from linkage_ros.errors import DefinitionError, FileError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.parameters import read_parameters
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.scene import parts_of
-from linkage_ros.scene.yaml_file import parse_yaml
 import mpmath
 import pytest
+
+from ..support.scenes import linkage_of, pipeline_of
 
 GALLERY = sorted((Path(__file__).parents[2] / 'config' / 'linkages').glob('*.yaml'))
 
 
-def linkage(text):
-    return read_linkage(parse_yaml(text.encode(), 'linkage.yaml'))
-
-
-FOUR_BAR = linkage('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
+FOUR_BAR = linkage_of('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
 
 
 def made(parameters, seed='seed', drawn=FOUR_BAR):
@@ -60,12 +51,6 @@ def deviations(altered, drawn=FOUR_BAR):
         for link, points in drawn.links.items()
         for point, place in points.items()
     }
-
-
-def read(text, drawn=FOUR_BAR):
-    return read_parameters(
-        parse_yaml(text.encode(), 'scene.yaml'), ToleranceParameters, parts_of(drawn)
-    )
 
 
 def test_the_same_seed_makes_the_same_linkage_and_another_one_another():
@@ -86,7 +71,7 @@ def test_nothing_else_than_the_points_changes():
 
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
 def test_without_a_deviation_the_linkage_is_the_drawn_one(file):
-    drawn = read_linkage(parse_yaml(file.read_bytes(), file.name))
+    drawn = linkage_of(file.read_bytes())
     assert made(ToleranceParameters(), drawn=drawn) == drawn
 
 
@@ -168,7 +153,7 @@ def test_what_is_given_takes_the_place_of_what_is_drawn():
 def test_given_lengths_are_those_of_a_linkage_written_so():
     # The coupler 0.1 mm longer, the ground 0.2 mm shorter.
     altered = made(ToleranceParameters(given={'coupler.B': (1e-4, 0), 'ground.O4': (-2e-4, 0)}))
-    written = linkage('four_bar: {a: 0.04, b: 0.1201, c: 0.08, d: 0.0998}')
+    written = linkage_of('four_bar: {a: 0.04, b: 0.1201, c: 0.08, d: 0.0998}')
     for crank in (0.0, 1.0, 2.5, 4.0):
         found, expected = (Closure(each).position(crank).joints for each in (altered, written))
         assert found == pytest.approx(expected, abs=1e-13)
@@ -177,7 +162,7 @@ def test_given_lengths_are_those_of_a_linkage_written_so():
 def test_a_pin_beside_the_axis_of_its_link_turns_what_is_published():
     # The rocker's frame stays that of the drawing: its pin lies 1 mm to the left of its axis.
     altered = made(ToleranceParameters(given={'rocker.B': (0.0, 1e-3)}))
-    straight = linkage(f'four_bar: {{a: 0.04, b: 0.12, c: {hypot(0.08, 1e-3)!r}, d: 0.1}}')
+    straight = linkage_of(f'four_bar: {{a: 0.04, b: 0.12, c: {hypot(0.08, 1e-3)!r}, d: 0.1}}')
     coupler, rocker = Closure(altered).position(1.0).joints
     expected_coupler, expected_rocker = Closure(straight).position(1.0).joints
     assert coupler == pytest.approx(expected_coupler, abs=1e-13)
@@ -186,7 +171,7 @@ def test_a_pin_beside_the_axis_of_its_link_turns_what_is_published():
 
 @pytest.mark.parametrize('file', GALLERY, ids=lambda file: file.stem)
 def test_a_linkage_of_the_gallery_closes_as_it_was_made(file):
-    drawn = read_linkage(parse_yaml(file.read_bytes(), file.name))
+    drawn = linkage_of(file.read_bytes())
     closure = Closure(made(ToleranceParameters(1e-6), drawn=drawn))
     if len(drawn.inputs) > 1:
         inputs = (1.5,) * len(drawn.inputs)
@@ -200,7 +185,7 @@ def test_a_linkage_of_the_gallery_closes_as_it_was_made(file):
 
 def test_a_parallelogram_as_it_was_made_is_none_any_more():
     # A change point is a matter of exact lengths: the two assemblies no longer meet there.
-    drawn = linkage('four_bar: {a: 0.3, b: 1.6, c: 0.3, d: 1.6}')
+    drawn = linkage_of('four_bar: {a: 0.3, b: 1.6, c: 0.3, d: 1.6}')
     follower = [Closure(drawn).position(pi * i / 50).joints[1] for i in range(101)]
     assert all(b > a for a, b in pairwise(follower[:50]))
     altered = Closure(made(ToleranceParameters(given={'coupler.B': (1e-3, 0.0)}), drawn=drawn))
@@ -224,35 +209,8 @@ def test_what_does_not_close_any_more_is_refused(parameters, reason):
         made(parameters)
 
 
-def test_it_is_read_from_a_scene():
-    assert read('{}') == ToleranceParameters()
-    assert read(
-        '{standard_deviation: 2.0e-5, links: [ground, coupler], given: {coupler.B: [0.0001, 0]}}'
-    ) == ToleranceParameters(2e-5, ('ground', 'coupler'), {'coupler.B': (1e-4, 0.0)})
-
-
-@pytest.mark.parametrize(
-    ('text', 'message'),
-    [
-        ('standard_deviation: -1', r'1: standard_deviation: -1 is out of bounds; .*at least 0'),
-        ('links: [couplr]', r"1: links: there is no body 'couplr'; did you mean 'coupler'\?"),
-        ('given: {coupler.C: [0, 0]}', r"1: given.coupler.C: there is no point 'coupler.C'; did"),
-        ('given: {coupler.B: 0.1}', r'1: given.coupler.B: 0.1 is not a point; write two finite'),
-        ('given: {coupler.B: [0, 2e9]}', r'1: given.coupler.B: \[0, 2000000000.0\] is out of'),
-        ('sigma: 1', r'1: sigma: unknown key; known: given, links, standard_deviation'),
-    ],
-)
-def test_what_is_wrong_is_said_in_one_line(text, message):
-    with pytest.raises(FileError, match=message):
-        read(text)
-
-
 def published(scene):
-    files = {
-        'scene.yaml': b'linkage: l.yaml\ndrive: {constant_rate: {rate: 3}}\n' + scene.encode(),
-        'linkage.yaml': b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}',
-    }
-    pipeline = Pipeline(parse_scene('scene', 'here', files))
+    pipeline = pipeline_of('drive: {constant_rate: {rate: 3}}\n' + scene)
     return [pipeline.tick(10**9 + i * 10**6).message for i in range(10)]
 
 
@@ -268,9 +226,3 @@ def test_a_scene_that_does_not_close_says_file_and_line():
         FileError, match=r'^here: scene.yaml:3: effects.tolerance: with its deviations the linkage'
     ):
         published('effects: {tolerance: {given: {coupler.B: [0.2, 0]}}}')
-
-
-def test_it_is_registered_before_all_that_move():
-    assert next(iter(EFFECTS)) == 'tolerance'
-    assert EFFECTS['tolerance'] == tolerance.__name__
-    assert tolerance.PARAMETERS is ToleranceParameters

@@ -23,23 +23,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import velocity
-from linkage_ros.effects.stage import EFFECTS, Motion
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.effects.stage import Motion
 from linkage_ros.kinematics.status import Status
-from linkage_ros.parameters import declared
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
+from ..support.scenes import closure_of
 
-def closure(text):
-    return Closure(read_linkage(parse_yaml(text.encode(), 'linkage.yaml')))
-
-
-FOUR_BAR = closure('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
-SLIDER = closure('inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}')
-STRETCHED_AT_0 = closure('four_bar: {a: 1, b: 1, c: 1, d: 3}')
-EVERY_OTHER = closure('four_bar: {a: 1, b: 1, c: 1, d: 2}')
+FOUR_BAR = closure_of('four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}')
+SLIDER = closure_of('inverted_slider_crank: {a: 0.15, swivel: [0.25, 0.1]}')
+STRETCHED_AT_0 = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 3}')
+EVERY_OTHER = closure_of('four_bar: {a: 1, b: 1, c: 1, d: 2}')
 
 
 def moved(loop, angle, rate):
@@ -93,11 +86,3 @@ def test_the_rest_of_the_motion_is_passed_on():
     motion = moved(FOUR_BAR, 1.0, 2.0)
     assert motion[:2] == (CrankState((1.0,), (2.0,), (0.0,), 0), position)
     assert motion.velocity == FOUR_BAR.velocity(position, 2.0)
-
-
-def test_it_has_no_parameters():
-    assert declared(velocity.PARAMETERS) == []
-
-
-def test_it_is_registered():
-    assert EFFECTS['velocity'] == velocity.__name__

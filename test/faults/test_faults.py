@@ -24,32 +24,26 @@ from __future__ import annotations
 
 from math import isnan
 
-from linkage_ros.errors import FileError
 from linkage_ros.faults.fault import Fault
 from linkage_ros.faults.freeze import FreezeParameters
 from linkage_ros.faults.injection import Change, Injection
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.load import parse_scene
 import pytest
+
+from ..support.scenes import scene_of
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
-LINKAGE = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
 TURNING = 'drive: {constant_rate: {rate: 1.0}}\neffects: {velocity: {}}\n'
 CRANK = JointStateReader(['crank_joint'])
 ROCKER = JointStateReader(['rocker_joint'])
 
 
-def scene(text):
-    files = {'scene.yaml': f'linkage: l.yaml\n{text}'.encode(), 'linkage.yaml': LINKAGE}
-    return parse_scene('test', 'test', files)
-
-
 def run(text, times, ask=None):
     """Tick at times, in [ms], and let somebody ask for faults; return a message for each."""
-    pipeline = Pipeline(scene(text))
+    pipeline = Pipeline(scene_of(text))
     injection = pipeline.injection
     messages = []
     for time in times:
@@ -79,7 +73,7 @@ def window(fault, at='[0.02]', seconds=0.02):
     return f'{TURNING}faults: {{mine: {{{fault}, at: {at}, seconds: {seconds}}}}}'
 
 
-def test_silence():
+def test_during_silence_no_message_is_published():
     assert angles(run(window('silence: {}'), TIMES)) == [0, 10, NOTHING, NOTHING, 40, 50]
 
 
@@ -105,7 +99,7 @@ def test_a_stuck_joint_stands_still_and_the_others_go_on():
 
 
 def test_a_broken_link_leaves_no_pose():
-    pipeline = Pipeline(scene(window('broken_link: {link: coupler}')))
+    pipeline = Pipeline(scene_of(window('broken_link: {link: coupler}')))
     looks = []
     for time in TIMES:
         pipeline.injection.advance(BEGIN + time * MS)
@@ -119,7 +113,7 @@ def test_a_broken_link_leaves_no_pose():
 
 def test_not_a_number_is_refused_and_the_last_good_sample_carried_forward():
     text = 'effects: {velocity: {}}\nfaults: {mine: {not_a_number: {}, at: [0.02], seconds: 0.02}}'
-    pipeline = Pipeline(scene(text))
+    pipeline = Pipeline(scene_of(text))
     writer = JointStateWriter(['crank_joint'])
     refused, published = [], []
     for time in TIMES:
@@ -141,7 +135,7 @@ def test_the_clock_jumps_and_jumps_back():
 
 
 def test_faults_begin_and_end_at_the_first_tick_that_is_not_before_their_time():
-    injection = Injection(scene(window('silence: {}', '[0.0151, 0.04]', 0.01)).faults)
+    injection = Injection(scene_of(window('silence: {}', '[0.0151, 0.04]', 0.01)).faults)
     changes = {t: injection.advance(BEGIN + t * MS) for t in (0, 15, 16, 25, 26, 39, 40, 49, 50)}
     on, off = [Change('mine', True)], [Change('mine', False)]
     assert changes == {0: [], 15: [], 16: on, 25: [], 26: off, 39: [], 40: on, 49: [], 50: off}
@@ -149,7 +143,7 @@ def test_faults_begin_and_end_at_the_first_tick_that_is_not_before_their_time():
 
 
 def test_windows_that_touch_are_two():
-    injection = Injection(scene(window('silence: {}', '[0.01, 0.02]', 0.01)).faults)
+    injection = Injection(scene_of(window('silence: {}', '[0.01, 0.02]', 0.01)).faults)
     assert injection.advance(BEGIN) == []
     assert injection.advance(BEGIN + 10 * MS) == [Change('mine', True)]
     both = [Change('mine', False), Change('mine', True)]
@@ -179,7 +173,7 @@ def test_of_windows_that_overlap_the_later_end_holds(at, seconds, on, times):
     assert injection.injected['hang'] == times
 
 
-def test_somebody_asks():
+def test_a_fault_that_is_asked_for_lasts_until_its_end_is_asked_for():
     text = f'{TURNING}faults: {{mine: {{silence: {{}}}}}}'
     ask = {20: [('mine', True)], 30: [('mine', True)], 40: [('mine', False)]}
     assert angles(run(text, TIMES, ask)) == [0, 10, NOTHING, NOTHING, 40, 50]
@@ -190,28 +184,3 @@ def test_several_faults_at_once():
     late = 'late: {time_jump: {by: 1}, at: [0.01], seconds: 0.03}'
     messages = run(f'{TURNING}faults: {{{quiet}, {late}}}', TIMES)
     assert stamps(messages) == [0, 1010, 1020, NOTHING, 40, 50]
-
-
-@pytest.mark.parametrize(
-    ('faults', 'expected'),
-    [
-        ('{mine: {silense: {}}}', "faults.mine.silense: unknown key; did you mean 'silence'?"),
-        ('{mine: {}}', 'faults.mine: 0 kinds; name one of'),
-        ('{my own: {silence: {}}}', "faults.my own: 'my own' is no ROS name; use letters"),
-        ('{1st: {silence: {}}}', "faults.1st: '1st' is no ROS name; use letters"),
-        ('{mine: {silence: {}, freeze: {}}}', 'faults.mine: 2 kinds; name one of'),
-        ('{mine: {stuck: {joint: rokker_joint}}}', "did you mean 'rocker_joint'?"),
-        ('{mine: {stuck: {}}}', "faults.mine.stuck: the key 'joint' is missing"),
-        ('{mine: {broken_link: {link: ground}}}', "there is no link 'ground'"),
-        ('{mine: {silence: {}, at: [-1], seconds: 1}}', 'begins before the first tick'),
-        ('{mine: {silence: {}, at: [1]}}', "the key 'seconds' is missing"),
-        ('{mine: {silence: {}, at: [1], seconds: 0}}', 'out of bounds'),
-        ('{mine: {time_jump: {by: 1e9}}}', 'out of bounds'),
-        ('{mine: {not_a_number: {}}}', 'not_a_number spoils messages, and constant_rate has none'),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_injected_is_refused_in_a_line(faults, expected):
-    with pytest.raises(FileError) as caught:
-        Pipeline(scene(f'{TURNING}faults: {faults}'))
-    assert expected in str(caught.value)
-    assert '\n' not in str(caught.value)

@@ -25,13 +25,13 @@ from __future__ import annotations
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.ros.tick_loop import TickLoop
-from linkage_ros.scene.load import parse_scene
 import pytest
+
+from ..support.scenes import scene_of
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
 OLD = 3
-LINKAGE = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
 TIMES = [0, 10, 15, 21, 35, 39, 41, 50]
 """When samples come, in [ms]; the crank turns at 1 rad/s."""
 IN_WINDOW = [21, 35, 39]
@@ -48,8 +48,7 @@ class Run:
     """A run at `rate: 0`: what is published, refused and told at each time a message comes."""
 
     def __init__(self, faults, times=TIMES, burst=1):
-        text = f'linkage: l.yaml\nrate: 0\npublish_input: true\n{faults}'
-        scene = parse_scene('t', 't', {'scene.yaml': text.encode(), 'linkage.yaml': LINKAGE})
+        scene = scene_of(f'rate: 0\npublish_input: true\n{faults}')
         waiting, self.messages, self.changes, self.published = [], [], {}, {}
         kept = []
 

@@ -34,6 +34,8 @@ from linkage_ros.scene.linkage_text import scene_text_for
 from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
+from ..support.scenes import closure_of
+
 TEXT = """
 links:
   ground: {{I: [0, 0], K: {K}{more}}}
@@ -151,6 +153,6 @@ joints: {crank_joint: {parent: ground, child: crank}}
 
 def test_a_slide_on_the_ground_is_no_cylinder():
     """A slider-crank that is driven by its slider goes to either side of its crank's pivot."""
-    closure = Closure(read_linkage(parse_yaml(SLOT.encode(), 's.yaml')))
+    closure = closure_of(SLOT)
     low, high = closure.input_ranges
     assert low.highest < 0.0 < high.lowest

@@ -29,14 +29,13 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.survey import Way
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
 from linkage_ros.solvers.newton import NewtonClosure
 from linkage_ros.solvers.table import TableClosure
 import numpy as np
 import pytest
 
 from .platforms import linkage_of, platform
+from ..support.scenes import closure_of
 
 CLOSED, LIMITED, TOGGLE, OPEN = Status.CLOSED, Status.LIMITED, Status.TOGGLE, Status.OPEN
 
@@ -55,7 +54,7 @@ joints: {slide: {slider: guideLIMITS}}
 
 
 def closed(text, limits=''):
-    return Closure(read_linkage(parse_yaml(text.replace('LIMITS', limits).encode(), 'f.yaml')))
+    return closure_of(text.replace('LIMITS', limits))
 
 
 # Linkage, limits, and for values of the input what is found there.
@@ -395,7 +394,7 @@ def test_rounding_of_typed_numbers_is_within():
     assert closure.position(nextafter(0.3 * (1 + 1e-15), inf)).status is LIMITED
 
 
-def test_several_inputs():
+def test_with_several_inputs_the_limits_of_each_joint_hold():
     text = """
 links:
   ground: {A: [0, 0], E: [0.3, 0]}

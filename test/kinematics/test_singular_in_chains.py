@@ -26,10 +26,10 @@ from math import cos, pi, remainder
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
 import numpy as np
 import pytest
+
+from ..support.scenes import closure_of
 
 PARALLELOGRAM = """
 links:
@@ -50,7 +50,7 @@ joints:
 
 def closure(slider: str, link: str = '', ground: str = '', side: str = ', S: ahead') -> Closure:
     text = PARALLELOGRAM.format(slider=slider, link=link, ground=ground, side=side)
-    return Closure(read_linkage(parse_yaml(text.encode(), 'file.yaml')))
+    return closure_of(text)
 
 
 def statuses_at(solved: Closure, value: float) -> set[Status]:

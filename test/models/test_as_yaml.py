@@ -29,16 +29,14 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from linkage_ros.cli.model_file import model_of
 from linkage_ros.errors import FileError
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.models.mjcf import mjcf
 from linkage_ros.models.part import Part, PartError
 from linkage_ros.models.urdf import urdf
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 import yaml
 
 from .gallery import LINKAGES
+from ..support.scenes import closure_of
 
 CONFIG = LINKAGES.parent
 FILES = [
@@ -85,7 +83,7 @@ joints:
 traced: [{p}]
 masses: {{{crank}: {{mass: 0.1, center: [0.02, 0], inertia: 1.5e-5}}}}
 """
-    return Closure(read_linkage(parse_yaml(text.encode(), 'it')))
+    return closure_of(text)
 
 
 def yaml_text(name):

@@ -348,7 +348,7 @@ class TestCommand:
         assert '<mujoco model="leg">' in capsys.readouterr().out
         assert [path.name for path in tmp_path.iterdir() if path.name.startswith('.')] == []
 
-    def test_of_others(self, tmp_path, capsys):
+    def test_models_of_others_become_linkages(self, tmp_path, capsys):
         file = tmp_path / 'g.urdf'
         file.write_text(GRIPPER)
         typed = ['import', str(file), '--close', 'bar_end=finger_end', '--input', 'motor_joint']

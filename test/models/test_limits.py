@@ -30,19 +30,19 @@ from linkage_ros.models.mjcf import mjcf
 from linkage_ros.models.part import Part
 from linkage_ros.models.urdf import urdf
 from linkage_ros.models.urdf_file import read_urdf
-from linkage_ros.scene.linkage_file import load, read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
+from linkage_ros.scene.linkage_file import load
 import mujoco
 import pytest
 
 from .gallery import GALLERY, LINKAGES
+from ..support.scenes import closure_of
 
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, SAID}'
 
 
 def closed(said):
     text = FOUR_BAR.replace(', SAID', said)
-    return Closure(read_linkage(parse_yaml(text.encode(), 'f.yaml')))
+    return closure_of(text)
 
 
 def limits_in(data):

@@ -176,14 +176,14 @@ def test_gravity_and_springs_are_those_of_the_scene():
     assert model.body('coupler').inertia.max() == closure.linkage.masses['coupler'].inertia
 
 
-def test_two_gravities():
+def test_linkages_of_two_gravities_are_refused():
     (closure,) = moving(LINKAGES / 'four_bar.yaml').closures
     parts = [Part(closure, 'a_', Loads((0.0, -9.81))), Part(closure, 'b_', Loads((0.0, 9.81)))]
     with pytest.raises(LinkageError, match=r'\[0 9.81\] is another than that of the first .*one'):
         mjcf('it', parts)
 
 
-def test_a_scene_of_two(tmp_path):
+def test_a_scene_of_two_linkages_is_one_model(tmp_path):
     data = model_of(str(LINKAGES.parent / 'scenes' / 'two_fingers.yaml'), mjcf)
     model, state = started(data)
     assert model.nu == 2

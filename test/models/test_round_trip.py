@@ -19,15 +19,13 @@ from __future__ import annotations
 
 from math import remainder, tau
 
-from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import samples, Way
 from linkage_ros.models.imported import imported
 from linkage_ros.models.part import Part
 from linkage_ros.models.urdf import urdf
 from linkage_ros.models.urdf_file import read_urdf
-from linkage_ros.scene.linkage_file import load, read_linkage
+from linkage_ros.scene.linkage_file import load
 from linkage_ros.scene.linkage_text import linkage_text
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
 from .gallery import GALLERY, LINKAGES, size_of
@@ -40,7 +38,7 @@ def back(closure):
     """Return a linkage that went through URDF and through the text of a linkage file."""
     made = imported(read_urdf(urdf('it', [Part(closure)]), 'it.urdf'))
     text = linkage_text(made.linkage)
-    return Closure(read_linkage(parse_yaml(text.encode(), 'it.yaml')))
+    return closure_of(text)
 
 
 def inputs_of(closure):
@@ -65,7 +63,7 @@ def differences(one, other):
 
 
 @pytest.mark.parametrize('name', [*GALLERY, 'five_bar'])
-def test_the_gallery(name):
+def test_every_shipped_linkage_comes_back_with_the_same_joints_and_masses(name):
     closure = load(LINKAGES / f'{name}.yaml')
     again = back(closure)
     assert list(again.linkage.joints) == list(closure.linkage.joints)

@@ -29,15 +29,15 @@ from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.models.part import Part, PartError
 from linkage_ros.models.urdf import urdf
 from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.linkage_file import load, read_linkage
-from linkage_ros.scene.load import load_scene, parse_scene
+from linkage_ros.scene.linkage_file import load
+from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.robot_model import scene_model
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
 from .gallery import GALLERY, LINKAGES, size_of
 from .odd import closure_of, ODD, UNTOLD
 from .walked import BEGIN, heard, moving, moving_text, MS, said, Walked
+from ..support.scenes import linkage_of, scene_of
 
 SCENES = LINKAGES.parent / 'scenes'
 CASES = [*GALLERY, 'five_bar', *ODD]
@@ -131,8 +131,7 @@ def test_joints_keep_their_limits_and_come_near_them(name):
 
 def from_topic(text, angles):
     """Return a scene of a linkage that messages turn."""
-    scene = f'linkage: linkage.yaml\nrate: 0\npublish_input: true\nangles: {angles}\n'
-    return parse_scene('it', 'it', {'scene.yaml': scene.encode(), 'linkage.yaml': text})
+    return scene_of(f'rate: 0\npublish_input: true\nangles: {angles}\n', text)
 
 
 def swept(pipeline, name, values):
@@ -189,7 +188,7 @@ def test_given_limits_that_a_wrapped_angle_leaves(angles, limits, kind):
     assert limit.get('effort') == '2'
 
 
-def test_limits_by_hand():
+def test_limits_are_those_worked_out_by_hand():
     """The rocker of a crank-rocker turns back where crank and coupler are in line."""
     limits = limits_of(urdf('it', [Part(closure('four_bar'))]))
     # Of the triangles 0.16, 0.1, 0.08 and 0.08, 0.1, 0.08: the angle at O4, from the ground's x.
@@ -210,14 +209,14 @@ def test_limits_by_hand():
 @pytest.mark.parametrize('name', UNTOLD)
 def test_joints_that_do_not_tell_all(name):
     text, remedy = UNTOLD[name]
-    linkage = read_linkage(parse_yaml(text.encode(), 'it'))
+    linkage = linkage_of(text)
     with pytest.raises(PartError) as caught:
         urdf('it', [Part(Closure(linkage))])
     assert str(caught.value) == f'joints: the published ones do not tell where {remedy}'
     # What the remedy says is one.
     added = str(caught.value).partition('add to joints: ')[2]
     whole = text.replace('joints: {', f'joints: {{{added}, ')
-    urdf('it', [Part(Closure(read_linkage(parse_yaml(whole.encode(), 'it'))))])
+    urdf('it', [Part(closure_of(whole))])
 
 
 def test_a_scene_of_two_has_prefixes_and_one_root():

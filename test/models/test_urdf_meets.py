@@ -71,7 +71,7 @@ def check(data, closure, messages, within=1e-12):
 
 
 @pytest.mark.parametrize('name', GALLERY)
-def test_the_gallery(name):
+def test_every_cut_pin_of_the_shipped_linkages_meets(name):
     file = LINKAGES / f'{name}.yaml'
     pipeline = moving(file)
     (closure,) = pipeline.closures
@@ -80,7 +80,7 @@ def test_the_gallery(name):
     assert cuts, 'nothing closes'
 
 
-def test_several_inputs():
+def test_cut_pins_of_a_linkage_with_two_inputs_meet():
     file = LINKAGES / 'five_bar.yaml'
     turns = np.linspace(0.0, 6.28, 60)
     values = [(1.6 + 0.3 * cos(t), 1.5 + 0.3 * sin(1.7 * t)) for t in turns]

@@ -22,10 +22,11 @@ import io
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
-from rosbags.typesys import get_typestore, Stores
 import yourdfpy
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
+from ..support.messages import read_joint_state
+from ..support.scenes import pipeline_of
+
 BEGIN = 1_700_000_000_000_000_000
 MS = 1_000_000
 
@@ -67,7 +68,7 @@ def said(pipeline, every=50 * MS, count=126):
 
 def heard(message):
     """Return names and positions of a joint state, read by rosbags."""
-    state = STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+    state = read_joint_state(message)
     return list(state.name), list(state.position)
 
 
@@ -89,9 +90,7 @@ def moving_text(text):
 
 def several_inputs(text, names, values):
     """Yield what is said where several inputs come in messages."""
-    scene = b'linkage: linkage.yaml\nrate: 0\npublish_input: true\n'
-    files = {'scene.yaml': scene, 'linkage.yaml': text}
-    pipeline = Pipeline(parse_scene('it', 'it', files))
+    pipeline = pipeline_of('rate: 0\npublish_input: true\n', text)
     writer = JointStateWriter(names)
     for number, inputs in enumerate(values):
         now = BEGIN + number * 50 * MS

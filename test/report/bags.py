@@ -32,7 +32,7 @@ from linkage_ros.scene.load import load_scene
 from mcap.reader import make_reader
 import numpy as np
 
-from ..cli.recorded import BEGIN, JOINT_STATE, MS, scene_file, SECOND, STORE, topic  # noqa: TID252
+from ..cli.recorded import BEGIN, JOINT_STATE, MS, scene_file, SECOND, STORE, topic
 
 STATES, CRANK, FAULTS = '/joint_states', '/crank_states', '/linkage/faults'
 WITHHELD, RESETS, HEALTH = '/linkage/withheld', '/linkage/resets', '/diagnostics'

@@ -28,14 +28,13 @@ from linkage_ros.report.data import lanes
 from linkage_ros.report.reading import read_run
 from linkage_ros.report.run import Run, Window
 import numpy as np
-from rosbags.typesys import get_typestore, Stores
 
-from ..ros.ticked import Moment, run  # noqa: TID252
+from ..ros.ticked import Moment, run
+from ..support.messages import STORE
 
 MS = 1_000_000
 BEGIN = 1_700_000_000_000_000_000
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
-STORE = get_typestore(Stores.ROS2_JAZZY)
 TYPES = STORE.types
 
 

@@ -31,7 +31,7 @@ import numpy as np
 import pytest
 
 from .runs import BEGIN, MS, read
-from ..ros.ticked import Moment, run  # noqa: TID252
+from ..ros.ticked import Moment, run
 
 FILES = sorted(shipped('linkages/four_bar.yaml').parent.glob('*.yaml'))
 TICKS = 40

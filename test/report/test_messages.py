@@ -23,9 +23,9 @@ from linkage_ros.report.diagnostics_summary import statuses
 from linkage_ros.report.joint_states import JointStates, MOST_JOINTS
 import numpy as np
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
+from ..support.messages import STORE
+
 TYPES = STORE.types
 STATE, ARRAY = 'sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'
 

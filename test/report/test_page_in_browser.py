@@ -29,8 +29,8 @@ import numpy as np
 import pytest
 
 from . import bags
-from ..browser.chromium import browser as chromium  # noqa: TID252
-from ..browser.opened import opened  # noqa: TID252
+from ..browser.chromium import browser as chromium
+from ..browser.opened import opened
 
 pytest.importorskip('plotly', reason='is within the page')
 

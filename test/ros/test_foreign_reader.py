@@ -25,7 +25,7 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from .graph import crank, wait_for
-from ..bag.foreign_reader.agreement import (  # noqa: TID252
+from ..bag.foreign_reader.agreement import (
     assert_agreement,
     of_kind,
     read,

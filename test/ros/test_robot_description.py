@@ -34,7 +34,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from .graph import wait_for
-from ..models.walked import Walked  # noqa: TID252
+from ..models.walked import Walked
 
 JAZZY = get_typestore(Stores.ROS2_JAZZY)
 TOPIC = '/robot_description'

@@ -165,7 +165,7 @@ SCENES = {
 
 
 @pytest.mark.parametrize('kind', SCENES)
-def test_bad_scene(build, kind):
+def test_a_bad_scene_is_refused_in_a_line(build, kind):
     text, expected = SCENES[kind]
     with pytest.raises(FileError) as caught:
         build(SCENE + text)

@@ -119,7 +119,7 @@ LINKAGES = {
 
 
 @pytest.mark.parametrize('kind', LINKAGES)
-def test_bad_linkage(build, kind):
+def test_a_bad_linkage_is_refused_in_a_line(build, kind):
     text, expected = LINKAGES[kind]
     with pytest.raises(FileError) as caught:
         build(SCENE, text)

@@ -48,7 +48,7 @@ def either_runs_or_says_why(files: dict[str, bytes]) -> None:
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
-def test_damaged_bytes(data):
+def test_files_with_damaged_bytes_run_or_say_why_not(data):
     shipped = data.draw(st.sampled_from(SHIPPED))
     files = {name: bytearray(file) for name, file in shipped.items()}
     damaged = files[data.draw(st.sampled_from(sorted(files)))]

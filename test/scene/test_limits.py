@@ -21,13 +21,11 @@ from math import inf
 
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.linkage import Limits
-from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.linkage_text import linkage_text
-from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
 from .files import is_one_line
+from ..support.scenes import linkage_of, scene_of
 
 SHORT = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, SAID}'
 LONG = """
@@ -42,10 +40,6 @@ joints:
   coupler_joint: {parent: crank, child: couplerCOUPLER}
   rocker_joint: {parent: ground, child: rockerROCKER}
 """
-
-
-def read(text):
-    return read_linkage(parse_yaml(text.encode(), 'f.yaml'))
 
 
 def long(driven='', rocker='', coupler='', more=''):
@@ -66,23 +60,23 @@ SAID = {
 @pytest.mark.parametrize('name', SAID)
 def test_what_an_input_may_say(name):
     said, limits = SAID[name]
-    linkage = read(long(said))
+    linkage = linkage_of(long(said))
     assert linkage.inputs[0].limits == limits
-    assert read(linkage_text(linkage)) == linkage
-    assert read(SHORT.replace('SAID', f'input: {{{said[2:]}}}')) == linkage
+    assert linkage_of(linkage_text(linkage)) == linkage
+    assert linkage_of(SHORT.replace('SAID', f'input: {{{said[2:]}}}')) == linkage
 
 
 def test_what_a_published_joint_may_say():
     said = 'limits: [1, 2.1], velocity: 4, effort: 5'
-    linkage = read(long(rocker=f', {said}'))
+    linkage = linkage_of(long(rocker=f', {said}'))
     assert linkage.joints['rocker_joint'].limits == Limits(1.0, 2.1, 4.0, 5.0)
     assert linkage.limits == {'rocker_joint': Limits(1.0, 2.1, 4.0, 5.0)}
-    assert read(linkage_text(linkage)) == linkage
-    assert read(SHORT.replace('SAID', f'joints: {{rocker_joint: {{{said}}}}}')) == linkage
+    assert linkage_of(linkage_text(linkage)) == linkage
+    assert linkage_of(SHORT.replace('SAID', f'joints: {{rocker_joint: {{{said}}}}}')) == linkage
 
 
 def test_where_nothing_is_said_there_are_none():
-    linkage = read(long())
+    linkage = linkage_of(long())
     assert linkage.limits == {}
     assert linkage.inputs[0].limits == Limits(-inf, inf, inf, inf)
     assert 'limits' not in linkage_text(linkage)
@@ -148,10 +142,10 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('name', REFUSED)
-def test_refused(name):
+def test_limits_that_cannot_be_are_refused_in_a_line(name):
     said, expected = REFUSED[name]
     with pytest.raises(FileError) as error:
-        read(long(*said))
+        linkage_of(long(*said))
     assert expected in str(error.value)
     assert is_one_line(error.value)
 
@@ -159,7 +153,7 @@ def test_refused(name):
 def test_limits_that_the_range_never_meets():
     text = 'four_bar: {a: 0.1, b: 0.07, c: 0.06, d: 0.05, input: {limits: [2.5, 3]}}'
     with pytest.raises(FileError) as error:
-        read(text)
+        linkage_of(text)
     assert str(error.value) == (
         "f.yaml:1: four_bar.input.limits: [2.5, 3] of 'crank_joint' never meet its range, "
         '-2.0264 to 2.0264 rad; widen them'
@@ -182,25 +176,20 @@ assembly: {C: right}
 joints: {rod_joint: {parent: left, child: left_rod}}
 """
     with pytest.raises(FileError) as error:
-        read(text)
+        linkage_of(text)
     assert "no state was found within the limits of 'left_joint', 'right_joint'" in str(
         error.value
     )
     assert is_one_line(error.value)
 
 
-def scene(said, linkage):
-    files = {'scene.yaml': f'linkage: linkage.yaml\n{said}'.encode(), 'linkage.yaml': linkage}
-    return parse_scene('s', 's', files)
-
-
 LIMITED = SHORT.replace('SAID', 'input: {limits: [0, 1]}').encode()
 
 
 def test_what_is_published_beyond_them_is_a_choice():
-    assert not scene('', LIMITED).members[0].silent_beyond_limits
-    assert not scene('beyond_limits: publish', LIMITED).members[0].silent_beyond_limits
-    assert scene('beyond_limits: silent', LIMITED).members[0].silent_beyond_limits
+    assert not scene_of('', LIMITED).members[0].silent_beyond_limits
+    assert not scene_of('beyond_limits: publish', LIMITED).members[0].silent_beyond_limits
+    assert scene_of('beyond_limits: silent', LIMITED).members[0].silent_beyond_limits
 
 
 SCENES = {
@@ -217,6 +206,6 @@ SCENES = {
 def test_refused_in_a_scene(name):
     said, linkage, expected = SCENES[name]
     with pytest.raises(FileError) as error:
-        scene(said, linkage)
+        scene_of(said, linkage)
     assert expected in str(error.value)
     assert is_one_line(error.value)

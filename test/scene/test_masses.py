@@ -35,7 +35,7 @@ def masses_of(text):
     return read_linkage(parse_yaml(text.encode(), 'linkage.yaml')).masses
 
 
-def test_what_they_say():
+def test_masses_are_read_as_the_file_says():
     assert masses_of(f'{BEFORE}masses:\n  crank: {CRANK}\n') == {
         'crank': Mass(mass=0.1, center=(0.02, 0.0), inertia=1e-5)
     }
@@ -103,7 +103,7 @@ BAD = {
 
 
 @pytest.mark.parametrize('kind', BAD)
-def test_bad_masses(kind):
+def test_bad_masses_are_refused_in_a_line(kind):
     text, expected = BAD[kind]
     with pytest.raises(FileError) as caught:
         masses_of(f'{BEFORE}masses: {text}\n')

@@ -33,7 +33,7 @@ ANGLES = [-7.0, -pi, -1.0, 0.0, 1e-9, 0.5, 2.0, 3.0, 100.0]
 
 
 @pytest.mark.parametrize('file', sorted((CONFIG / 'scenes').glob('*.yaml')), ids=lambda f: f.stem)
-def test_shipped_scene(file):
+def test_every_shipped_scene_is_read_and_closes(file):
     scene = load_scene(file)
     assert scene.name == file.stem
     for closure in Pipeline(scene).closures:

@@ -273,7 +273,7 @@ def test_bad_linkages_of_a_scene(scene, build, valid):
         'linkage: linkage.yaml\ndrive: {}\neffects: {}',
     ],
 )
-def test_good_scenes(scene, build, valid):
+def test_the_schema_takes_good_scenes(scene, build, valid):
     build(scene.encode())
     assert valid('scene', content_of(scene.encode()))
 

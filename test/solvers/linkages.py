@@ -23,22 +23,15 @@ from pathlib import Path
 from hypothesis import strategies as st
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
 from mpmath import mp, mpf
 
-from ..kinematics.linkages import four_bar_linkage  # noqa: TID252
-from ..kinematics.reference import four_bar, turned  # noqa: TID252
+from ..kinematics.linkages import four_bar_linkage
+from ..kinematics.reference import four_bar, turned
 
 GALLERY = sorted((Path(__file__).parents[2] / 'config' / 'linkages').glob('*.yaml'))
 Lengths = tuple[float, float, float, float]
 
 CRANK_ROCKER: Lengths = (0.04, 0.12, 0.08, 0.1)
-
-
-def shipped(name: str) -> Linkage:
-    """Return a linkage of the gallery."""
-    return read_linkage(read_yaml(GALLERY[0].parent / f'{name}.yaml')[0])
 
 
 def crank_rocker(lengths: Lengths = CRANK_ROCKER) -> Linkage:

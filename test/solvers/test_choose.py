@@ -24,7 +24,8 @@ from linkage_ros.solvers.solver import Solver
 from linkage_ros.solvers.table import TableClosure
 import pytest
 
-from .linkages import CRANK_ROCKER, crank_rocker, shipped, worst_error
+from .linkages import CRANK_ROCKER, crank_rocker, worst_error
+from ..support.scenes import shipped
 
 
 def timed(monkeypatch, **times: float) -> list[set[str]]:
@@ -73,7 +74,7 @@ ABLE = {
 
 
 @pytest.mark.parametrize('name', ABLE)
-def test_who_proves_it(monkeypatch, name: str) -> None:
+def test_only_solvers_that_prove_the_accuracy_are_timed(monkeypatch, name: str) -> None:
     asked = timed(monkeypatch, closed_form=1e-6, table=1e-6, newton=1e-6)
     said = choose(shipped(name), 1e-6).choice.why
     assert asked == [ABLE[name]]

@@ -36,8 +36,9 @@ from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest
 
-from .linkages import crank_rocker, crank_rockers, Lengths, shipped, true_joints
-from ..kinematics.reference import turned  # noqa: TID252
+from .linkages import crank_rocker, crank_rockers, Lengths, true_joints
+from ..kinematics.reference import turned
+from ..support.scenes import shipped
 
 reals = st.floats(-3.0, 3.0)
 radii = st.floats(0.0, 0.5)

@@ -37,7 +37,8 @@ from linkage_ros.solvers.table import TableClosure
 import pytest
 
 from .linkages import apart
-from ..bag.test_replay import Run, sample  # noqa: TID252
+from ..bag.test_replay import Run, sample
+from ..support.scenes import scene_of
 
 FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}\n'
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
@@ -51,12 +52,6 @@ SOLVERS = {
     'part of a table': ('solver: {table: {tolerance: 1.0e-6, span: [0.2, 2.5]}}', TableClosure),
 }
 BEGIN = 1_700_000_000_000_000_000
-
-
-def scene_of(text: str, linkage: bytes = FOUR_BAR):
-    """Return a scene of a linkage, without files."""
-    files = {'scene.yaml': f'linkage: l.yaml\n{text}\n'.encode(), 'linkage.yaml': linkage}
-    return parse_scene('s', 'here', files)
 
 
 @pytest.mark.parametrize('name', SOLVERS)
@@ -193,7 +188,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize('text', REFUSED)
-def test_refused(text: str) -> None:
+def test_a_solver_that_cannot_be_is_refused_by_reader_and_schema(text: str) -> None:
     with pytest.raises(FileError) as caught:
         scene_of(text)
     assert REFUSED[text] in str(caught.value)

@@ -33,10 +33,10 @@ from .linkages import (
     crank_rocker,
     crank_rockers,
     Lengths,
-    shipped,
     worst_error,
 )
-from ..kinematics.linkages import four_bar_linkage  # noqa: TID252
+from ..kinematics.linkages import four_bar_linkage
+from ..support.scenes import shipped
 
 # Between the knots, so that no doubling of these meets them.
 PLACES = [tau * (k + 0.137) / 97.0 for k in range(97)]
@@ -45,7 +45,7 @@ PLACES = [tau * (k + 0.137) / 97.0 for k in range(97)]
 @pytest.mark.parametrize(
     ('kind', 'orders'), [('linear', (2.0, 1.0)), ('hermite', (4.0, 3.0, 2.0))]
 )
-def test_orders(kind, orders: tuple[float, ...]) -> None:
+def test_tables_have_the_order_of_their_polynomial(kind, orders: tuple[float, ...]) -> None:
     def errors(knots: int) -> list[float]:
         table = TableClosure(crank_rocker(), knots=knots, order=kind)
         closure = table.closed
@@ -191,7 +191,7 @@ def test_the_toggle_is_named_where_it_is() -> None:
         ('jansen_leg', None, 'is finer than rounding allows here'),
     ],
 )
-def test_refused(name: str, span, said: str) -> None:
+def test_a_table_that_cannot_be_proved_is_refused(name: str, span, said: str) -> None:
     with pytest.raises(DefinitionError, match=said):
         TableClosure(shipped(name), 1e-12, span=span)
 

@@ -47,7 +47,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 import yaml
 
-from ...node_packages import (  # noqa: TID252
+from ...node_packages import (
     FOREIGN_READER,
     install_foreign_reader,
     node,

@@ -49,7 +49,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 
 from .agreement import assert_agreement, of_kind, read
-from ..conftest import START, STORE  # noqa: TID252
+from ..conftest import START, STORE
 
 LINKAGES = Path(__file__).parents[3] / 'config' / 'linkages'
 TICKS = 300

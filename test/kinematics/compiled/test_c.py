@@ -41,7 +41,7 @@ from .emitted import (
     subject,
     Told,
 )
-from ..test_gallery import closure_of, KINDS  # noqa: TID252
+from ..test_gallery import closure_of, KINDS
 
 GALLERY = [name for name, kinds in KINDS.items() if kinds != 'iterated']
 DYADS = [family for family in FAMILIES if not family.startswith('class III')]

@@ -32,7 +32,7 @@ import pytest
 
 from .emitted import COUNT, needs, NUMBERS, parts, plain, State, states, subject, Told
 from .test_c import GALLERY, limited
-from ..test_gallery import closure_of  # noqa: TID252
+from ..test_gallery import closure_of
 
 _ULPS = 4
 """So many units in the last place may a function of JavaScript be off."""

@@ -12,21 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-JointState bytes, read and written, against rosbags, which has a CDR of its own, and rclpy.
+JointState messages that are read, as crank samples and as effort commands, against rosbags.
 
-The reader answers every sequence of bytes with a sample or a rejection, and never raises.
+The readers answer every sequence of bytes with what they read or a rejection, and never raise.
 """
 
 from __future__ import annotations
 
 from array import array
+from collections.abc import Callable
 from math import isnan
 import struct
+from typing import Any, NamedTuple
 
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from linkage_ros.messages.joint_effort import EffortCommand, JointEffortReader
 from linkage_ros.messages.joint_state import (
     CrankSample,
     JointStateReader,
@@ -34,12 +36,10 @@ from linkage_ros.messages.joint_state import (
     OwnJointStates,
     Rejection,
 )
-import numpy as np
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
-STORE = get_typestore(Stores.ROS2_JAZZY)
-TYPE = 'sensor_msgs/msg/JointState'
+from .support.messages import joint_state as serialized
+
 NS = 1_000_000_000
 CRANK = 'crank_joint'
 
@@ -47,23 +47,12 @@ names_ = st.text(st.characters(exclude_categories=['Cs'], exclude_characters='\0
 doubles = st.floats(width=64)
 
 
-def serialized(names, positions, velocities=(), efforts=(), stamp=(1, 2), frame='', little=True):
-    message = STORE.types[TYPE](
-        STORE.types['std_msgs/msg/Header'](
-            STORE.types['builtin_interfaces/msg/Time'](*stamp), frame
-        ),
-        list(names),
-        *(np.array(values, float) for values in (positions, velocities, efforts)),
-    )
-    return bytes(STORE.serialize_cdr(message, TYPE, little_endian=little))
-
-
 def same(one, other):
     return one == other or (one is not None and isnan(one) and isnan(other))
 
 
 @st.composite
-def joint_states(draw, inputs=(CRANK,)):
+def joint_states(draw, inputs=(CRANK,), required='positions'):
     """Draw the parts of a message with the inputs among its joints, in any order."""
     others = draw(st.lists(names_.filter(lambda name: name not in inputs), max_size=6))
     names = draw(st.permutations([*others, *inputs]))
@@ -71,9 +60,10 @@ def joint_states(draw, inputs=(CRANK,)):
     stamp = st.integers(0, 2**31 - 1), st.integers(0, NS - 1)
     return {
         'names': names,
-        'positions': draw(numbers),
-        'velocities': draw(numbers | st.just([])),
-        'efforts': draw(numbers | st.just([])),
+        **{
+            key: draw(numbers if key == required else numbers | st.just([]))
+            for key in ('positions', 'velocities', 'efforts')
+        },
         'stamp': draw(st.tuples(*stamp)),
         'frame': draw(names_),
         'little': draw(st.booleans()),
@@ -107,6 +97,15 @@ def test_reads_what_rosbags_has_written(messages):
         data = serialized(**message)
         assert agrees(reader.read(data), message)
         assert agrees(reader.read(data + b'\0\0\0'), message), 'DDS may pad'
+
+
+@given(st.lists(joint_states(required='efforts'), min_size=1, max_size=4))
+def test_the_effort_of_the_joint_is_read(messages):
+    reader = JointEffortReader(CRANK)  # one for all: layouts change from message to message
+    for message in messages:
+        stamp, effort = reader.read(serialized(**message))
+        assert stamp == message['stamp'][0] * NS + message['stamp'][1]
+        assert same(effort, message['efforts'][message['names'].index(CRANK)])
 
 
 @given(st.data(), st.lists(names_, min_size=2, max_size=5, unique=True))
@@ -147,6 +146,41 @@ def test_reads_what_rclpy_has_written(message):
     assert agrees(JointStateReader([CRANK]).read(data), message)
 
 
+class Reader(NamedTuple):
+    """A reader, a message that it reads, and what it reads of it."""
+
+    build: Callable[[], Any]
+    good: bytes
+    read: CrankSample | EffortCommand
+
+
+READERS = {
+    'crank sample': Reader(
+        lambda: JointStateReader([CRANK]),
+        serialized(['a', CRANK], [0.1, 0.5], [0.2, 1.0], frame='base'),
+        CrankSample(NS + 2, (0.5,), (1.0,)),
+    ),
+    'effort command': Reader(
+        lambda: JointEffortReader(CRANK),
+        serialized(['a', CRANK], [0.1, 0.2], efforts=[1.0, 4.0], frame='base'),
+        EffortCommand(NS + 2, 4.0),
+    ),
+}
+every_reader = pytest.mark.parametrize('name', READERS)
+
+
+@every_reader
+@pytest.mark.parametrize('warm', [False, True])
+def test_a_message_cut_short_is_malformed(name, warm):
+    build, good, read = READERS[name]
+    for length in range(len(good)):
+        reader = build()
+        if warm:
+            assert reader.read(good) == read
+        assert reader.read(good[:length]) is Rejection.MALFORMED
+        assert reader.read(good) == read
+
+
 @given(joint_states(), st.lists(st.tuples(st.integers(0), st.integers(0, 255)), max_size=8))
 def test_whatever_the_bytes_there_is_an_answer(message, changes):
     data = serialized(**message)
@@ -164,16 +198,31 @@ def test_whatever_the_bytes_there_is_an_answer(message, changes):
                 assert answer is Rejection.MALFORMED, 'a message cut short is none'
 
 
+@every_reader
+@given(st.lists(st.tuples(st.integers(0, 2**16), st.integers(0, 255)), max_size=8), st.booleans())
+def test_any_damage_is_answered(name, damage, after_a_good_one):
+    build, good, read = READERS[name]
+    reader = build()
+    if after_a_good_one:
+        assert reader.read(good) == read
+    data = bytearray(good)
+    for place, value in damage:
+        data[place % len(data)] = value
+    assert isinstance(reader.read(bytes(data)), type(read) | Rejection)
+    assert reader.read(good) == read
+
+
+@every_reader
 @given(st.binary(max_size=200))
 @example(b'\0\1\0\0' + b'\xff' * 100)
 @example(b'\0\1\0\0' + bytes(12) + b'\xff\xff\xff\x7f' * 20)
-def test_bytes_that_never_were_a_message(data):
-    assert isinstance(JointStateReader([CRANK]).read(data), CrankSample | Rejection)
+def test_bytes_that_never_were_a_message(name, data):
+    build, _, read = READERS[name]
+    assert isinstance(build().read(data), type(read) | Rejection)
 
 
-@pytest.mark.parametrize(
-    ('message', 'reason'),
-    [
+REFUSED = {
+    'crank sample': [
         ({'names': [], 'positions': []}, Rejection.EMPTY),
         ({'names': [CRANK], 'positions': []}, Rejection.EMPTY),
         ({'names': [CRANK, 'x'], 'positions': [1]}, Rejection.UNEQUAL),
@@ -186,22 +235,73 @@ def test_bytes_that_never_were_a_message(data):
         ({'names': [CRANK], 'positions': [1], 'stamp': (-1, 0)}, Rejection.STAMP_INVALID),
         ({'names': [CRANK], 'positions': [1], 'stamp': (1, NS)}, Rejection.STAMP_INVALID),
     ],
+    'effort command': [
+        ({'names': [CRANK], 'efforts': []}, Rejection.NO_EFFORT),
+        ({'names': [], 'efforts': []}, Rejection.NO_EFFORT),
+        ({'names': [CRANK], 'efforts': [], 'positions': [1]}, Rejection.NO_EFFORT),
+        ({'names': ['rocker_joint'], 'efforts': [1]}, Rejection.MISSING),
+        ({'names': [CRANK, CRANK], 'efforts': [1, 2]}, Rejection.TWICE),
+        ({'names': [], 'efforts': [1]}, Rejection.UNEQUAL),
+        ({'names': [CRANK, 'b'], 'efforts': [1]}, Rejection.UNEQUAL),
+        ({'names': [CRANK], 'efforts': [1, 2]}, Rejection.UNEQUAL),
+        ({'names': [CRANK, 'b'], 'efforts': [1, 2], 'positions': [1]}, Rejection.UNEQUAL),
+        ({'names': [CRANK, 'b'], 'efforts': [1, 2], 'velocities': [1]}, Rejection.UNEQUAL),
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ('name', 'message', 'reason'),
+    [(name, *refused) for name, rows in REFUSED.items() for refused in rows],
 )
-@pytest.mark.parametrize('warm', [False, True])
 @pytest.mark.parametrize('little', [False, True])
-def test_says_why_there_is_no_sample(message, reason, warm, little):
-    reader = JointStateReader([CRANK])
-    good = serialized([CRANK], [0.5], [1.0])
-    if warm:
-        reader.read(good)
+def test_says_why_a_message_is_refused(name, message, reason, little):
+    build, good, read = READERS[name]
+    reader = build()
     assert reader.read(serialized(**message, little=little)) is reason
-    assert reader.read(good) == (NS + 2, (0.5,), (1.0,))
+    assert reader.read(good) == read
+    assert reader.read(serialized(**message, little=little)) is reason, 'with a layout known'
 
 
+DEPENDENT = ('coupler_joint', 'rocker_joint')
+
+
+@pytest.mark.parametrize(
+    ('names', 'efforts', 'expected'),
+    [
+        # As joint_state_topic_hardware_interface 1.1.0 sends them: efforts in the order of the
+        # joints that have a command.
+        ([CRANK, 'coupler_joint', 'rocker_joint'], [4.0], 4.0),
+        (['coupler_joint', CRANK, 'rocker_joint'], [4.0], 4.0),
+        (['rocker_joint', 'coupler_joint', CRANK], [4.0], 4.0),
+        (['arm', 'rocker_joint', CRANK], [1.0, 4.0], 4.0),
+        ([CRANK, 'rocker_joint', 'arm'], [4.0, 1.0], 4.0),
+        (['rocker_joint', CRANK], [1.0, 4.0], 4.0),
+        # Whose the effort is, nothing says.
+        (['arm', CRANK], [4.0], Rejection.UNEQUAL),
+        (['arm', 'rocker_joint', CRANK], [4.0], Rejection.UNEQUAL),
+        (['arm', 'rocker_joint'], [4.0], Rejection.MISSING),
+        ([CRANK, 'rocker_joint', CRANK], [4.0, 4.0], Rejection.TWICE),
+    ],
+)
+@pytest.mark.parametrize('little', [True, False])
+def test_joints_that_follow_from_others_need_no_effort(names, efforts, expected, little):
+    reader = JointEffortReader(CRANK, DEPENDENT)
+    for _ in range(2):  # also with a layout known
+        read = reader.read(serialized(names, efforts=efforts, little=little))
+        assert read == (EffortCommand(NS + 2, 4.0) if expected == 4.0 else expected)
+
+
+def test_a_command_with_a_stamp_of_zero_is_as_good_as_any():
+    data = serialized([CRANK], efforts=[4.0], stamp=(0, 0))
+    assert JointEffortReader(CRANK).read(data) == EffortCommand(0, 4.0)
+
+
+@every_reader
 @pytest.mark.parametrize('encapsulation', [b'\0\2', b'\0\3', b'\0\6', b'\0\7', b'\0\12', b'\1\1'])
-def test_other_encodings_are_refused(encapsulation):
-    good = serialized([CRANK], [0.5], [1.0])
-    reader = JointStateReader([CRANK])
+def test_other_encodings_are_refused(name, encapsulation):
+    build, good, _ = READERS[name]
+    reader = build()
     for _ in range(2):  # also when it has seen that very message in an encoding that it reads
         assert reader.read(encapsulation + good[2:]) is Rejection.MALFORMED
         reader.read(good)
@@ -216,26 +316,6 @@ def test_a_layout_seen_before_is_not_taken_for_granted(wrong):
     assert reader.read(serialized(**right)) == (NS + 2, (1.0,), None)
     assert reader.read(serialized(**right | wrong)) is Rejection.UNEQUAL
     assert reader.read(serialized(**right)) == (NS + 2, (1.0,), None)
-
-
-@given(
-    st.lists(names_, min_size=1, max_size=6),
-    st.integers(0, (2**31 - 1) * NS),
-    st.data(),
-)
-def test_writes_as_rosbags_does_to_the_last_byte(names, stamp, data):
-    numbers = st.lists(doubles, min_size=len(names), max_size=len(names))
-    positions, rates = data.draw(numbers), data.draw(numbers | st.just([]))
-    written = JointStateWriter(names).write(stamp, positions, rates)
-    assert written == serialized(names, positions, rates, stamp=divmod(stamp, NS))
-
-    read = STORE.deserialize_cdr(written, TYPE)
-    assert read.header.stamp.sec * NS + read.header.stamp.nanosec == stamp
-    assert read.header.frame_id == ''
-    assert read.name == names
-    assert read.position.tobytes() == np.array(positions, float).tobytes()
-    assert read.velocity.tobytes() == np.array(rates, float).tobytes()
-    assert len(read.effort) == 0
 
 
 @given(st.lists(st.lists(names_, min_size=1, max_size=3), min_size=1, max_size=4), st.data())
