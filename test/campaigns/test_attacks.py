@@ -12,18 +12,28 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A sample of the attacks: no traceback, no hang, no screenful; and the judge sees them."""
+"""A sample of the attacks: each is answered, or refused in a line."""
 
 from __future__ import annotations
 
+from pathlib import Path
 import random
+from random import Random
 
 from campaigns.attacks import files, signals
+from campaigns.attacks.bags import attack, changed, judged
+from campaigns.attacks.bags import COMMANDS as BAG_COMMANDS
 from campaigns.attacks.mutations import mutated
+from campaigns.in_process import Ended
 from linkage_ros.cli.main import COMMANDS
 import pytest
 
+# A sample of the attacks: no traceback, no hang, no screenful; and the judge sees them.
+
+
 SEED = 20261122
+
+
 """Not the campaign's own."""
 
 
@@ -92,3 +102,57 @@ def test_files_are_changed_in_many_ways() -> None:
 )
 def test_the_judge_knows_an_end_that_must_not_be(command, code, said, found) -> None:
     assert bool(files.judged(command, code, said)) is found
+
+
+# A sample of the attacks with bags: each command tells what it can, or why not in a line.
+
+
+BAG_SEED = 20261123
+
+
+"""Not the campaign's own: its findings went into the code."""
+
+
+SAMPLE = 20
+
+
+def test_changed_bags_are_told_in_time_and_within_memory() -> None:
+    tried, findings = attack(SAMPLE, BAG_SEED)
+    assert findings == []
+    assert sum(tried.values()) == SAMPLE * len(BAG_COMMANDS)
+
+
+def test_the_same_seed_changes_a_bag_alike(tmp_path: Path) -> None:
+    made = []
+    for name in ('one', 'other'):
+        (tmp_path / name).mkdir()
+        done = changed(tmp_path / name, Random('6'))
+        # The bytes are others: a bag says when it was made.
+        made.append((done, sorted(file.stat().st_size for file in (tmp_path / name).iterdir())))
+    assert made[0] == made[1]
+
+
+@pytest.mark.parametrize(
+    ('end', 'wrong'),
+    [
+        ((0, 'a table', ''), ''),
+        ((2, '', 'linkage info: x: is damaged\n'), ''),
+        ((2, '', 'linkage export: x: unfinished: killed\nlinkage export: x: is damaged\n'), ''),
+        ((2, '', ''), '0 lines'),
+        ((2, '', 'one\ntwo\n'), '2 lines'),
+        ((0, '', ''), 'nothing is told'),
+        ((0, 'a\x1b[0m', ''), 'not printable'),
+        ((2, '', 'x' * 331_000), 'a line of 331000 letters'),
+        (('traceback', '', 'MemoryError'), 'MemoryError'),
+        (('no end', '', 'more than 60 s'), 'more than 60 s'),
+    ],
+)
+def test_what_must_not_be_is_a_finding(end: tuple[object, str, str], wrong: str) -> None:
+    code, shown, said = end
+    found = judged(Ended(code, said, shown))
+    assert wrong in found
+    assert bool(found) == bool(wrong)
+
+
+def test_every_command_that_only_looks_is_tried() -> None:
+    assert set(BAG_COMMANDS) == {'info', 'report', 'export', 'plot'}

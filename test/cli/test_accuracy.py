@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""``linkage accuracy``: what it prints and writes, and what it refuses."""
+"""``linkage accuracy``: what it prints, writes and refuses."""
 
 from __future__ import annotations
 
@@ -21,10 +20,16 @@ import argparse
 from threading import Event
 
 from linkage_ros.accuracy.measure import PARTS
+from linkage_ros.accuracy.results import Part, Results, Table
+from linkage_ros.accuracy.spread import Spread
 from linkage_ros.cli import accuracy as command
+from linkage_ros.cli.accuracy_tables import print_results
 from linkage_ros.errors import LinkageError
 from linkage_ros.shipped import shipped
 import pytest
+
+# ``linkage accuracy``: what it prints and writes, and what it refuses.
+
 
 DEMO = str(shipped('scenes/demo.yaml'))
 
@@ -95,3 +100,54 @@ def test_it_can_be_stopped_and_leaves_nothing(tmp_path, monkeypatch):
     stop.set()
     assert run(DEMO, stop=stop) == 1
     assert not list(tmp_path.iterdir())
+
+
+# What a terminal shows of what accuracy costs.
+
+
+RESULTS = Results(
+    'four_bar',
+    [('cores', '2')],
+    [
+        Part(
+            'solving',
+            'Solving the loop',
+            ['A text for the page.'],
+            (),
+            [
+                Table(
+                    'methods',
+                    'What each takes',
+                    ('method', 'time [µs]', 'error [rad]'),
+                    [
+                        ('closed form', Spread(0.68, 0.7, 0.75), 2.1e-16),
+                        ('Newton', 12.25, None),
+                        ('another', 'failed', 1e-6),
+                    ],
+                ),
+                Table('none', 'What nobody takes', ('method', 'time [µs]'), []),
+            ],
+            ['For 1e-12 rad: the closed form.'],
+        ),
+        Part('ticking', 'Ticking', ['Nothing in numbers.']),
+    ],
+)
+
+
+def test_tables_part_by_part_and_the_advice_at_the_end(capsys):
+    print_results(RESULTS)
+    assert capsys.readouterr().out == (
+        'Solving the loop\n\n'
+        'What each takes\n'
+        'method              time [µs]  error [rad]\n'
+        'closed form  0.70 (0.68–0.75)      2.1e-16\n'
+        'Newton                   12.2\n'
+        'another                failed         1e-6\n'
+        '\n'
+        'What nobody takes\n'
+        'method  time [µs]\n'
+        '\n'
+        'Ticking\n\n'
+        'Solving the loop\n'
+        '  For 1e-12 rad: the closed form.\n'
+    )

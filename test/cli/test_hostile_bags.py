@@ -12,30 +12,49 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""What a bag says of its run may be anything: one clear line for it, and never a traceback."""
+"""Bags of strangers: what they say may be anything, and nothing of it is run."""
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator
+from importlib import import_module
 import json
+import os
 from pathlib import Path
+import subprocess
+import sys
 from types import ModuleType
 from typing import Any
 
 from linkage_ros.bag.reading.reader import BagMessage, read_bag, RUN_FILE
+from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writing.writer import BagWriter
 from linkage_ros.cdr import text_message
 from linkage_ros.cli import export, info, plot, replay, report
-from linkage_ros.errors import BagError, LinkageError
-from linkage_ros.replay import read_change
+from linkage_ros.cli.main import COMMANDS as ALL_COMMANDS
+from linkage_ros.cli.main import module_of
+from linkage_ros.cli.outlet import Outlet
+from linkage_ros.errors import BagError, clean, FileError, LinkageError
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.pipeline import Pipeline
+from linkage_ros.replay import read_change, recorded_scene
+from linkage_ros.scene.load import SCENE_FILE
 import pytest
 
-from .recorded import answer, BEGIN, MS
+from .conftest import environment
+from .recorded import answer, BEGIN, FOUR_BAR, JOINT_STATE, MS, scene_file
+from .test_bounds import told
 from .test_replay import recorded
 
+# What a bag says of its run may be anything: one clear line for it, and never a traceback.
+
+
 DEEP = '[' * 100_000
+
+
 LONG = '9' * 100_000
+
 
 ACCOUNTS = {
     'nothing': b'',
@@ -45,6 +64,7 @@ ACCOUNTS = {
     'a deep object': b'{"a":' * 100_000,
     'cut': b'{"scene": "s", ',
 }
+
 
 # By key what it is replaced by, as JSON.
 VALUES = {
@@ -58,7 +78,11 @@ VALUES = {
     'control characters': json.dumps('a\n\x1b[31mb'),
     'half a character': '"\\ud800"',
 }
+
+
 KEYS = ('scene', 'joint_states_topic', 'crank_topic', 'withheld_topic', 'extra_topics')
+
+
 # Names of files may be anything, and a scene has the name of its file.
 GOOD = {('scene', 'control characters'), ('scene', 'half a character')}
 
@@ -162,3 +186,292 @@ def test_a_tick_beyond_all_stamps_is_told_in_a_line(tmp_path, capsys, time) -> N
     assert lines[0].startswith(f'{odd}: holds what was made at {time} ns, beyond ')
     with pytest.raises(BagError, match='beyond'):
         answer(replay, odd)
+
+
+# A bag calls its topics, types, joints and files what it likes: what is shown is printable.
+#
+# Escapes of a terminal, line breaks, letters that turn the direction of writing, and halves of
+# letters come out as Python writes them; what is too long loses its middle.
+
+
+ODD = {
+    'an escape': 'a\x1b[31mred\x1b]0;title\x07',
+    'line breaks': 'a\r\nlinkage info: all is well\x85\u2028',
+    'turned': 'a\u202egnp.exe\u2066\u200f',
+    'no width': 'a\u200b\ufeff\u00ad',
+    'long': 'x' * 331_000,
+}
+
+
+COMMANDS = {
+    'info': [],
+    'info --json': [],
+    'export': ['-o', 'x.csv'],
+    'plot': [],
+    'report': [],
+    'replay': [],
+    'recover': ['-o', 'recovered'],
+    'play': ['--rate', '1000'],
+}
+
+
+def odd_bag(folder: Path, odd: str) -> Path:
+    """Write a bag whose names are all odd; its scene is whole."""
+    whole = read_bag(recorded(folder, 'effects: {velocity: {}}\n', 60))
+    account = json.loads(whole.attachments[RUN_FILE])
+    account |= {'scene': odd, 'linkage_ros': odd, 'python': odd, 'effects': {odd: odd}}
+    files = {name: ('', data) for name, data in whole.attachments.items()}
+    files[RUN_FILE] = ('', json.dumps(account).encode())
+    files[f'{odd}.txt'] = ('', b'')
+    strange = [Topic(f'/{odd}', odd, odd, odd), Topic(f'/{odd}/joints', JOINT_STATE, '', '')]
+    topics = [*whole.topics, *strange]
+    numbers = {each.name: number for number, each in enumerate(topics)}
+    writer = BagWriter(folder / 'odd', topics, files)
+    for message in whole.messages():
+        writer.write(numbers[message.topic], *message[1:])
+    for number in range(3):
+        time = BEGIN + number * MS
+        writer.write(len(topics) - 2, time, time, text_message(odd))
+        states = JointStateWriter([odd, 'rocker_joint']).write(time, (0.1, 0.2), ())
+        writer.write(len(topics) - 1, time, time, states)
+    writer.close({'linkage_ros.failure': odd, 'linkage_ros.recovered': odd, odd: odd})
+    return writer.folder
+
+
+@pytest.mark.parametrize('name', ODD)
+def test_what_is_shown_is_printable(tmp_path: Path, name: str) -> None:
+    odd_bag(tmp_path, ODD[name])
+    for command, more in COMMANDS.items():
+        ended = told(tmp_path, *command.split(), 'odd', *more)
+        shown = ended.stdout + ended.stderr
+        assert 'Traceback' not in shown, command
+        assert all(line.isprintable() for line in shown.split('\n')), command
+        assert not any(line.startswith('linkage info: all is well') for line in shown.split('\n'))
+        assert max(map(len, ended.stderr.split('\n'))) < 10_000, command
+    page, *_ = (tmp_path / 'odd.html').read_text().partition('Plotly')
+    assert all(letter.isprintable() or letter == '\n' for letter in page)
+
+
+@pytest.mark.parametrize('name', ODD)
+def test_an_error_is_a_printable_line_with_an_end(name: str) -> None:
+    odd = ODD[name]
+    error = LinkageError(odd, odd, odd)
+    for text in (str(error), error.where, error.reason, error.remedy):
+        assert text.isprintable()
+        assert len(text) < 6_100
+
+
+@pytest.mark.parametrize(
+    ('text', 'expected'),
+    [
+        ('µ [rad/s²]', 'µ [rad/s²]'),
+        ("it's 'so'", "it's 'so'"),
+        ('a\tb\x1b', r'a\tb\x1b'),
+        ('\u202e', r'\u202e'),
+        ('\ud800', r'\ud800'),
+        ('\U000e0001', r'\U000e0001'),
+    ],
+)
+def test_only_what_is_not_printable_is_written_otherwise(text: str, expected: str) -> None:
+    assert clean(text) == expected
+
+
+def test_lines_stay_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    import sys
+
+    print('one\x1b[0m\ntwo\r', file=Outlet(sys.stdout))
+    assert capsys.readouterr().out == 'one\\x1b[0m\ntwo\\r\n'
+
+
+# A bag names modules; no command runs them unless its user says so.
+#
+# The canary is a package beside the bag. It writes down that it was imported.
+
+
+ROOT = Path(__file__).parents[2]
+
+
+EFFECT = 'canary.effect'
+
+
+RAN = 'ran'
+
+
+CANARY = f"""
+from pathlib import Path
+Path(__file__).parents[1].joinpath('{RAN}').write_text('')
+"""
+
+
+DOES_NOTHING = """
+from dataclasses import dataclass
+
+@dataclass(frozen=True, slots=True)
+class PARAMETERS:
+    'Nothing.'
+
+AFTER = 'bias'
+
+def sensor(parameters, context):
+    return lambda now, reading: reading
+"""
+
+
+# What is typed behind the bag, by the command; of each that takes a bag at least one line.
+TYPED = {
+    'info': [[], ['--json']],
+    'report': [[]],
+    'export': [['-o', 'x.csv'], ['-o', 'x.csv', '--topic', '/joint_states']],
+    'plot': [[]],
+    'play': [['--rate', '1000']],
+    'recover': [['-o', 'recovered']],
+    'replay': [
+        [],
+        ['--json'],
+        ['--scene', 'other.yaml'],
+        ['--scene', 'other.yaml', '-o', 'new'],
+    ],
+}
+
+
+# Commands that do take a scene, and may be told so to follow a bag.
+FOLLOWS = 'linkage: l.yaml\ndrive: {bag: {file: bag}}\n'
+
+
+WITH_A_SCENE = (['scene', 'follows.yaml'], ['cost', 'follows.yaml', '--ticks', '5'])
+
+
+def takes_a_bag(command: str) -> bool:
+    parser = argparse.ArgumentParser()
+    import_module(module_of(command)).add_arguments(parser)
+    return any(action.dest == 'bag' for action in parser._actions)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a bag and the package that the bag's scene names."""
+    folder = tmp_path_factory.mktemp('strange')
+    whole = read_bag(recorded(folder, 'effects: {velocity: {}}\n', 60))
+    files = {name: ('', data) for name, data in whole.attachments.items()}
+    text = whole.attachments[SCENE_FILE].decode().replace('{velocity: {}}', f'{{{EFFECT}: {{}}}}')
+    assert EFFECT in text
+    files[SCENE_FILE] = ('', text.encode())
+    writer = BagWriter(folder / 'strange', whole.topics, files)
+    numbers = {each.name: number for number, each in enumerate(whole.topics)}
+    for message in whole.messages():
+        writer.write(numbers[message.topic], *message[1:])
+    writer.close()
+    (folder / 'canary').mkdir()
+    (folder / 'canary' / '__init__.py').write_text(CANARY)
+    (folder / 'canary' / 'effect.py').write_text(DOES_NOTHING)
+    scene_file(folder, 'effects: {velocity: {}}\n', FOUR_BAR).rename(folder / 'other.yaml')
+    (folder / 'follows.yaml').write_text(FOLLOWS.replace('file: bag', 'file: strange'))
+    return folder
+
+
+def typed(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run ``linkage`` in the folder of the canary, which an empty entry puts onto the path."""
+    (folder / RAN).unlink(missing_ok=True)
+    return subprocess.run(
+        [sys.executable, '-m', 'linkage_ros.cli.main', *words],
+        cwd=folder,
+        env=environment(folder) | {'PYTHONPATH': f'{os.pathsep}{ROOT}'},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_every_command_that_takes_a_bag_is_tried() -> None:
+    assert {name for name in ALL_COMMANDS if takes_a_bag(name)} == set(TYPED)
+
+
+LINES = [[name, 'strange', *more] for name, lines in TYPED.items() for more in lines]
+
+
+@pytest.mark.parametrize('words', [*LINES, *WITH_A_SCENE], ids=' '.join)
+def test_nothing_that_a_bag_names_is_imported(folder: Path, words: list[str]) -> None:
+    ended = typed(folder, *words)
+    assert not (folder / RAN).exists(), ended.stdout
+    assert 'Traceback' not in ended.stderr
+    assert ended.returncode == (
+        2
+        if words in (['replay', 'strange'], ['replay', 'strange', '--json'], ['plot', 'strange'])
+        else 0
+    ), ended.stderr
+
+
+def test_a_replay_says_what_it_would_import(folder: Path) -> None:
+    ended = typed(folder, 'replay', 'strange')
+    assert ended.stderr == (
+        f'linkage replay: strange: scene.yaml:2: effects.{EFFECT}: names a module, and what a '
+        f"bag names is not imported unasked; the name leads to '{folder}/canary/__init__.py' "
+        'here; --trust-effects imports it\n'
+    )
+
+
+def test_info_names_the_effect_and_says_why_the_rest_is_not_known(folder: Path) -> None:
+    account = json.loads(typed(folder, 'info', 'strange', '--json').stdout)
+    (linkage,) = account['scene']['linkages']
+    assert (linkage['effects'], linkage['effects_not_imported']) == ([], [EFFECT])
+    assert account['messages'] > 0
+    assert account['replay'] is None
+    assert f'effects.{EFFECT}: names a module' in account['scene_missing']
+    assert f'{EFFECT} (not imported)' in typed(folder, 'info', 'strange').stdout
+
+
+def test_a_report_names_it(folder: Path) -> None:
+    typed(folder, 'report', 'strange')
+    page = (folder / 'strange.html').read_text()
+    assert (
+        f'The scene was not run again, so no linkage: strange: scene.yaml:2: effects.{EFFECT}'
+        in page
+    )
+
+
+@pytest.mark.parametrize('command', ['info', 'report', 'plot', 'replay'])
+def test_who_trusts_a_bag_is_told_first_what_runs(folder: Path, command: str) -> None:
+    ended = typed(folder, command, 'strange', '--trust-effects')
+    assert (folder / RAN).exists()
+    assert ended.stderr.startswith(
+        f'linkage: strange is trusted: imports {EFFECT}, and the name leads to '
+        f"'{folder}/canary/__init__.py'\n"
+    )
+    # The bag was made with rates, which the scene that it now carries does not ask for.
+    assert ended.returncode == (3 if command == 'replay' else 0), ended.stderr
+
+
+def test_where_the_package_is_found_is_said_before_it_runs(folder: Path) -> None:
+    init = folder / 'canary' / '__init__.py'
+    init.write_text(f'{CANARY}\nprint("runs", flush=True)\n')
+    try:
+        ended = subprocess.run(
+            [sys.executable, '-m', 'linkage_ros.cli.main', 'info', 'strange', '--trust-effects'],
+            cwd=folder,
+            env=environment(folder) | {'PYTHONPATH': str(ROOT)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+    finally:
+        init.write_text(CANARY)
+    lines = ended.stdout.splitlines()
+    assert [lines[0][:27], lines[1]] == ['linkage: strange is trusted', 'runs']
+
+
+def test_the_scene_of_a_bag_is_not_trusted_where_nobody_says_so(folder: Path) -> None:
+    scene = recorded_scene(read_bag(folder / 'strange'))
+    assert scene.not_imported == (EFFECT,)
+    with pytest.raises(FileError, match='leads to no module here'):
+        Pipeline(scene)
+
+
+@pytest.mark.parametrize(
+    'name', ['__main__.effect', 'no_such_package.effect', '.effect', 'a b.effect', 'os.path', '..']
+)
+def test_any_name_is_told_in_a_line(name: str) -> None:
+    own = import_module('linkage_ros.effects.own')
+    assert own.found_in(name).isprintable()

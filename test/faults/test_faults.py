@@ -12,13 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""
-Faults, as timelines: what is published before, while and after, and when they begin and end.
-
-The crank turns at 1 rad/s from 0, so that the crank's joint is the time in seconds: a tick's
-position says of which instant it is.
-"""
+"""Faults, as timelines, at a rate and with each message."""
 
 from __future__ import annotations
 
@@ -30,14 +24,29 @@ from linkage_ros.faults.injection import Change, Injection
 from linkage_ros.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline
+from linkage_ros.ros.tick_loop import TickLoop
 import pytest
 
 from ..support.scenes import scene_of
 
+# Faults, as timelines: what is published before, while and after, and when they begin and end.
+#
+# The crank turns at 1 rad/s from 0, so that the crank's joint is the time in seconds: a tick's
+# position says of which instant it is.
+
+
 MS = 1_000_000
+
+
 BEGIN = 1_700_000_000_000_000_000
+
+
 TURNING = 'drive: {constant_rate: {rate: 1.0}}\neffects: {velocity: {}}\n'
+
+
 CRANK = JointStateReader(['crank_joint'])
+
+
 ROCKER = JointStateReader(['rocker_joint'])
 
 
@@ -66,6 +75,8 @@ def stamps(messages):
 
 
 TIMES = [0, 10, 20, 30, 40, 50]
+
+
 NOTHING = b''
 
 
@@ -184,3 +195,149 @@ def test_several_faults_at_once():
     late = 'late: {time_jump: {by: 1}, at: [0.01], seconds: 0.03}'
     messages = run(f'{TURNING}faults: {{{quiet}, {late}}}', TIMES)
     assert stamps(messages) == [0, 1010, 1020, NOTHING, 40, 50]
+
+
+# Faults where the ticks are samples (`rate: 0`), as timelines of messages that come.
+#
+# The loop is the node's own; only what waits for messages is left out. Samples come with stamps
+# that are 3 ms old. Times of faults are those of the node's clock, counted from when the first
+# message came, and not those of stamps.
+
+
+OLD = 3
+
+
+MESSAGE_TIMES = [0, 10, 15, 21, 35, 39, 41, 50]
+
+
+"""When samples come, in [ms]; the crank turns at 1 rad/s."""
+
+
+IN_WINDOW = [21, 35, 39]
+
+
+"""Those of them that come while a fault of `window` is on."""
+
+
+WRITE = JointStateWriter(['crank_joint']).write
+
+
+def fault_window(fault, at='[0.02]', seconds=0.02):
+    return f'faults: {{mine: {{{fault}, at: {at}, seconds: {seconds}}}}}'
+
+
+class Run:
+    """A run at `rate: 0`: what is published, refused and told at each time a message comes."""
+
+    def __init__(self, faults, times=MESSAGE_TIMES, burst=1):
+        scene = scene_of(f'rate: 0\npublish_input: true\n{faults}')
+        waiting, self.messages, self.changes, self.published = [], [], {}, {}
+        kept = []
+
+        def build():
+            pipeline = Pipeline(scene, injection=kept[0] if kept else None)
+            kept[:] = [pipeline.injection]
+            return pipeline
+
+        loop = TickLoop(
+            build,
+            lambda: waiting.pop(0) if waiting else None,
+            self.messages.append,
+            publish_change=self._changed,
+        )
+        self.counts = loop.counts
+        for self.time in times:
+            for k in range(burst):
+                stamp = BEGIN + (self.time - OLD) * MS + k
+                sample = WRITE(stamp, [(self.time - OLD) * 1e-3], [1.0])
+                waiting.append((sample, {'source_timestamp': stamp}))
+            self.messages.clear()
+            loop.tick_samples(BEGIN + self.time * MS)
+            self.published[self.time] = list(self.messages)
+
+    def _changed(self, change):
+        self.changes.setdefault(self.time, []).append(change.on)
+        return b''
+
+    def stamps(self):
+        """Return the stamp of each message, in [ms] from the first time, by when it came."""
+        return {
+            time: [(CRANK.read(message).stamp - BEGIN) / MS for message in messages]
+            for time, messages in self.published.items()
+        }
+
+
+def of_samples(silent=()):
+    return {time: [] if time in silent else [time - OLD] for time in MESSAGE_TIMES}
+
+
+def test_a_fault_begins_with_the_first_sample_that_is_not_before_its_time():
+    run = Run(fault_window('silence: {}'))
+    assert run.stamps() == of_samples(IN_WINDOW)
+    assert run.changes == {21: [True], 41: [False]}
+    assert run.counts.ticks == len(MESSAGE_TIMES), 'they are ticks, silent ones'
+
+
+@pytest.mark.parametrize(('at', 'first'), [('[0.021]', 21), ('[0.0210001]', 35)])
+def test_on_its_instant_it_has_begun(at, first):
+    assert list(Run(fault_window('silence: {}', at, 1.0)).changes) == [first]
+
+
+@pytest.mark.parametrize(('seconds', 'first'), [(0.02, 39), (0.0200001, 41)])
+def test_on_its_end_it_has_ended(seconds, first):
+    # From 19 to 39 ms.
+    assert list(Run(fault_window('silence: {}', '[0.019]', seconds)).changes) == [21, first]
+
+
+def test_a_fault_between_two_samples_is_told_and_touches_none():
+    run = Run(fault_window('silence: {}', '[0.022]', 0.01))
+    assert run.stamps() == of_samples()
+    assert run.changes == {35: [True, False]}
+
+
+def test_the_times_are_those_of_the_clock_and_not_of_the_stamps():
+    # By its stamp, 18 ms, the sample that comes at 21 ms would be before the fault.
+    assert 21 - OLD < 20
+    assert Run(fault_window('silence: {}')).published[21] == []
+
+
+def test_of_samples_that_come_together_all_see_the_same():
+    run = Run(fault_window('silence: {}'), burst=3)
+    assert {time: len(found) for time, found in run.published.items()} == {
+        time: 0 if time in IN_WINDOW else 3 for time in MESSAGE_TIMES
+    }
+    assert run.changes == {21: [True], 41: [False]}
+
+
+def test_a_frozen_reading_has_the_stamps_of_the_samples():
+    run = Run(fault_window('freeze: {}'))
+    assert run.stamps() == of_samples()
+    angles = {time: CRANK.read(found[0]).angles[0] for time, found in run.published.items()}
+    frozen = {time: 15 if time in IN_WINDOW else time for time in MESSAGE_TIMES}
+    assert angles == pytest.approx({t: (f - OLD) * 1e-3 for t, f in frozen.items()}, abs=1e-12)
+
+
+def test_samples_that_are_no_numbers_are_no_ticks():
+    run = Run(fault_window('not_a_number: {}'))
+    assert run.stamps() == of_samples(IN_WINDOW)
+    assert run.counts.ticks == len(MESSAGE_TIMES) - len(IN_WINDOW)
+    assert run.counts.rejected[Rejection.NOT_FINITE] == len(IN_WINDOW)
+
+
+def test_a_clock_that_is_set_back_refuses_samples_that_come_from_its_future():
+    run = Run(fault_window('time_jump: {by: -5}'))
+    assert run.stamps() == of_samples(IN_WINDOW)
+    assert run.counts.clock_jumps == 1
+    assert sum(run.counts.rejected.values()) == len(IN_WINDOW)
+
+
+def test_a_clock_that_jumps_ahead_leaves_the_stamps_alone():
+    run = Run(fault_window('time_jump: {by: 0.05}'))
+    assert run.stamps() == of_samples()
+    assert run.counts.clock_jumps == 1, 'when it comes back'
+
+
+def test_a_link_that_is_broken_leaves_samples_without_a_pose():
+    run = Run(fault_window('broken_link: {link: coupler}'))
+    assert run.stamps() == of_samples(IN_WINDOW)
+    assert sum(run.counts.unclosed.values()) == len(IN_WINDOW)

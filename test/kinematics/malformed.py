@@ -12,15 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What can be wrong with a linkage: how to make each fault, the key that is named, the remedy."""
+"""What can be wrong with a linkage: how to change one, the key that is named, the remedy."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from linkage_ros.kinematics.linkage import Input, Pose, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.kinematics.linkage import Input, Linkage, Pose, RevoluteJoint, SlideJoint, Slider
 
-from .edits import Change, drop, Fields, fields, put, rename
 from .linkages import (
     class_3_linkage,
     four_bar_linkage,
@@ -28,9 +28,72 @@ from .linkages import (
     scotch_yoke_linkage,
 )
 
+# A linkage as fields that can be changed, and the changes.
+
+
+Fields = dict[str, Any]
+
+
+Change = Callable[[Fields], None]
+
+
+def fields(linkage: Linkage) -> Fields:
+    """Return the fields of a linkage, which may be changed."""
+    return {
+        'links': {name: dict(points) for name, points in linkage.links.items()},
+        'inputs': linkage.inputs,
+        'assembly': dict(linkage.assembly),
+        'joints': dict(linkage.joints),
+        'sliders': dict(linkage.sliders),
+        'traced': linkage.traced,
+        'pose': linkage.pose,
+    }
+
+
+def put(*path_and_value: Any) -> Change:
+    """Return a change that sets a value, given its path."""
+    *path, last, value = path_and_value
+
+    def change(linkage: Fields) -> None:
+        for key in path:
+            linkage = linkage[key]
+        linkage[last] = value
+
+    return change
+
+
+def drop(*path: str) -> Change:
+    """Return a change that removes what stands at a path."""
+
+    def change(linkage: Fields) -> None:
+        for key in path[:-1]:
+            linkage = linkage[key]
+        del linkage[path[-1]]
+
+    return change
+
+
+def rename(old: str, new: str) -> Change:
+    """Return a change that gives a link another name."""
+
+    def change(linkage: Fields) -> None:
+        linkage['links'] = {new if k == old else k: v for k, v in linkage['links'].items()}
+
+    return change
+
+
+# What can be wrong with a linkage: how to make each fault, the key that is named, the remedy.
+
+
 FOUR_BAR = fields(four_bar_linkage((0.04, 0.12, 0.08, 0.1), 'left'))
+
+
 SLIDER_CRANK = fields(inverted_slider_crank_linkage((0.15, 0.27, 0.0), 'ahead', along=0.3))
+
+
 CLASS_3 = fields(class_3_linkage())
+
+
 YOKE = fields(scotch_yoke_linkage(0.04))
 
 

@@ -38,11 +38,9 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from .linkages import four_bar_linkage
-from .on_crank import FourBar
-from .reference import four_bar, Quantity, turned
+from .linkages import four_bar_linkage, FourBar
+from .reference import ANGLE, four_bar, Quantity, RATE, TOGGLE, turned, Worst
 from .samples import FOUR_BARS, four_bars, FourBarCase
-from .tolerance import ANGLE, RATE, TOGGLE, Worst
 
 COUNT = 500
 ACCELERATED = 60

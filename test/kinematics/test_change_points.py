@@ -12,25 +12,31 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Where all links lie along the ground, a linkage may go on as either of two; it goes on as it was.
-
-The half-angle form decides that in closed form. κ grows beyond all bounds near a change point, so
-that the references here are motions known exactly: a parallelogram, whose coupler does not turn,
-and kites.
-"""
+"""Toggles and change points, and the sides that assemblies keep there."""
 
 from __future__ import annotations
 
 from itertools import pairwise
-from math import copysign, cos, nextafter, pi, remainder, sin
+from math import copysign, cos, nextafter, pi, remainder, sin, tau
+import random
 
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
+from mpmath import mp, mpf
 import pytest
 
-from .on_crank import FourBar
-from .reference import four_bar
-from .tolerance import ANGLE, RATE
+from .defects import defect
+from .flat_linkages import FLAT, Flat
+from .linkages import FourBar, InvertedSliderCrank
+from .reference import ANGLE, four_bar, inverted_slider_crank, LENGTH, RATE, TOGGLE, UNIT_ROUNDOFF
+
+# Where all links lie along the ground, a linkage may go on as either of two; it goes on as it
+# was.
+#
+# The half-angle form decides that in closed form. κ grows beyond all bounds near a change point,
+# so that the references here are motions known exactly: a parallelogram, whose coupler does not
+# turn, and kites.
+
 
 # a = c and b = d; the last as decimals, which do not cancel exactly.
 PARALLELOGRAMS = {
@@ -39,6 +45,7 @@ PARALLELOGRAMS = {
     'needle': (1.0, 2.0**-30, 1.0, 2.0**-30),
     'decimal': (0.04, 0.12, 0.04, 0.12),
 }
+
 
 # From as far as the eye sees to next to where rates are no normal numbers any more.
 NEAR = [1e-3, 1e-6, 1e-9, 1e-12, 1e-100, 1e-290]
@@ -229,3 +236,222 @@ def test_where_the_crank_pin_meets_the_ground_pivot_rates_stay_right(
     rates = dyad.rates(dyad.close(phi), 1.0)
     limits = (0.5 * (1.0 - sign / b), 0.5 * (1.0 + sign / b))
     assert rates == pytest.approx(limits, rel=1e-15, abs=4e-16)
+
+
+# Near a limit position: closed to the last digit inside, a toggle on it, an open gap outside.
+
+
+DISTANCES = [10.0**-exponent for exponent in range(3, 16)]
+
+
+# Lengths a, b, c, d and whether it is by stretching or folding that the dyad limits the crank.
+LIMITS = {
+    'stretched': ((4.0, 5.0, 3.0, 6.5), 'stretch'),
+    'folded, long coupler': ((4.0, 5.0, 3.0, 2.5), 'fold'),
+    'folded, long rocker': ((4.0, 2.0, 4.5, 5.0), 'fold'),
+    'stretched, short pair': ((40.0, 3.0, 2.5, 41.0), 'stretch'),
+    'folded, short pair': ((40.0, 3.0, 1.5, 41.0), 'fold'),
+    'stretched needle': ((1e6, 1e6, 1.0, 10.0), 'stretch'),
+}
+
+
+def limit_angle(name: str) -> mpf:
+    """Return the crank's limit angle between 0 and π."""
+    (a, b, c, d), kind = LIMITS[name]
+    span = mpf(b) + c if kind == 'stretch' else abs(mpf(b) - c)
+    return mp.acos((mpf(a) ** 2 + mpf(d) ** 2 - span**2) / (2 * mpf(a) * d))
+
+
+def inward(name: str) -> int:
+    """Return the sign in which the crank turns away from the limit angle into its range."""
+    return -1 if LIMITS[name][1] == 'stretch' else 1
+
+
+@pytest.mark.parametrize('name', LIMITS)
+@pytest.mark.parametrize('distance', DISTANCES)
+@pytest.mark.parametrize('side', [1, -1])
+def test_inside_the_limit_the_loop_closes_to_the_last_digit(
+    name: str, distance: float, side: int
+) -> None:
+    lengths, _ = LIMITS[name]
+    with mp.workdps(60):
+        phi = float(limit_angle(name) + inward(name) * distance)
+    dyad = FourBar(*lengths, side)
+    pose, truth = dyad.close(phi), four_bar(*lengths, phi, side)
+    assert pose.status in (Status.CLOSED, Status.TOGGLE)
+    assert (pose.status is Status.TOGGLE) == (pose.cross == 0.0)
+    limit = ANGLE if pose.status is Status.CLOSED else TOGGLE
+    if truth.gap <= 0:
+        assert truth.coupler.half_turn_error_of(pose.first) < limit
+        assert truth.rocker.half_turn_error_of(pose.second) < limit
+    if distance > 1e-13:
+        assert pose.status is Status.CLOSED
+    if pose.status is Status.CLOSED:
+        coupler_rate, rocker_rate = dyad.rates(pose, 1.0)
+        assert truth.coupler_rate.error_of(coupler_rate) < RATE
+        assert truth.rocker_rate.error_of(rocker_rate) < RATE
+
+
+@pytest.mark.parametrize('name', LIMITS)
+@pytest.mark.parametrize('distance', DISTANCES)
+@pytest.mark.parametrize('turn', [1, -1])
+def test_outside_the_limit_the_loop_is_open_by_the_gap(
+    name: str, distance: float, turn: int
+) -> None:
+    lengths, _ = LIMITS[name]
+    with mp.workdps(60):
+        phi = turn * float(limit_angle(name) - inward(name) * distance)
+    pose, truth = FourBar(*lengths, 1).close(phi), four_bar(*lengths, phi, 1)
+    rounding = UNIT_ROUNDOFF * sum(lengths)
+    if truth.gap > 32 * rounding:
+        assert pose.status is Status.OPEN
+    assert pose.status in (Status.OPEN, Status.TOGGLE)
+    assert abs(pose.gap - float(truth.gap)) < LENGTH * rounding
+
+
+@pytest.mark.parametrize('name', LIMITS)
+@pytest.mark.parametrize('turn', [1, -1])
+@pytest.mark.parametrize('side', [1, -1])
+def test_at_the_limit_the_position_is_that_of_links_in_line(
+    name: str, turn: int, side: int
+) -> None:
+    lengths, kind = LIMITS[name]
+    a, b, c, d = lengths
+    with mp.workdps(60):
+        exact = limit_angle(name)
+        line = turn * mp.arg(d - a * mp.expj(exact))
+        coupler = line + (mp.pi if kind == 'fold' and b < c else 0)
+        rocker = line + (0 if kind == 'fold' and b > c else mp.pi)
+    pose = FourBar(*lengths, side).close(turn * float(exact))
+    assert (pose.status, pose.gap, pose.cross) == (Status.TOGGLE, 0.0, 0.0)
+    # The rounded crank angle turns the diagonal by as much again as the angles' own rounding.
+    sensitivity = max(1.0, a * d / (b - c) ** 2)
+    assert abs(remainder(pose.first - float(coupler), 2 * pi)) < 2e-15 * sensitivity
+    assert abs(remainder(pose.second - float(rocker), 2 * pi)) < 2e-15 * sensitivity
+
+
+@pytest.mark.parametrize('distance', DISTANCES)
+@pytest.mark.parametrize(('a', 'd', 'h'), [(1.5, 2.0, 1.0), (2.0, 1.5, -1.0), (1.0, 1.0, 1e-3)])
+@pytest.mark.parametrize('side', [1, -1])
+def test_a_bent_rod_reaches_its_swivel_inside_the_limit_and_misses_it_outside(
+    distance: float, a: float, d: float, h: float, side: int
+) -> None:
+    with mp.workdps(60):
+        limit = mp.acos((mpf(a) ** 2 + mpf(d) ** 2 - mpf(h) ** 2) / (2 * mpf(a) * d))
+        inside, outside = float(limit + distance), float(limit - distance)
+    size = UNIT_ROUNDOFF * (a + d + abs(h))
+
+    truth = inverted_slider_crank(a, d, h, inside, side)
+    dyad = InvertedSliderCrank(a, d, h, side)
+    pose = dyad.close(inside)
+    assert pose.status in (Status.CLOSED, Status.TOGGLE)
+    assert (pose.status is Status.TOGGLE) == (pose.slide == 0.0)
+    error = ANGLE if pose.status is Status.CLOSED else TOGGLE
+    assert truth.rod.half_turn_error_of(pose.rail) < error
+    assert truth.slide.error_of(pose.slide) < error
+    if pose.status is Status.CLOSED:
+        rod_rate, slide_rate = dyad.rates(pose, 1.0)
+        assert truth.rod_rate.error_of(rod_rate) < RATE
+        assert truth.slide_rate.error_of(slide_rate) < RATE
+
+    missed = InvertedSliderCrank(a, d, h, side).close(outside)
+    gap = float(inverted_slider_crank(a, d, h, outside, side).gap)
+    assert missed.status in (Status.OPEN, Status.TOGGLE)
+    if gap > 32 * size:
+        assert missed.status is Status.OPEN
+    assert abs(missed.gap - gap) < LENGTH * size
+
+
+@pytest.mark.parametrize(
+    ('lengths', 'gap'),
+    [
+        ((1.0, 2.0, 3.0, 10.0), 4.0),
+        ((1.0, 10.0, 2.0, 3.0), 6.0),
+        ((1.0, 0.25, 0.25, 1.0), 1.5),
+        ((1.0, 2.0, 1.0, 1.0), 1.0),
+    ],
+)
+def test_the_gap_is_what_the_links_miss_each_other_by(
+    lengths: tuple[float, float, float, float], gap: float
+) -> None:
+    # Crank along the ground, where all lengths lie on one line and are added up by hand.
+    phi = 0.0 if gap in (4.0, 6.0, 1.0) else pi
+    pose = FourBar(*lengths, 1).close(phi)
+    assert pose.status is Status.OPEN
+    assert pose.gap == pytest.approx(gap, rel=1e-15)
+
+
+# One rule of sides for all dyads, also at change points (docs/conventions.md).
+#
+# Where a linkage folds flat, the named side holds while the crank points to one side of the line
+# on which it folds; beyond it the linkage goes on as it moves. Sides are read off the points'
+# places.
+
+
+COUNT = 150
+
+
+_STEP = 1e-6
+
+
+def drawn(kind: str, number: int) -> Flat:
+    return FLAT[kind](random.Random(f'sides/{kind}/{number}'))
+
+
+@pytest.mark.parametrize('kind', FLAT)
+def test_the_named_side_holds_on_one_side_of_the_line_on_which_it_folds(kind: str) -> None:
+    for number in range(COUNT):
+        flat = drawn(kind, number)
+        closure = Closure(flat.linkage)
+        (side,) = flat.linkage.assembly.values()
+        named = 1.0 if side in ('left', 'ahead') else -1.0
+        low, high = flat.holds
+        for part in (0.02, 0.3, 0.6, 0.98):
+            crank = low + part * (high - low)
+            position = closure.position(flat.sign * crank)
+            if position.status is Status.OPEN:
+                continue
+            met = flat.side(closure.points(position))
+            assert named * met > 0.0, (number, crank, flat)
+
+
+@pytest.mark.parametrize('kind', FLAT)
+def test_the_linkage_goes_on_through_its_change_points_as_it_moves(kind: str) -> None:
+    for number in range(COUNT // 3):
+        flat = drawn(kind, number)
+        closure = Closure(flat.linkage)
+        for at in flat.at:
+            before, here, after = (
+                closure.position(flat.sign * (at + off)) for off in (-_STEP, 0.0, _STEP)
+            )
+            assert here.status is Status.CHANGE_POINT, flat
+            if Status.OPEN in (before.status, after.status):
+                continue
+            # A motion that turned back would be off by as much as it moves.
+            rates = closure.velocity(here, 1.0).joints
+            for j, turning in enumerate(closure.turning):
+                x, y, z = (position.joints[j] for position in (before, here, after))
+                moved = [y - x, z - y]
+                if turning:
+                    moved = [remainder(part, tau) for part in moved]
+                for part in moved:
+                    assert abs(part - flat.sign * _STEP * rates[j]) < 1e-3 * _STEP, (number, flat)
+
+
+@pytest.mark.parametrize(
+    ('name', 'joint', 'expected'),
+    [
+        # The block's pin lies 1.793 m ahead of the rail's, at a crank angle of 30 degrees.
+        ('inv_ahead', 'b', 1.793151),
+        # A millionth of a length off the change point it is the same assembly.
+        ('inv_ahead2', 'b', 1.793153),
+        # |AD| = 2 sin 15°, with the rail on the ground.
+        ('straight_rev_ahead', 'r', 0.517638),
+        ('straight_rev_behind', 'r', -0.517638),
+    ],
+)
+def test_a_rail_on_the_ground_has_the_named_side(name: str, joint: str, expected: float) -> None:
+    closure = defect(name)
+    position = closure.position(pi / 6.0)
+    value = position.joints[list(closure.linkage.joints).index(joint)]
+    assert value == pytest.approx(expected, abs=1e-6)

@@ -12,23 +12,37 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Published joints are child less parent and slides in metres, whatever the links' frames."""
+"""A closure: published joints, steps alone and together, and points that are followed."""
 
 from __future__ import annotations
 
+from cmath import rect
 from math import cos, pi, remainder, sin
 import random
 
+from linkage_ros.kinematics.alone import pose_alone
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.survey import transmission_angles, usual_inputs, Way
+from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.scene.yaml_file import read_yaml
 import pytest
 
 from .linkages import four_bar_linkage, Frame, inverted_slider_crank_linkage
 from .reference import four_bar, inverted_slider_crank, UNIT_ROUNDOFF
+from .test_gallery import closure_of, FOLDER
+from .test_ranges import FILES
+
+# Published joints are child less parent and slides in metres, whatever the links' frames.
+
 
 CRANK_ANGLES = [-3.0, -1.2, 0.1, 0.9, 2.2, 3.1]
+
+
 FOUR_BAR = (0.04, 0.12, 0.08, 0.1)
+
+
 SLIDER_CRANK = (0.15, 0.27, -0.02)
 
 
@@ -212,3 +226,151 @@ def test_a_slide_line_may_be_given_in_any_length_and_from_any_of_its_points() ->
         )
         expected = Closure(plain).position(1.0).joints[1]
         assert Closure(linkage).position(1.0).joints == pytest.approx((expected,), rel=1e-15)
+
+
+# A step closed alone has the pose that it has among all others, to the last bit.
+
+
+@pytest.mark.parametrize('name', [file.stem for file in FILES])
+def test_a_step_alone_is_as_among_the_others(name: str) -> None:
+    closure = closure_of(name)
+    usual = usual_inputs(closure)
+    inputs = [[value + 0.02 * i for value in usual] for i in range(-150, 150)]
+    closed = [one for one in inputs if closure.position(*one).status.has_pose]
+    assert usual in map(tuple, closed)
+    for number in range(len(closure.steps)):
+        pose = pose_alone(closure, number, *closed[0])
+        for one in closed:
+            assert repr(pose(*one)) == repr(closure.position(*one).poses[number])
+
+
+def side_by_side(count: int) -> Closure:
+    """Return four-bars that one crank drives."""
+    links = {'ground': {'O': (0.0, 0.0)}, 'crank': {'O': (0.0, 0.0), 'A': (0.04, 0.0)}}
+    for i in range(count):
+        links['ground'][f'P{i}'] = (0.1, 0.001 * i)
+        links[f'coupler{i}'] = {'A': (0.0, 0.0), f'B{i}': (0.12, 0.0)}
+        links[f'rocker{i}'] = {f'P{i}': (0.0, 0.0), f'B{i}': (0.08, 0.0)}
+    return Closure(
+        Linkage(
+            links,
+            (Input('crank_joint', 'ground', 'crank'),),
+            {f'B{i}': 'left' for i in range(count)},
+            {'rocker_joint': RevoluteJoint('ground', 'rocker0')},
+            {},
+        )
+    )
+
+
+def test_what_a_loop_takes_hardly_grows_with_the_number_of_loops(monkeypatch) -> None:
+    taken = []
+    for count in (2, 20):
+        closings = [0]
+        kinds = {type(s) for s in side_by_side(1).steps if hasattr(s, 'transmission_angle')}
+        with monkeypatch.context() as patch:
+            for kind in kinds:
+                patch.setattr(kind, 'close', counted(kind.close, closings))
+            transmission_angles(Way(side_by_side(count)))
+        taken.append(closings[0] / count)
+    # Their ranges are searched for together; without that the ratio is 10.
+    assert taken[1] < 3.0 * taken[0]
+
+
+def counted(close, closings):
+    def counting(self, known):
+        closings[0] += 1
+        return close(self, known)
+
+    return counting
+
+
+# Followed points: each lies where its link carries it, and its rates are the slopes of its
+# places.
+#
+# Places are held against those of two named points of the link, which the closure places by
+# steps of their own; velocities and accelerations against differences of the places.
+
+
+# The values of the inputs: at all of them every loop closes, away from toggles.
+INPUTS = {
+    'four_bar': (0.7,),
+    'slider_crank': (2.5,),
+    'excavator_bucket': (1.05,),
+    'scotch_yoke': (2.0,),
+    'inverted_slider_crank': (1.7,),
+    'elliptic_trammel': (0.05,),
+    'whitworth_quick_return': (2.0,),
+    'class_3': (1.5,),
+    'windscreen_wiper': (0.4,),
+    'five_bar': (1.2, 1.9),
+}
+
+
+OFF = 0.03 - 0.05j
+
+
+"""From the first point of a link to one that has no name, in the link's frame."""
+
+
+@pytest.fixture(params=INPUTS)
+def case(request):
+    closure = Closure(read_linkage(read_yaml(FOLDER / f'{request.param}.yaml')[0]))
+    names = [(link, name) for link, points in closure.structure.links.items() for name in points]
+    frames = {
+        link: complex(*next(iter(p.values()))) for link, p in closure.structure.links.items()
+    }
+    points = [(k, complex(*closure.structure.links[k][name])) for k, name in names]
+    points += [(link, first + OFF) for link, first in frames.items()]
+    return closure, INPUTS[request.param], names, points
+
+
+def test_they_lie_where_their_links_carry_them(case):
+    closure, inputs, names, points = case
+    position = closure.position(*inputs)
+    follower = closure.follower(points)
+    places = follower.places(position)
+    expected, angles = closure.points(position), closure.link_angles(position)
+    wanted = [expected[name] for name in names]
+    for link, carried in closure.structure.links.items():
+        wanted.append(expected[link, next(iter(carried))] + rect(1.0, angles[link]) * OFF)
+    for index, place in zip(follower.indices, wanted, strict=True):
+        assert places[index] == pytest.approx(place, rel=1e-14, abs=1e-15)
+
+
+def test_rates_are_slopes_of_places(case):
+    closure, inputs, _, points = case
+    follower, step = closure.follower(points), 1e-4
+    rates, pulls = [0.9, -0.6][: len(inputs)], [0.4, 1.1][: len(inputs)]
+
+    def at(t):
+        moved = [q + v * t + 0.5 * a * t * t for q, v, a in zip(inputs, rates, pulls, strict=True)]
+        return follower.places(closure.position(*moved))
+
+    position = closure.position(*inputs)
+    velocity = closure.velocity(position, *rates)
+    acceleration = closure.acceleration(position, velocity, *pulls)
+    places = follower.places(position)
+    speeds = follower.velocities(position, velocity, places)
+    changes = follower.accelerations(position, velocity, acceleration, places)
+    before, after = at(-step), at(step)
+    assert set(follower.indices) <= set(range(len(places)))
+    for i in follower.indices:
+        assert speeds[i] == pytest.approx((after[i] - before[i]) / (2 * step), abs=1e-6)
+        bend = (after[i] - 2 * places[i] + before[i]) / step**2
+        assert changes[i] == pytest.approx(bend, rel=1e-5, abs=1e-5)
+
+
+def test_what_is_asked_twice_is_walked_once():
+    closure = Closure(read_linkage(read_yaml(FOLDER / 'four_bar.yaml')[0]))
+    follower = closure.follower([('coupler', 0.06 + 0j)] * 3)
+    assert len(set(follower.indices)) == 1
+
+
+def test_the_ground_stands():
+    closure = Closure(read_linkage(read_yaml(FOLDER / 'four_bar.yaml')[0]))
+    position = closure.position(1.0)
+    velocity = closure.velocity(position, 5.0)
+    follower = closure.follower([('ground', 0.3 + 0.4j)])
+    places = follower.places(position)
+    assert places == [0.3 + 0.4j]
+    assert follower.velocities(position, velocity, places) == [0j]

@@ -11,37 +11,51 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-"""What is iterated is what the closed form would say, depends on no history, and ends honestly."""
+
+"""Links that are iterated, alone and in chains with dyads."""
 
 from __future__ import annotations
 
+from cmath import rect
 from dataclasses import replace
 import json
-from math import tau
+from math import remainder, tau
 from pathlib import Path
 import random
 
 from linkage_ros.kinematics import closure as closure_module
-from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.groups import find_groups
-from linkage_ros.kinematics.linkage import GROUND, Linkage, Pose
+from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Pose, RevoluteJoint, Side
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Driven, Iterated, Structure
+from linkage_ros.kinematics.survey import Way
 from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
+from linkage_ros.solvers.table import TableClosure
+import numpy as np
 import pytest
 
 from .linkages import class_3_linkage
+from .platforms import linkage_of, platform
+
+# What is iterated is what the closed form would say, depends on no history, and ends honestly.
+
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'
+
+
 PLACES = json.loads((Path(__file__).parent / 'gallery.json').read_text('utf-8'))
+
 
 CLOSED_FORM = ['four_bar', 'slider_crank', 'inverted_slider_crank', 'scotch_yoke', 'jansen_leg',
                'whitworth_quick_return', 'elliptic_trammel', 'excavator_bucket']  # fmt: skip
+
+
 """Linkages of all kinds of dyads but PRP; the last ones by a slide that is driven."""
 
 
-def linkage_of(name: str) -> Linkage:
+def shipped_linkage(name: str) -> Linkage:
     return read_linkage(read_yaml(FOLDER / f'{name}.yaml')[0])
 
 
@@ -60,7 +74,7 @@ def iterated(linkage: Linkage) -> Structure:
 
 @pytest.mark.parametrize('name', CLOSED_FORM)
 def test_it_finds_what_the_closed_form_finds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    linkage = linkage_of(name)
+    linkage = shipped_linkage(name)
     exact = Closure(linkage)
     start = PLACES[f'{name}.yaml']['inputs'][1]
     rough = {
@@ -141,3 +155,137 @@ def test_a_pose_that_leads_nowhere_is_an_open_loop() -> None:
     closure = Closure(replace(sound, pose=Pose((3.0,), sound.pose.points)))
     assert closure.position(3.0).status is Status.OPEN
     assert closure.position(1.0).status is Status.OPEN
+
+
+# Iterated links behind dyads, and dyads behind iterated links: ranges, turns, ends, tables.
+
+
+FOUR_BARS = {
+    'crank-rocker': (1.0, 2.5, 2.0, 2.2),
+    'double rocker': (2.0, 1.5, 1.8, 2.4),
+    'change point': (1.0, 4.0, 3.0, 2.0),
+}
+
+
+def chain(rng: random.Random, lengths: tuple[float, float, float, float], tail: bool) -> Linkage:
+    """Return a four-bar whose rocker drives a platform, which may drive a dyad."""
+    a, b, c, d = lengths
+    made = platform(rng)
+    linkage = linkage_of(made, rng)
+    pivot = made.legs[0].anchor
+    links = {name: dict(points) for name, points in linkage.links.items()}
+    links['ground']['G'] = ((pivot - d).real, (pivot - d).imag)
+    links['crank'] = {'G': (0.0, 0.0), 'A': (a, 0.0)}
+    links['coupler'] = {'A': (0.0, 0.0), 'B': (b, 0.0)}
+    links['driver'] = {'O': (0.0, 0.0), 'B': (c, 0.0)}
+    driven = Linkage(
+        links={name: links[name] for name in ('ground', 'crank', 'coupler', 'driver')},
+        inputs=(Input('crank', 'ground', 'crank'),),
+        assembly={'B': 'left'},
+        joints={'driver': RevoluteJoint('ground', 'driver')},
+        sliders={},
+    )
+    four_bar = Closure(driven)
+    interval = four_bar.input_ranges[0]
+    x = interval.lowest + (interval.highest - interval.lowest) * rng.uniform(0.2, 0.8)
+    rocker = four_bar.position(x).joints[0]
+    tip = made.legs[0].reach * rect(1.0, made.pose[2] - rocker)
+    links['driver']['A0'] = (tip.real, tip.imag)
+    assembly: dict[str, Side] = {'B': 'left'}
+    joints = dict(linkage.joints)
+    assert linkage.pose is not None
+    if tail:
+        p, angle, _ = made.pose
+        arm, ground, end = (complex(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)) for _ in '123')
+        begin = p + rect(1.0, angle) * arm
+        end += begin
+        links['platform']['Q'] = (arm.real, arm.imag)
+        links['ground']['H'] = (ground.real, ground.imag)
+        links['tail'] = {'Q': (0.0, 0.0), 'E': (abs(end - begin), 0.0)}
+        links['fin'] = {'H': (0.0, 0.0), 'E': (abs(end - ground), 0.0)}
+        left = ((ground - begin).conjugate() * (end - begin)).imag > 0.0
+        assembly['E'] = 'left' if left else 'right'
+        joints['fin'] = RevoluteJoint('ground', 'fin')
+    return replace(
+        driven, links=links, assembly=assembly, joints=joints, pose=Pose((x,), linkage.pose.points)
+    )
+
+
+def misfit(closure: Closure, position: Position) -> float:
+    """Return how far links are from their shapes, and points of one name from each other."""
+    points = closure.points(position)
+    worst = 0.0
+    for link, given in closure.linkage.links.items():
+        names = list(given)
+        for one in names:
+            for other in names:
+                meant = abs(complex(*given[one]) - complex(*given[other]))
+                worst = max(worst, abs(abs(points[link, one] - points[link, other]) - meant))
+    for (_, one), place in points.items():
+        worst = max(worst, *(abs(place - z) for (_, name), z in points.items() if name == one))
+    return worst
+
+
+@pytest.mark.parametrize('tail', [False, True], ids=['', 'a dyad behind'])
+@pytest.mark.parametrize('name', FOUR_BARS)
+def test_a_chain_goes_its_ranges_without_a_leap_and_no_farther(name: str, tail: bool) -> None:
+    rng = random.Random(3)
+    for _ in range(6):
+        closure = Closure(chain(rng, FOUR_BARS[name], tail))
+        assert closure.linkage.pose is not None
+        (start,) = closure.linkage.pose.inputs
+        assert any(one.lowest <= start <= one.highest or one.whole for one in closure.input_ranges)
+        for interval in closure.input_ranges:
+            middle = 0.5 * (interval.lowest + interval.highest)
+            half = 0.5 * (interval.highest - interval.lowest)
+            places = None
+            # As the root of the input at the ends, so that neighbours are near each other there.
+            for part in np.sin(np.linspace(-0.5 * np.pi, 0.5 * np.pi, 1501)).tolist():
+                x = min(max(middle + half * part, interval.lowest), interval.highest)
+                position = closure.position(x)
+                assert position.status.has_pose, (x, interval)
+                now = closure.points(position)
+                if places is not None:
+                    assert max(abs(now[key] - place) for key, place in places.items()) < 0.25
+                places = now
+            for end, sign in ((interval.lowest, -1.0), (interval.highest, 1.0)):
+                position = closure.position(end)
+                assert misfit(closure, position) < 1e-12
+                if not interval.whole:
+                    assert position.status is Status.TOGGLE
+                    assert not closure.position(end + sign * 1e-9).status.has_pose
+
+
+def test_a_platform_on_a_change_point_linkage_repeats_after_two_turns() -> None:
+    found = 0
+    for seed in (4, 8, 9, 11, 12):
+        closure = Closure(chain(random.Random(seed), FOUR_BARS['change point'], tail=False))
+        (interval,) = closure.input_ranges
+        assert interval.whole
+        assert interval.turns == 2
+        assert Way(closure).ranges[0].highest == pytest.approx(2.0 * tau)
+        # Apart: the four-bar itself is on its other side after a turn, and back after two.
+        once, twice = (closure.points(closure.position(1.0 + n * tau)) for n in (1, 2))
+        start = closure.points(closure.position(1.0))
+        moved = max(abs(once[key] - place) for key, place in start.items())
+        assert moved > 0.01
+        assert all(abs(twice[key] - place) < 1e-12 for key, place in start.items())
+        found += 1
+    assert found == 5
+
+
+@pytest.mark.parametrize('tail', [False, True], ids=['', 'a dyad behind'])
+def test_a_table_of_a_chain_is_proven(tail: bool) -> None:
+    rng = random.Random(3)
+    linkage = chain(rng, FOUR_BARS['crank-rocker'], tail)
+    closure = Closure(linkage)
+    interval = Way(closure).ranges[0]
+    span = None
+    if not interval.whole:
+        width = interval.highest - interval.lowest
+        span = interval.lowest + 0.2 * width, interval.highest - 0.2 * width
+    table = TableClosure(linkage, 1e-4, span=span)
+    low, high = span or (0.0, tau)
+    for x in np.random.default_rng(2).uniform(low, high, 100).tolist():
+        pairs = zip(table.position(x).joints, closure.position(x).joints, strict=True)
+        assert all(abs(remainder(one - other, tau)) <= 1e-4 for one, other in pairs)

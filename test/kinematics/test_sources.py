@@ -28,9 +28,8 @@ from linkage_ros.kinematics.status import Status
 from mpmath import mp, mpf
 import pytest
 
-from .on_crank import FourBar, InvertedSliderCrank
-from .reference import four_bar, inverted_slider_crank, turned, UNIT_ROUNDOFF
-from .tolerance import ANGLE, LENGTH, RATE
+from .linkages import FourBar, InvertedSliderCrank
+from .reference import ANGLE, four_bar, inverted_slider_crank, LENGTH, RATE, turned, UNIT_ROUNDOFF
 
 # A crank that turns alone, one with its rocker, and two that meet a limit.
 FOUR_BARS = {

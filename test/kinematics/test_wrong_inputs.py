@@ -12,22 +12,32 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is no input: one line that names it, or a state without a pose; never a made-up one."""
+"""Linkages and inputs that are refused, in one line."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 from math import inf, nan
 import re
 from typing import Any
 
+from linkage_ros.errors import DefinitionError, LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.status import Status
 import numpy as np
 import pytest
 
+from .malformed import Fields, FOUR_BAR, MALFORMED, SLIDER_CRANK
 from .test_gallery import closure_of as shipped
 
+# What is no input: one line that names it, or a state without a pose; never a made-up one.
+
+
 ONE, TWO = shipped('four_bar'), shipped('five_bar')
+
+
 NAMES = 'left_crank_joint, right_crank_joint'
 
 
@@ -103,3 +113,41 @@ def test_a_position_without_rates_has_none() -> None:
         text = f'rates: a linkage that is {status} has none; ask its status'
         with pytest.raises(ValueError, match=f'^{text}$'):
             closure.velocity(position, 1.0)
+
+
+# A linkage that cannot be built is refused in one line: where, what is wrong, what would help.
+
+
+@pytest.mark.parametrize('name', MALFORMED)
+def test_a_malformed_linkage_is_refused_with_its_key_and_a_remedy(name: str) -> None:
+    sound, change, key, remedy = MALFORMED[name]
+    linkage = deepcopy(sound)
+    change(linkage)
+    with pytest.raises(DefinitionError) as caught:
+        Closure(Linkage(**linkage))
+    error = caught.value
+    assert error.where == key
+    assert remedy in error.remedy
+    assert str(error) == f'{error.where}: {error.reason}; {error.remedy}'
+    assert '\n' not in str(error)
+    assert isinstance(error, LinkageError)
+
+
+@pytest.mark.parametrize('sound', [FOUR_BAR, SLIDER_CRANK], ids=['four-bar', 'slider-crank'])
+def test_what_the_table_makes_malformed_is_sound_before(sound: Fields) -> None:
+    Closure(Linkage(**deepcopy(sound)))
+
+
+def test_links_may_stand_in_any_order_and_bear_any_names() -> None:
+    expected = Closure(Linkage(**deepcopy(FOUR_BAR))).position(1.0).joints
+    turned = deepcopy(FOUR_BAR)
+    turned['links'] = dict(reversed(list(turned['links'].items())))
+    assert Closure(Linkage(**turned)).position(1.0).joints == expected
+
+
+def test_points_that_only_one_link_names_are_no_pins() -> None:
+    expected = Closure(Linkage(**deepcopy(FOUR_BAR))).position(1.0).joints
+    traced = deepcopy(FOUR_BAR)
+    traced['links']['coupler']['P'] = (0.06, 0.03)
+    traced['links']['rocker']['Q'] = (0.0, 0.0)
+    assert Closure(Linkage(**traced)).position(1.0).joints == expected

@@ -12,13 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""The URDF of a linkage: valid, the same every time, with limits that its joints keep."""
+"""The URDF of a linkage: valid, with limits that its joints keep, and read back."""
 
 from __future__ import annotations
 
 from collections import Counter
-from math import pi
+from math import pi, remainder, tau
 from xml.etree import ElementTree as ET
 
 from linkage_ros.cli.linkage_file import open_linkage
@@ -27,9 +26,12 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.survey import samples, usual_inputs, Way
+from linkage_ros.models.imported import imported
 from linkage_ros.models.part import Part, PartError
 from linkage_ros.models.urdf import urdf
+from linkage_ros.models.urdf_file import read_urdf
 from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.linkage_text import linkage_text
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.robot_model import scene_model
 import pytest
@@ -39,8 +41,15 @@ from .odd import closure_of, ODD, UNTOLD
 from .walked import BEGIN, heard, moving, moving_text, MS, said, Walked
 from ..support.scenes import linkage_of, scene_of
 
+# The URDF of a linkage: valid, the same every time, with limits that its joints keep.
+
+
 SCENES = LINKAGES.parent / 'scenes'
+
+
 CASES = [*GALLERY, 'five_bar', *ODD]
+
+
 URDF_KINDS = {'revolute', 'continuous', 'prismatic', 'fixed'}
 
 
@@ -270,3 +279,67 @@ def test_pinocchio_reads_it_too(name):
     data = urdf('it', [Part(closure(name))])
     model = pinocchio.buildModelFromXML(data.decode())
     assert set(model.names) - {'universe'} == set(limits_of(data))
+
+
+# Linkage to URDF and back: the joints have the same values all over the range.
+
+
+WITHIN = 1e-12
+
+
+def back(closure):
+    """Return a linkage that went through URDF and through the text of a linkage file."""
+    made = imported(read_urdf(urdf('it', [Part(closure)]), 'it.urdf'))
+    text = linkage_text(made.linkage)
+    return closure_of(text)
+
+
+def inputs_of(closure):
+    """Return inputs all over the range, but for its very ends, where rounding opens loops."""
+    if len(closure.linkage.inputs) > 1:
+        return [(1.3 + 0.05 * i, 1.8 - 0.03 * i) for i in range(15)]
+    interval = Way(closure).widest_range
+    return [(value,) for value in samples(interval, 200)[1:-1]]
+
+
+def differences(one, other):
+    """Yield by how much each joint of the one differs in the other, of its size."""
+    places = {name: i for i, name in enumerate(other.linkage.joints)}
+    for inputs in inputs_of(one):
+        here, there = one.position(*inputs), other.position(*inputs)
+        assert here.joints
+        assert there.joints, inputs
+        for name, value, turns in zip(one.linkage.joints, here.joints, one.turning, strict=True):
+            if name in places:
+                off = there.joints[places[name]] - value
+                yield abs(remainder(off, tau)) if turns else abs(off) / size_of(one)
+
+
+@pytest.mark.parametrize('name', [*GALLERY, 'five_bar'])
+def test_every_shipped_linkage_comes_back_with_the_same_joints_and_masses(name):
+    closure = open_linkage(str(LINKAGES / f'{name}.yaml'))
+    again = back(closure)
+    assert list(again.linkage.joints) == list(closure.linkage.joints)
+    assert [e.joint for e in again.linkage.inputs] == [e.joint for e in closure.linkage.inputs]
+    assert max(differences(closure, again)) <= WITHIN
+    assert again.linkage.masses.keys() == closure.linkage.masses.keys()
+    for link, mass in closure.linkage.masses.items():
+        origin = next(iter(again.linkage.links[link].values()))
+        assert origin == (0.0, 0.0)
+        assert again.linkage.masses[link].mass == mass.mass
+        assert again.linkage.masses[link].inertia == pytest.approx(mass.inertia, rel=1e-15)
+
+
+@pytest.mark.parametrize('name', ODD)
+def test_every_way_from_frame_to_frame(name):
+    closure = closure_of(name)
+    again = back(closure)
+    lost = set(closure.linkage.joints) - set(again.linkage.joints)
+    assert len(lost) <= LOST.get(name, 0)
+    assert max(differences(closure, again)) <= WITHIN
+
+
+LOST = {'one more than needed, and the crank once more': 3, 'a rod that only slides hold': 1}
+
+
+"""Joints that no link hangs by; those of links that others tell of are left out."""

@@ -12,21 +12,35 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""Messages as arrays, as rosbags reads them one by one; damaged ones are left out."""
+"""Messages as arrays, and the blocks in which they are read."""
 
 from __future__ import annotations
 
+from itertools import groupby, pairwise
+from operator import itemgetter
+from types import SimpleNamespace
+
 from hypothesis import given
 from hypothesis import strategies as st
+from linkage_ros.bag.reading.contents import contents_of
+from linkage_ros.bag.reading.reader import BagMessage, read_bag
+from linkage_ros.bag.topic import Topic
+from linkage_ros.report import blocks as blocks_module
+from linkage_ros.report.blocks import Blocks, Progress
 from linkage_ros.report.diagnostics import statuses
 from linkage_ros.report.joint_states import JointStates, MOST_JOINTS
 import numpy as np
 import pytest
 
+from .runs import recorded
 from ..support.messages import STORE
 
+# Messages as arrays, as rosbags reads them one by one; damaged ones are left out.
+
+
 TYPES = STORE.types
+
+
 STATE, ARRAY = 'sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'
 
 
@@ -49,6 +63,8 @@ def encoded(message, little=True):
 
 
 NAMES = st.text('abcé', min_size=1, max_size=6)
+
+
 MESSAGES = st.lists(
     st.tuples(
         st.builds(
@@ -84,10 +100,20 @@ def test_all_that_publishers_may_mix_comes_out_as_rosbags_reads_it(messages):
 
 
 GOOD = encoded(state(5, {'a': 1.0, 'b': 2.0}))
+
+
 TWICE = TYPES[STATE](header(5), ['a', 'a'], np.ones(2), np.array([]), np.array([]))
+
+
 UNEQUAL = TYPES[STATE](header(5), ['a', 'b'], np.ones(2), np.ones(1), np.array([]))
+
+
 NOTHING = TYPES[STATE](header(5), [], np.array([]), np.array([]), np.array([]))
+
+
 NAMES_ALONE = TYPES[STATE](header(5), ['a'], np.array([]), np.array([]), np.array([]))
+
+
 BAD = {
     'malformed message': [
         b'', b'\x00\x01', GOOD[:40], b'\x07' * len(GOOD), GOOD[:4] + b'\xff' * 90
@@ -202,3 +228,95 @@ def test_damaged_diagnostics_say_nothing():
         data = bytearray(whole)
         data[at] = 0xFF
         statuses(bytes(data))
+
+
+# A bag in blocks: nothing is lost, ticks stay whole, and counts are those of ``linkage info``.
+
+
+BLOCK_NAMES = ('/a', '/b', '/c')
+
+
+TOPICS = tuple(Topic(name, 'std_msgs/msg/Empty', '', '') for name in BLOCK_NAMES)
+
+
+BLOCK_MESSAGES = st.lists(
+    st.builds(
+        BagMessage,
+        st.sampled_from((*BLOCK_NAMES, '/not in the index')),
+        st.integers(0, 9),
+        st.integers(0, 9),
+        st.binary(max_size=30),
+    ),
+    max_size=200,
+)
+
+
+def bag_of(messages):
+    return SimpleNamespace(topics=TOPICS, messages=lambda: iter(messages))
+
+
+@pytest.fixture(scope='module', autouse=True)
+def small():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(blocks_module, '_MOST_MESSAGES', 8)
+        patch.setattr(blocks_module, '_MOST_BYTES', 100)
+        yield
+
+
+@given(BLOCK_MESSAGES, st.sets(st.sampled_from(BLOCK_NAMES)))
+def test_every_wanted_message_is_in_one_block_in_its_place(messages, wanted):
+    found, counts = [], []
+    reader = Blocks(bag_of(messages), wanted, Progress(counts.append))
+    for block in reader:
+        entries = sorted((*entry, name) for name, own in block.items() for entry in own)
+        assert len({number for number, *_ in entries}) == len(entries)
+        found += [(name, *entry) for _, *entry, name in entries]
+    assert found == [tuple(each) for each in messages if each.topic in wanted]
+    assert counts == sorted(counts)
+    assert reader.contents() == contents_of(bag_of(messages))
+
+
+@given(BLOCK_MESSAGES)
+def test_a_tick_is_in_one_block_unless_it_is_larger_than_any(messages):
+    blocks = [
+        sorted((number, log, len(data)) for own in block.values() for number, log, _, data in own)
+        for block in Blocks(bag_of(messages), (*BLOCK_NAMES, '/not in the index'), Progress())
+    ]
+    for before, after in pairwise(blocks):
+        if before[-1][1] == after[0][1]:
+            assert len(before) >= 4 * 8 or sum(size for *_, size in before) >= 4 * 100
+    for block in blocks:
+        # No block is much larger than is meant: but for its last time, and its last message.
+        ticks = [[*each] for _, each in groupby(block, key=itemgetter(1))]
+        rest = [entry for tick in ticks[:-1] for entry in tick]
+        assert len(rest) <= 8 or len(rest) - len(ticks[-2]) < 8
+        assert len(block) <= 4 * 8
+        assert sum(size for *_, size in block[:-1]) < 4 * 100 + 30
+
+
+@pytest.mark.parametrize('harm', ['cut in a chunk', 'a damaged chunk', 'without an end', 'none'])
+def test_counts_are_those_of_info_for_a_harmed_bag_too(tmp_path, harm):
+    folder = recorded(tmp_path, 'effects: {velocity: {}}\n').path
+    (file,) = folder.glob('*.mcap')
+    content = bytearray(file.read_bytes())
+    if harm == 'cut in a chunk':
+        content = content[: len(content) // 2]
+    elif harm == 'without an end':
+        content = content[:-9]
+    elif harm == 'a damaged chunk':
+        content[len(content) // 3] ^= 1
+    file.write_bytes(content)
+    bag = read_bag(folder, allow_truncated=True)
+    reader = Blocks(bag, ['/joint_states'], Progress())
+    assert sum(len(own) for block in reader for own in block.values()) == next(
+        each.messages for each in reader.contents().topics if each.topic.name == '/joint_states'
+    )
+    assert reader.contents() == contents_of(bag)
+    assert bool(reader.contents().damage) == (harm == 'a damaged chunk')
+
+
+def test_a_wish_to_stop_ends_the_reading_at_the_next_block():
+    messages = [BagMessage('/a', number, 0, b'') for number in range(100)]
+    reader = Blocks(bag_of(messages), ['/a'], Progress(stopped=lambda: True))
+    assert sum(len(block['/a']) for block in reader) == 8
+    assert reader.contents().stopped

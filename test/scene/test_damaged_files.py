@@ -12,21 +12,32 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""The shipped files, damaged at random: what comes of them runs, or is refused with one line."""
+"""Shipped files, damaged or changed at random: they run, or one line says why not."""
 
 from __future__ import annotations
 
 from copy import deepcopy
+from math import isfinite
+from pathlib import Path
+from typing import Any
 
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import FileError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.pipeline import Pipeline
+from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.load import load_scene, parse_scene
+from linkage_ros.scene.section import Section
+from linkage_ros.scene.yaml_file import read_yaml
+import pytest
 import yaml
 
 from .files import CONFIG, is_one_line
+
+# The shipped files, damaged at random: what comes of them runs, or is refused with one line.
+
 
 SHIPPED = [load_scene(scene).files for scene in sorted((CONFIG / 'scenes').glob('*.yaml'))]
 
@@ -103,3 +114,119 @@ def test_damaged_contents(data):
             if kind == 'rename':
                 parent[f'{key}_'] = value
     either_runs_or_says_why({name: yaml.safe_dump(file).encode() for name, file in files.items()})
+
+
+# A gallery file that was spoilt is answered, or refused in one line; never with a traceback.
+
+
+FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'
+
+
+GALLERY = {file.stem: yaml.safe_load(file.read_text('utf-8')) for file in FOLDER.glob('*.yaml')}
+
+
+Path_ = tuple[Any, ...]
+
+
+NUMBERS = st.sampled_from(
+    [0, 0.0, -0.0, 1, -1, 1e-12, 1e-300, 5e-324, 1e9, -1e9, 1e300, float('nan'), float('inf')]
+)
+
+
+WORDS = st.sampled_from(
+    ['ground', 'crank', 'A', 'B', 'O2', 'left', 'right', 'ahead', 'behind', '', 'nowhere']
+)
+
+
+JUNK = st.one_of(NUMBERS, WORDS, st.none(), st.booleans(), st.builds(list), st.builds(dict))
+
+
+def damaged_places(content: Any, path: Path_ = ()) -> list[Path_]:
+    """Return the path of everything within a file."""
+    found: list[Path_] = []
+    items = content.items() if isinstance(content, dict) else enumerate(content)
+    for key, value in items:
+        found.append((*path, key))
+        if isinstance(value, dict | list):
+            found += damaged_places(value, (*path, key))
+    return found
+
+
+def at(content: Any, path: Path_) -> Any:
+    for key in path:
+        content = content[key]
+    return content
+
+
+@st.composite
+def spoilt(draw: st.DrawFn) -> tuple[str, Any]:
+    """Return the name of a gallery file, and what is left of it after one to three accidents."""
+    name = draw(st.sampled_from(sorted(GALLERY)))
+    content = deepcopy(GALLERY[name])
+    for _ in range(draw(st.integers(1, 3))):
+        known = damaged_places(content)
+        if not known:
+            break
+        *above, last = path = draw(st.sampled_from(known))
+        holder = at(content, tuple(above))
+        accident = draw(st.sampled_from(['drop', 'junk', 'number', 'swap', 'rename', 'copy']))
+        if accident == 'drop':
+            del holder[last]
+        elif accident == 'junk':
+            holder[last] = draw(JUNK)
+        elif accident == 'number':
+            holder[last] = draw(NUMBERS)
+        elif accident == 'rename' and isinstance(holder, dict):
+            holder[draw(WORDS)] = holder.pop(last)
+        elif accident == 'copy' and isinstance(holder, dict):
+            holder[f'{last}_2'] = deepcopy(holder[last])
+        else:
+            other = draw(st.sampled_from(known))
+            if other[: len(path)] != path and path[: len(other)] != other:
+                first, second = deepcopy(at(content, path)), deepcopy(at(content, other))
+                holder[last] = second
+                at(content, other[:-1])[other[-1]] = first
+    return name, content
+
+
+def read(name: str, content: Any) -> Linkage | FileError:
+    """Return what a file holds, or how it is refused."""
+    try:
+        return read_linkage(Section(f'{name}.yaml', '', content))
+    except FileError as error:
+        return error
+
+
+@settings(
+    derandomize=True, deadline=None, max_examples=600, suppress_health_check=list(HealthCheck)
+)
+@given(spoilt())
+def test_a_spoilt_file_is_answered_or_refused_in_one_line(case: tuple[str, Any]) -> None:
+    name, content = case
+    found = read(name, content)
+    if isinstance(found, FileError):
+        assert str(found).startswith(f'{name}.yaml')
+        assert '\n' not in str(found)
+        assert found.reason
+        assert found.remedy
+        return
+    linkage = found
+    closure = Closure(linkage)
+    count = len(linkage.inputs)
+    for value in (0.0, 0.3, 1.0, -2.5, 1e6):
+        position = closure.position(*(value,) * count)
+        assert all(map(isfinite, position.joints))
+        assert isfinite(position.gap)
+        assert position.gap >= 0.0
+        if position.status.has_rates:
+            velocity = closure.velocity(position, *(1.0,) * count)
+            closure.acceleration(position, velocity, *(0.0,) * count)
+            closure.residual(position)
+            closure.nearness(position)
+        else:
+            assert bool(position.joints) == position.status.has_pose
+
+
+@pytest.mark.parametrize('name', sorted(GALLERY))
+def test_what_is_spoilt_here_is_sound_before(name: str) -> None:
+    read_linkage(read_yaml(FOLDER / f'{name}.yaml')[0])

@@ -71,7 +71,7 @@ import pytest
 import yaml
 
 from .files import CONFIG, FOUR_BAR, SCENE
-from .test_bad_linkages import SLIDER, WRITTEN_OUT
+from .test_bad_files import SLIDER, WRITTEN_OUT
 
 Validator = pytest.importorskip('jsonschema').Draft202012Validator
 

@@ -37,11 +37,11 @@ from .linkages import (
     crank_rockers,
     GALLERY,
     Lengths,
-    shipped,
     true_joints,
     worst_error,
 )
 from ..kinematics.linkages import four_bar_linkage
+from ..support.scenes import shipped
 
 STARTS = {'from knots': None, 'warm': True, 'cold': False}
 

@@ -12,27 +12,39 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""Where path generation begins: four-bars that close, laid upon the points by least squares."""
+"""Where path generation begins: coupler curves and starts from them."""
 
 from __future__ import annotations
 
 from cmath import rect
-from math import inf, pi
+from math import inf, pi, tan
 import pickle
 from typing import Any
 
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from linkage_ros.synthesis.design import Assembly
 from linkage_ros.synthesis.path.aim import Aim
+from linkage_ros.synthesis.path.arcs import along, resampled, theta_at
 from linkage_ros.synthesis.path.fit import allowed, improve
+from linkage_ros.synthesis.path.model import closes, COLUMNS, folds, slopes
 from linkage_ros.synthesis.path.search import problem_of
 import numpy as np
 import pytest
 
-from .by_hand import on
+from .by_hand import Lengths, on, pins, transmission
+
+# Where path generation begins: four-bars that close, laid upon the points by least squares.
+
 
 POINTS = np.array([0.1 + 0.2j, 0.3 + 0.3j, 0.4 - 0.1j, 0.1 - 0.4j, -0.4 - 0.2j, -0.5 + 0.2j])
+
+
 TIMING = np.arange(6) * pi / 3.0
+
+
 COUNT = 400
+
 
 AIMS = {
     'timed': (Aim(POINTS, TIMING, True, True, 0.05, 20.0), True),
@@ -134,3 +146,113 @@ def test_steps_keep_what_was_asked_for(aim: Aim, closed: bool, guard: float) -> 
     if aim.timing is not None and not aim.zero_free:
         world = fitted.angles + fitted.rows[:, 2:3] - aim.timing
         assert np.exp(1j * world) == pytest.approx(1.0)
+
+
+# Coupler curves of many four-bars: places by compass and ruler, derivatives by differences.
+
+
+length = st.floats(0.2, 4.0)
+
+
+# Where the crank's pin can meet the rocker's pivot, no circle says where the other pin is.
+lengths_of_any = st.tuples(length, length, length, length).filter(
+    lambda lengths: abs(lengths[0] - lengths[3]) > 1e-3
+)
+
+
+angle = st.floats(-7.0, 7.0)
+
+
+def row(lengths: Lengths, at: complex, ground: float, point: complex) -> np.ndarray[Any, Any]:
+    return np.array([[at.real, at.imag, ground, *np.log(lengths), point.real, point.imag]])
+
+
+@given(lengths_of_any, angle, st.sampled_from(('left', 'right')), angle)
+def test_the_traced_point_is_where_circles_put_it(
+    lengths: Lengths, direction: float, side: Assembly, ground: float
+) -> None:
+    assume(pins(lengths, direction) is not None)
+    assume(transmission(lengths, direction) > 0.01)
+    near, far = rect(lengths[0], direction), on(side, lengths, direction)
+    point = 0.7 - 0.4j
+    place = (near + point * (far - near) / lengths[1]) * rect(1.0, ground) + (2.0 + 3.0j)
+    rows = row(lengths, 2.0 + 3.0j, ground, point)
+    sign = np.array([1.0 if side == 'left' else -1.0])
+    assert abs(slopes(rows, np.array([[direction]]), sign).places[0, 0] - place) < 1e-9
+
+
+GENERATOR = np.random.default_rng(5)
+
+
+ROWS = np.column_stack(
+    (
+        GENERATOR.normal(size=(4, 3)),
+        np.log((1.0, 2.3, 2.1, 2.0)) + GENERATOR.normal(0.0, 0.02, (4, 4)),
+        GENERATOR.normal(size=(4, 2)),
+    )
+)
+
+
+ANGLES = GENERATOR.uniform(0.0, 6.0, (4, 5))
+
+
+SIDE = np.array((1.0, -1.0, 1.0, -1.0))
+
+
+STEP = 1e-6
+
+
+@pytest.mark.parametrize('column', range(len(COLUMNS)), ids=COLUMNS)
+def test_derivatives_by_dimensions_are_those_of_differences(column: int) -> None:
+    aside = np.zeros(len(COLUMNS))
+    aside[column] = STEP
+    places = [slopes(ROWS + sign * aside, ANGLES, SIDE).places for sign in (1.0, -1.0)]
+    folded = [folds(ROWS + sign * aside, ANGLES)[0] for sign in (1.0, -1.0)]
+    by_place = slopes(ROWS, ANGLES, SIDE).by_dimension[..., column]
+    by_fold = folds(ROWS, ANGLES)[1][..., column]
+    assert np.abs((places[0] - places[1]) / (2.0 * STEP) - by_place).max() < 1e-8
+    assert np.abs((folded[0] - folded[1]) / (2.0 * STEP) - by_fold).max() < 1e-8
+
+
+def test_derivatives_by_the_crank_are_those_of_differences() -> None:
+    places = [slopes(ROWS, ANGLES + by, SIDE).places for by in (STEP, -STEP)]
+    folded = [folds(ROWS, ANGLES + by)[0] for by in (STEP, -STEP)]
+    by_place = slopes(ROWS, ANGLES, SIDE).by_angle
+    assert np.abs((places[0] - places[1]) / (2.0 * STEP) - by_place).max() < 1e-8
+    by_fold = folds(ROWS, ANGLES)[2]
+    assert np.abs((folded[0] - folded[1]) / (2.0 * STEP) - by_fold).max() < 1e-8
+
+
+@given(lengths_of_any, angle)
+def test_a_fold_is_told_by_the_transmission_angle(lengths: Lengths, direction: float) -> None:
+    assume(pins(lengths, direction) is not None)
+    acute = transmission(lengths, direction)
+    assume(acute > 0.01)
+    folded = folds(row(lengths, 0j, 0.0, 0j), np.array([[direction]]))[0]
+    assert abs(folded[0, 0]) == pytest.approx(1.0 / tan(acute), rel=1e-6, abs=1e-9)
+
+
+@given(lengths_of_any, angle, st.floats(0.0, 6.2))
+def test_a_linkage_closes_if_it_does_at_every_angle_on_the_way(
+    lengths: Lengths, low: float, travel: float
+) -> None:
+    closed = bool(closes(row(lengths, 0j, 0.0, 0j), np.array([low]), np.array([low + travel]))[0])
+    # The ground line's directions are where the diagonal is shortest and longest.
+    turns = [i * pi for i in range(-10, 10) if low <= i * pi <= low + travel]
+    found = [pins(lengths, at) for at in (*np.linspace(low, low + travel, 9), *turns)]
+    if closed:
+        assert all(found)
+    else:
+        folded = [transmission(lengths, at) for at in (low, low + travel, *turns) if all(found)]
+        assert not all(found) or min(folded) < 1e-3
+
+
+def test_places_along_a_curve_are_found_by_the_length_of_its_chords() -> None:
+    curves = np.array([[0j, 3.0, 3.0 + 1.0j], [0j, 1.0j, 4.0j]])
+    way = along(curves)
+    assert way == pytest.approx(np.array([[0.0, 0.75, 1.0], [0.0, 0.25, 1.0]]))
+    wanted = np.array([0.0, 0.25, 0.5, 1.0])
+    places = np.array([[0j, 1.0, 2.0, 3.0 + 1.0j], [0j, 1.0j, 2.0j, 4.0j]])
+    assert resampled(curves, way, wanted) == pytest.approx(places)
+    steps = np.array([[0.0, 1 / 6, 1 / 3, 1.0], [0.0, 0.5, 2 / 3, 1.0]])
+    assert theta_at(way, wanted) == pytest.approx(steps)

@@ -12,18 +12,27 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+"""Studies: the best of all candidates, whoever works them out."""
 
-"""A study finds the best of all its candidates, whoever works them out."""
+from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import sys
 import tracemalloc
 
+from linkage_ros.errors import LinkageError
+from linkage_ros.synthesis.extras import distributed, scipy_optimize
 from linkage_ros.synthesis.study import CHUNK, Found, search
 import numpy as np
 import pytest
 
+# A study finds the best of all its candidates, whoever works them out.
+
+
 CAST = 3 * CHUNK + 7
+
+
 """Candidates, of which the last chunk has only some."""
 
 
@@ -135,3 +144,26 @@ def test_any_number_of_workers_finds_the_same():
                 assert found == expected
                 assert done == sorted(done)
                 assert done[-1] == study['count']
+
+
+# A library that only some kinds of synthesis need is named, with what installs it.
+
+
+@pytest.mark.parametrize(
+    ('library', 'asked', 'extra'),
+    [('scipy', scipy_optimize, 'design'), ('distributed', distributed, 'dask')],
+)
+def test_what_is_missing_is_told_with_what_installs_it(
+    library: str, asked: Callable[[], object], extra: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # None stands for a module that is not there.
+    monkeypatch.setitem(sys.modules, library, None)
+    monkeypatch.delitem(sys.modules, 'scipy.optimize', raising=False)
+    with pytest.raises(LinkageError) as caught:
+        asked()
+    assert str(caught.value) == f"{library}: is not installed; pip install 'linkage_ros[{extra}]'"
+
+
+def test_what_is_there_is_returned() -> None:
+    optimize = pytest.importorskip('scipy.optimize')
+    assert scipy_optimize() is optimize

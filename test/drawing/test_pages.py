@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""The page of drives, effects and faults says what the code declares, and shows its own scenes."""
+"""The pages of gallery and effects are those of the files and the code."""
 
 from __future__ import annotations
 
@@ -24,6 +23,7 @@ from pathlib import Path
 import re
 import sys
 
+from linkage_ros.cli.linkage_file import open_linkage
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.faults.fault import FAULTS
@@ -31,17 +31,73 @@ from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
 
+# The gallery shows every linkage that comes with the package, as its file is now.
+
+
 ROOT = Path(__file__).parents[2]
+
+
+FILES = sorted((ROOT / 'config' / 'linkages').glob('*.yaml'))
+
+
+PNG = b'\x89PNG\r\n\x1a\n'
+
+
+SPEC = spec_from_file_location('make_gallery', ROOT / 'docs' / 'make_gallery.py')
+
+
+make_gallery = module_from_spec(SPEC)
+
+
+@pytest.fixture(scope='module')
+def page() -> str:
+    pytest.importorskip('PIL')
+    SPEC.loader.exec_module(make_gallery)
+    return (ROOT / 'docs' / 'gallery.md').read_text('utf-8')
+
+
+@pytest.mark.parametrize('file', FILES, ids=lambda file: file.stem)
+def test_a_linkage_is_told_as_its_file_has_it(page: str, file: Path) -> None:
+    picture = ROOT / 'docs' / 'gallery' / f'{file.stem}.png'
+    chapter = make_gallery.chapter(open_linkage(str(file)), file, picture)
+    assert '\n'.join(chapter) in page, 'make gallery makes it anew'
+    assert picture.read_bytes().startswith(PNG)
+    assert picture.stat().st_size < make_gallery.LARGEST
+
+
+def test_nothing_else_is_in_the_gallery(page: str) -> None:
+    assert page.count('\n## ') == len(FILES)
+    drawn = {file.stem for file in (ROOT / 'docs' / 'gallery').iterdir()}
+    assert drawn == {file.stem for file in FILES}
+
+
+# The page of drives, effects and faults says what the code declares, and shows its own scenes.
+
+
 LINKAGES = ROOT / 'config' / 'linkages'
 
-SPEC = spec_from_file_location('make_effects', ROOT / 'docs' / 'make_effects.py')
-make_effects = module_from_spec(SPEC)
-SPEC.loader.exec_module(make_effects)
+
+EFFECTS_SPEC = spec_from_file_location('make_effects', ROOT / 'docs' / 'make_effects.py')
+
+
+make_effects = module_from_spec(EFFECTS_SPEC)
+
+
+EFFECTS_SPEC.loader.exec_module(make_effects)
+
 
 PAGE = make_effects.PAGE.read_text('utf-8')
+
+
 SECTIONS = make_effects.sections(PAGE)
+
+
 BY_NAME = {section.name: section for section in SECTIONS}
+
+
 MODULES = {**DRIVES, **EFFECTS, **FAULTS}
+
+
 DRAWN = [section for section in SECTIONS if section.scene]
 
 

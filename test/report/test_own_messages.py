@@ -1,0 +1,331 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a report says of curves, diagnostics and samples of a run."""
+
+from __future__ import annotations
+
+import json
+from math import inf, nan
+from pathlib import Path
+
+from linkage_ros.joint_state import JointStateWriter
+from linkage_ros.report.data import page_data
+from linkage_ros.report.health import _COUNTED
+from linkage_ros.report.html import run_html, Told
+import numpy as np
+import pytest
+
+from .runs import (
+    BEGIN,
+    but,
+    curve,
+    MS,
+    on_lanes,
+    read,
+    recorded,
+    Said,
+    sample,
+    STORE,
+    turning,
+    TYPES,
+)
+
+# Curves are what the messages of a run say; numbers that no joint has break nothing.
+
+
+STATE = 'sensor_msgs/msg/JointState'
+
+
+def test_ticks_are_late_by_what_they_were_late(tmp_path):
+    late = np.random.default_rng(7).integers(0, 300_000, 1000)
+    late[::10] = 0
+    moments = but(
+        1000, lambda tick, m: m._replace(time=m.time + int(late[tick]), messages=m.messages)
+    )
+    found = read(recorded(tmp_path, '', moments))
+    times, told = curve(found, 'tick', 'lateness')
+    assert told == pytest.approx(late * 1e-6, abs=1.5e-6)
+    assert times == pytest.approx((np.arange(1000) * MS + late) / MS)
+    assert found.lateness.count == 1000
+
+
+def test_curves_are_what_messages_say(tmp_path):
+    bag = recorded(tmp_path, 'effects: {velocity: {}}\n')
+    found = read(bag)
+    states = [
+        STORE.deserialize_cdr(message.data, STATE)
+        for message in bag.messages()
+        if message.topic == '/joint_states'
+    ]
+    for place, name in enumerate(states[0].name):
+        for quantity, field in (('position', 'position'), ('rate', 'velocity')):
+            expected = [getattr(each, field)[place] for each in states]
+            assert curve(found, name, quantity) == ([*range(1000)], expected)
+    assert curve(found, 'crank_joint', 'position')[1] == [0.007 * tick for tick in range(1000)]
+
+
+def test_torque_commands_are_samples_of_efforts(tmp_path):
+    linkage = FOUR_BAR_WITH_MASSES
+    command = JointStateWriter(['crank_joint']).write
+
+    def pushed(tick, moment):
+        return moment._replace(messages=(command(0, [0.0], [], [0.001 * tick]),))
+
+    found = read(recorded(tmp_path, TORQUE, but(50, pushed), linkage))
+    assert curve(found, 'crank_joint', 'effort')[1][:50] == [0.001 * tick for tick in range(50)]
+    assert on_lanes(found) == {}
+    assert not found.left_out
+
+
+TORQUE = 'drive: {torque: {}}\nloads: {drive_inertia: 0.001}\n'
+
+
+FOUR_BAR_WITH_MASSES = """
+links:
+  ground:  {O2: [0, 0], O4: [0.100, 0]}
+  crank:   {O2: [0, 0], A: [0.040, 0]}
+  coupler: {A: [0, 0], B: [0.120, 0]}
+  rocker:  {O4: [0, 0], B: [0.080, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {B: left}
+joints: {rocker_joint: {parent: ground, child: rocker}}
+masses:
+  crank: {mass: 0.1, center: [0, 0], inertia: 1.0e-5}
+  coupler: {mass: 0.1, center: [0, 0], inertia: 1.0e-5}
+  rocker: {mass: 0.1, center: [0, 0], inertia: 1.0e-5}
+"""
+
+
+def page(found):
+    return run_html(found, Told('t', [], [], []))
+
+
+@pytest.mark.parametrize('value', [nan, inf, -inf, 1e308])
+def test_numbers_that_no_joint_has_break_no_page(tmp_path, value):
+    pytest.importorskip('plotly')
+    moments = but(50, lambda tick, m: m)
+    bag = recorded(tmp_path, 'effects: {velocity: {}}\nfaults: {n: {not_a_number: {}}}\n', moments)
+    writer = JointStateWriter(['coupler_joint', 'rocker_joint'])
+    messages = [
+        m._replace(data=writer.write(BEGIN, [value, 1.0], [value, value]))
+        if m.topic == '/joint_states' and number % 3 else m
+        for number, m in enumerate(bag.messages())
+    ]  # fmt: skip
+
+    class Changed(type(bag)):
+        def messages(self):
+            return iter(messages)
+
+    changed = Changed(*(getattr(bag, name) for name in bag.__slots__))
+    text = page(read(changed))
+    json.loads(text.split('id="data">')[1].split('</script>')[0], parse_constant=pytest.fail)
+
+
+# What the diagnostics of a run add: ticks lost, messages dropped, warnings, and when it ended.
+
+
+SHORT_MEMORY = 'drive: {topic: {max_age: 0.2}}\n'
+
+
+def without_samples(first, last):
+    return lambda tick, m: m._replace(messages=()) if first <= tick <= last else m
+
+
+def test_diagnostics_tell_of_the_time_since_those_before(tmp_path):
+    said = [
+        Said(100.3, 'tick', {'Lost ticks': 2}),
+        Said(200.3, 'tick', {'Lost ticks': 2}),
+        Said(300.3, 'tick', {'Lost ticks': 7}, level=1, message='5 ticks lost'),
+        Said(
+            300.4, 'loop closure', {'Ticks open': 4, 'Ticks at a toggle': 1}, level=2, message='m'
+        ),
+        Said(
+            400.3,
+            'loop closure',
+            {'Ticks open': 4, 'Ticks indeterminate': 6, 'Ticks beyond limits': 3},
+        ),
+        Said(500.3, 'recording', {'Dropped: /joint_states': 3, 'Dropped: /crank': 0}),
+        Said(600.3, 'motor', {'Lost ticks': 99}, level=2, message='of somebody else'),
+        Said(900.3, 'tick', {'Lost ticks': 1}),  # the node was started anew
+    ]
+    found = read(recorded(tmp_path, said=said))
+    assert on_lanes(found) == {
+        'lost': [(0, 100.3, 2, ''), (200.3, 300.3, 5, ''), (500.3, 900.3, 1, '')],
+        'told_open': [(300.3, 300.4, 4, 'open'), (300.4, 400.3, 6, 'indeterminate')],
+        'told_toggle': [(300.3, 300.4, 1, '')],
+        'told_limited': [(300.4, 400.3, 3, '')],
+        'dropped': [(400.3, 500.3, 3, 'messages of /joint_states')],
+        'health': [
+            (200.3, 300.3, 1, 'warning, tick: 5 ticks lost'),
+            (300.3, 300.4, 1, 'error, loop closure: m'),
+        ],
+    }
+    assert found.said['tick', 'Lost ticks'] == '1'
+    assert ('motor', 'Lost ticks') not in found.said
+
+
+def test_diagnostics_tell_how_long_a_run_went_on_without_a_joint_state(tmp_path):
+    moments = but(1000, without_samples(300, 999))
+    said = [Said(ms, 'crank', {}, 3, 'No crank') for ms in (1000.0, 2000.0, 3000.0)]
+    found = read(recorded(tmp_path, SHORT_MEMORY, moments, said=said))
+    assert found.end == 3000 * MS
+    assert on_lanes(found) == {
+        'stale': [(299, 3000, 1, '')],
+        'silent': [(499, 3000, 1, '')],
+        'health': [(0, 3000, 3, 'stale, crank: No crank')],
+    }
+
+
+def test_a_bag_begun_in_mid_run_does_not_tell_what_was_lost_before(tmp_path):
+    bag = recorded(tmp_path, said=[Said(100, 'tick', {'Lost ticks': 50}),
+                                   Said(200, 'tick', {'Lost ticks': 53})])  # fmt: skip
+    begun = bag.attachments['run.json'].replace(b'{', b'{"begun": "mid-run", ', 1)
+    bag.attachments['run.json'] = begun
+    assert on_lanes(read(bag)) == {'lost': [(100, 200, 3, '')]}
+
+
+def test_ever_new_diagnostics_take_no_ever_growing_room(tmp_path):
+    said = [
+        Said(ms, 'tick', {f'{ms} {n}': 'x' * 1000 for n in range(100)}, 1, f'{ms}' * 200)
+        for ms in range(100)
+    ]
+    found = read(recorded(tmp_path, said=said))
+    assert len(found.said) == 500
+    assert all(len(value) <= 80 for value in found.said.values())
+    assert sum(span[2] for span in on_lanes(found)['health']) == 100
+
+
+def test_the_counts_that_are_followed_are_those_that_the_node_tells():
+    pytest.importorskip('diagnostic_msgs')
+    from linkage_ros.ros import diagnostics  # local import: needs rclpy
+
+    source = Path(diagnostics.__file__).read_text()
+    for key in _COUNTED:
+        assert f"'{key}':" in source
+    assert "f'Dropped: {topic.name}'" in source
+
+
+def test_what_could_not_be_known_is_not_said_to_be_none(tmp_path):
+    assert {*read(recorded(tmp_path)).lanes} == {
+        'silent',
+        'jump',
+        'rejected',
+        'open',
+        'stale',
+        'reset',
+    }
+
+
+# Samples of the crank: rejected for the reason of the run, and as old at a tick as they were.
+
+
+def joint_state(stamp, names, positions, rates):
+    time = TYPES['builtin_interfaces/msg/Time'](*divmod(BEGIN + stamp, 10**9))
+    message = TYPES[STATE](
+        TYPES['std_msgs/msg/Header'](time, ''), names, np.array(positions, float),
+        np.array(rates, float), np.array([]),
+    )  # fmt: skip
+    return bytes(STORE.serialize_cdr(message, STATE))
+
+
+AT = 500 * MS
+
+
+ONE = ['crank_joint']
+
+
+REJECTED = {
+    'malformed message': b'\0\1\0\0abc',
+    'no joints or no positions': joint_state(AT, [], [], []),
+    'arrays of unequal length': joint_state(AT, ONE, [1, 2], [1]),
+    'crank joint missing': joint_state(AT, ['knee'], [1], [1]),
+    'crank joint named twice': joint_state(AT, ONE * 2, [1, 1], [1, 1]),
+    'no velocities': joint_state(AT, ONE, [1], []),
+    'position or rate not finite': joint_state(AT, ONE, [nan], [1]),
+    'position or rate beyond 1e10': joint_state(AT, ONE, [1e11], [1]),
+    'stamp zero': joint_state(-BEGIN, ONE, [1], [1]),
+    'stamp in the future': joint_state(AT + 101 * MS, ONE, [1], [1]),
+    'stamp older than the last': joint_state(AT - 2 * MS, ONE, [1], [1]),
+}
+
+
+@pytest.mark.parametrize('reason', REJECTED)
+def test_samples_are_rejected_for_the_reason_for_which_the_drive_did(tmp_path, reason):
+    bad = REJECTED[reason]
+    moments = but(
+        1000,
+        lambda tick, m: m._replace(messages=(bad, *m.messages, bad)) if tick == 500 else m,
+    )
+    found = read(recorded(tmp_path, '', moments))
+    assert on_lanes(found) == {'rejected': [(500, 500, 2, reason)]}
+    assert found.rejected == {reason: 2}
+
+
+def test_what_is_rejected_is_told_apart_and_counted(tmp_path):
+    bad = {
+        **dict.fromkeys((100, 110, 125), REJECTED['malformed message']),
+        **dict.fromkeys((126, 200), REJECTED['crank joint missing']),
+    }
+    moments = but(
+        300, lambda tick, m: m._replace(messages=(*m.messages, bad[tick])) if tick in bad else m
+    )
+    found = read(recorded(tmp_path, '', moments))
+    assert on_lanes(found) == {
+        'rejected': [
+            (100, 125, 3, 'malformed message'),
+            (126, 126, 1, 'crank joint missing'),
+            (200, 200, 1, 'crank joint missing'),
+        ]
+    }
+    assert found.rejected == {'malformed message': 3, 'crank joint missing': 2}
+
+
+def test_the_age_of_the_input_is_the_ticks_time_less_the_newest_stamp(tmp_path):
+    # A sample every 10 ticks, 3 ms old when it comes.
+    moments = but(
+        100,
+        lambda tick, m: m._replace(
+            messages=() if tick % 10 else (sample(tick - 3, 0.007 * tick),)
+        ),
+    )
+    found = read(recorded(tmp_path, '', moments))
+    times, ages = curve(found, 'input', 'age')
+    assert times == [*range(100)]
+    assert ages == pytest.approx([3 + tick % 10 for tick in range(100)], abs=1e-9)
+    assert (found.age.count, found.age.least, found.age.greatest) == (100, 3 * MS, 12 * MS)
+
+
+def test_an_age_is_negative_where_a_stamp_is_ahead_of_the_clock(tmp_path):
+    moments = but(50, lambda tick, m: m._replace(messages=(sample(tick + 2, 0.1),)))
+    found = read(recorded(tmp_path, '', moments))
+    assert curve(found, 'input', 'age')[1] == pytest.approx([-2.0] * 50)
+    assert (found.age.count, found.age.least, found.age.greatest) == (50, -2 * MS, -2 * MS)
+    # It stands in the lowest of the bins, whose percentiles are no more than it.
+    spread = page_data(found, wrapped=False)['histograms']['age']
+    assert (spread['counts'], spread['percentiles']['p50']) == ([50], -0.002)
+
+
+def test_between_two_samples_the_crank_is_carried_forward(tmp_path):
+    moments = but(100, lambda tick, m: m if tick % 10 == 0 else m._replace(messages=()))
+    found = read(recorded(tmp_path, '', moments))
+    crank = found.frames.values['crank_joint']
+    assert crank == pytest.approx([0.007 * tick for tick in range(100)], abs=1e-12)
+
+
+def test_a_run_by_samples_has_no_lateness(tmp_path):
+    found = read(recorded(tmp_path, 'rate: 0\n', map(turning, range(200))))
+    assert found.lateness is None
+    assert curve(found, 'input', 'age')[1] == pytest.approx([0.0] * 200)
+    assert on_lanes(found) == {}
