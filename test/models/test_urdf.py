@@ -225,7 +225,7 @@ def test_joints_that_do_not_tell_all(name):
     # What the remedy says is one.
     added = str(caught.value).partition('add to joints: ')[2]
     whole = text.replace('joints: {', f'joints: {{{added}, ')
-    urdf('it', [Part(closure_of(whole))])
+    urdf('it', [Part(Closure(linkage_of(whole)))])
 
 
 def test_a_scene_of_two_has_prefixes_and_one_root():
@@ -291,7 +291,7 @@ def back(closure):
     """Return a linkage that went through URDF and through the text of a linkage file."""
     made = imported(read_urdf(urdf('it', [Part(closure)]), 'it.urdf'))
     text = linkage_text(made.linkage)
-    return closure_of(text)
+    return Closure(linkage_of(text))
 
 
 def inputs_of(closure):

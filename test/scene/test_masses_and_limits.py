@@ -258,7 +258,7 @@ def test_limits_that_the_range_never_meets():
     with pytest.raises(FileError) as error:
         linkage_of(text)
     assert str(error.value) == (
-        "f.yaml:1: four_bar.input.limits: [2.5, 3] of 'crank_joint' never meet its range, "
+        "linkage.yaml:1: four_bar.input.limits: [2.5, 3] of 'crank_joint' never meet its range, "
         '-2.0264 to 2.0264 rad; widen them'
     )
 
