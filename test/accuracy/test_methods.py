@@ -42,28 +42,12 @@ from linkage_ros.solvers.table import Order
 import numpy as np
 import pytest
 
+from ..kinematics.linkages import four_bar_linkage
+
 # Each method is as accurate, and fails where, its theory says; against the reference.
 
 
 FOUR_BARS = ('four_bar', 'double_rocker', 'drag_link', 'parallelogram', 'hoeken')
-
-
-def four_bar(a: float, b: float, c: float, d: float) -> Linkage:
-    return Linkage(
-        links={
-            'ground': {'O2': (0.0, 0.0), 'O4': (d, 0.0)},
-            'crank': {'O2': (0.0, 0.0), 'A': (a, 0.0)},
-            'coupler': {'A': (0.0, 0.0), 'B': (b, 0.0)},
-            'rocker': {'O4': (0.0, 0.0), 'B': (c, 0.0)},
-        },
-        inputs=(Input('crank_joint', 'ground', 'crank'),),
-        assembly={'B': 'left'},
-        joints={
-            'coupler_joint': RevoluteJoint('crank', 'coupler'),
-            'rocker_joint': RevoluteJoint('ground', 'rocker'),
-        },
-        sliders={},
-    )
 
 
 def turned_about() -> Linkage:
@@ -192,7 +176,7 @@ def test_float32_is_float32_all_the_way() -> None:
 
 def wrong(angle: float, d: float = 1.0) -> float | None:
     """Return what the textbook form is off by in the linkage 2, 3, 3, d; nothing: no answer."""
-    linkage = four_bar(2.0, 3.0, 3.0, d)
+    linkage = four_bar_linkage((2.0, 3.0, 3.0, d), 'left')
     method = textbook(linkage)
     assert method is not None
     assert method.position is not None

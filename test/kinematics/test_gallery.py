@@ -33,6 +33,8 @@ from linkage_ros.scene.linkage_file import read_linkage
 from linkage_ros.scene.yaml_file import read_yaml
 import pytest
 
+from ..support.scenes import size_of
+
 FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'
 EXPECTED = json.loads((Path(__file__).parent / 'gallery.json').read_text('utf-8'))
 
@@ -63,16 +65,6 @@ KINDS = {
 
 def closure_of(name: str) -> Closure:
     return Closure(read_linkage(read_yaml(FOLDER / f'{name}.yaml')[0]))
-
-
-def size_of(closure: Closure) -> float:
-    """Return the longest distance on a link, in [m]."""
-    return max(
-        abs(complex(*p) - complex(*q))
-        for points in closure.linkage.links.values()
-        for p in points.values()
-        for q in points.values()
-    )
 
 
 def inputs_of(closure: Closure, name: str, count: int) -> list[tuple[float, ...]]:

@@ -30,14 +30,13 @@ from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Pose, Revolut
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Driven, Iterated, Structure
 from linkage_ros.kinematics.survey import Way
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
 from linkage_ros.solvers.table import TableClosure
 import numpy as np
 import pytest
 
 from .linkages import class_3_linkage
 from .platforms import linkage_of, platform
+from ..support.scenes import shipped
 
 # What is iterated is what the closed form would say, depends on no history, and ends honestly.
 
@@ -55,10 +54,6 @@ CLOSED_FORM = ['four_bar', 'slider_crank', 'inverted_slider_crank', 'scotch_yoke
 """Linkages of all kinds of dyads but PRP; the last ones by a slide that is driven."""
 
 
-def shipped_linkage(name: str) -> Linkage:
-    return read_linkage(read_yaml(FOLDER / f'{name}.yaml')[0])
-
-
 def iterated(linkage: Linkage) -> Structure:
     """Return a structure in which every link but the ground is iterated."""
     found = find_groups(linkage)
@@ -74,7 +69,7 @@ def iterated(linkage: Linkage) -> Structure:
 
 @pytest.mark.parametrize('name', CLOSED_FORM)
 def test_it_finds_what_the_closed_form_finds(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    linkage = shipped_linkage(name)
+    linkage = shipped(name)
     exact = Closure(linkage)
     start = PLACES[f'{name}.yaml']['inputs'][1]
     rough = {

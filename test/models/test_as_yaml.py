@@ -35,8 +35,7 @@ from linkage_ros.models.urdf import urdf
 import pytest
 import yaml
 
-from .gallery import LINKAGES
-from ..support.scenes import closure_of
+from ..support.scenes import closure_of, LINKAGES
 
 CONFIG = LINKAGES.parent
 FILES = [

@@ -29,9 +29,9 @@ from linkage_ros.models.urdf_file import read_urdf
 import numpy as np
 import pytest
 
-from .gallery import LINKAGES
 from .odd import UNTOLD
 from .walked import Walked
+from ..support.scenes import LINKAGES
 
 LIMITS = Limits(-3.0, 3.0, velocity=1.0, effort=1.0)
 """What `joint` says below."""

@@ -34,8 +34,7 @@ from linkage_ros.models.urdf_file import read_urdf
 import mujoco
 import pytest
 
-from .gallery import GALLERY, LINKAGES
-from ..support.scenes import closure_of
+from ..support.scenes import closure_of, LINKAGES, ONE_INPUT
 
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, SAID}'
 
@@ -72,7 +71,7 @@ def test_the_same_limits_come_back(name):
     assert made.limits == linkage.limits
 
 
-@pytest.mark.parametrize('name', [*GALLERY, 'five_bar'])
+@pytest.mark.parametrize('name', [*ONE_INPUT, 'five_bar'])
 def test_what_gives_none_comes_back_with_none(name):
     closure = open_linkage(str(LINKAGES / f'{name}.yaml'))
     made = imported(read_urdf(urdf('it', [Part(closure)]), 'it.urdf')).linkage

@@ -36,9 +36,9 @@ from linkage_ros.models.part import Part
 import numpy as np
 import pytest
 
-from .gallery import GALLERY, LINKAGES, size_of
 from .odd import closure_of, ODD
 from .walked import moving
+from ..support.scenes import LINKAGES, ONE_INPUT, size_of
 
 mujoco = pytest.importorskip('mujoco')
 
@@ -82,7 +82,7 @@ def off(model, state, closure):
     return worst
 
 
-CASES = [*GALLERY, 'five_bar', *ODD]
+CASES = [*ONE_INPUT, 'five_bar', *ODD]
 
 
 def case(name):

@@ -36,10 +36,9 @@ from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.robot_model import scene_model
 import pytest
 
-from .gallery import GALLERY, LINKAGES, size_of
 from .odd import closure_of, ODD, UNTOLD
 from .walked import BEGIN, heard, moving, moving_text, MS, said, Walked
-from ..support.scenes import linkage_of, scene_of
+from ..support.scenes import linkage_of, LINKAGES, ONE_INPUT, scene_of, size_of
 
 # The URDF of a linkage: valid, the same every time, with limits that its joints keep.
 
@@ -47,7 +46,7 @@ from ..support.scenes import linkage_of, scene_of
 SCENES = LINKAGES.parent / 'scenes'
 
 
-CASES = [*GALLERY, 'five_bar', *ODD]
+CASES = [*ONE_INPUT, 'five_bar', *ODD]
 
 
 URDF_KINDS = {'revolute', 'continuous', 'prismatic', 'fixed'}
@@ -111,7 +110,7 @@ def limits_of(data):
     }
 
 
-@pytest.mark.parametrize('name', [*GALLERY, *ODD])
+@pytest.mark.parametrize('name', [*ONE_INPUT, *ODD])
 def test_joints_keep_their_limits_and_come_near_them(name):
     """A node that starts where the linkage starts publishes nothing beyond the limits."""
     file = LINKAGES / f'{name}.yaml'
@@ -154,7 +153,7 @@ def swept(pipeline, name, values):
 
 
 @pytest.mark.parametrize('angles', ['continuous', 'wrapped'])
-@pytest.mark.parametrize('name', [*GALLERY, *ODD])
+@pytest.mark.parametrize('name', [*ONE_INPUT, *ODD])
 def test_no_state_of_the_whole_range_lies_beyond_the_limits(name, angles):
     """Wherever in its range the input is when the node starts, and whichever way it goes on."""
     text = ODD[name].encode() if name in ODD else (LINKAGES / f'{name}.yaml').read_bytes()
@@ -272,7 +271,7 @@ def test_names_that_two_linkages_come_to(tmp_path):
         model_of(str(scene), urdf)
 
 
-@pytest.mark.parametrize('name', GALLERY)
+@pytest.mark.parametrize('name', ONE_INPUT)
 def test_pinocchio_reads_it_too(name):
     """A reader that uses urdfdom, as robot_state_publisher does."""
     pinocchio = pytest.importorskip('pinocchio')
@@ -315,7 +314,7 @@ def differences(one, other):
                 yield abs(remainder(off, tau)) if turns else abs(off) / size_of(one)
 
 
-@pytest.mark.parametrize('name', [*GALLERY, 'five_bar'])
+@pytest.mark.parametrize('name', [*ONE_INPUT, 'five_bar'])
 def test_every_shipped_linkage_comes_back_with_the_same_joints_and_masses(name):
     closure = open_linkage(str(LINKAGES / f'{name}.yaml'))
     again = back(closure)

@@ -33,9 +33,9 @@ from linkage_ros.models.urdf import urdf
 import numpy as np
 import pytest
 
-from .gallery import GALLERY, LINKAGES, size_of
 from .odd import closure_of, ODD
 from .walked import moving, moving_text, said, several_inputs, Walked
+from ..support.scenes import LINKAGES, ONE_INPUT, size_of
 
 pytest.importorskip('yourdfpy')
 
@@ -70,7 +70,7 @@ def check(data, closure, messages, within=1e-12):
     return count, cuts
 
 
-@pytest.mark.parametrize('name', GALLERY)
+@pytest.mark.parametrize('name', ONE_INPUT)
 def test_every_cut_pin_of_the_shipped_linkages_meets(name):
     file = LINKAGES / f'{name}.yaml'
     pipeline = moving(file)

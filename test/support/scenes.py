@@ -28,6 +28,9 @@ from linkage_ros.scene.yaml_file import parse_yaml
 
 ROOT = Path(__file__).parents[2]
 LINKAGES = ROOT / 'config' / 'linkages'
+GALLERY = sorted(file.stem for file in LINKAGES.glob('*.yaml'))
+ONE_INPUT = [name for name in GALLERY if name != 'five_bar']
+"""Names of all shipped linkages, and of those that a file alone drives."""
 FOUR_BAR = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
 """Publishes coupler_joint and rocker_joint; its input is crank_joint."""
 
@@ -49,6 +52,16 @@ def closure_of(text: str | bytes) -> Closure:
 def shipped(name: str) -> Linkage:
     """Return a linkage that comes with the package."""
     return linkage_of((LINKAGES / f'{name}.yaml').read_bytes())
+
+
+def size_of(closure: Closure) -> float:
+    """Return the length that errors are measured by: the longest distance on a link, in [m]."""
+    return max(
+        abs(complex(*p) - complex(*q))
+        for points in closure.linkage.links.values()
+        for p in points.values()
+        for q in points.values()
+    )
 
 
 def scene_of(text: str | bytes, linkage: str | bytes = FOUR_BAR) -> Scene:
