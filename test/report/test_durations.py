@@ -12,24 +12,33 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""Lateness out of times alone; the clock of a run; silences; how durations are spread."""
+"""Numbers of a report: lateness, clocks and silences, and curves thinned with their extremes."""
 
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import pairwise
+import json
 
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.report.clock import RunClock, times_of
+from linkage_ros.report.extremes import capacity, Extremes, most_columns
 from linkage_ros.report.histogram import Histogram
 from linkage_ros.report.lateness import Lateness
 from linkage_ros.report.silences import Silences
 from linkage_ros.report.spans import Lane
+from linkage_ros.report.thinned import Thinned
+from linkage_ros.report.words import size_in_json
 import numpy as np
 import pytest
 
+# Lateness out of times alone; the clock of a run; silences; how durations are spread.
+
+
 MS = 1_000_000
+
+
 BEGIN = 1_700_000_000_000_000_000
 
 
@@ -179,3 +188,200 @@ def test_percentiles_are_those_of_the_durations_to_a_bin(durations):
         true = np.percentile(durations, percent, method='inverted_cdf')
         told = found.percentile(percent)
         assert told == found.greatest or true <= told <= max(100.0, true * 10**0.1 * (1 + 1e-12))
+
+
+# Thinned curves keep what is least and greatest, in a bounded number of intervals.
+
+
+NUMBERS = st.floats(-1e300, 1e300) | st.sampled_from([np.nan, np.inf, -np.inf, 0.0, -0.0])
+
+
+ROWS = st.lists(st.tuples(NUMBERS, NUMBERS), max_size=300)
+
+
+CUTS = st.lists(st.integers(0, 300), max_size=8)
+
+
+def kept(rows, cuts, most):
+    """Give rows in pieces; return the intervals."""
+    values = np.array(rows, float).reshape(-1, 2)
+    times = 7 * np.arange(len(values))
+    curves = Extremes(2, most)
+    edges = [0, *sorted(min(cut, len(values)) for cut in cuts), len(values)]
+    for start, end in pairwise(edges):
+        curves.add(times[start:end], values[start:end])
+    return values, curves.intervals()
+
+
+@given(ROWS, CUTS, st.sampled_from([2, 4, 16, 64]))
+def test_each_interval_has_the_least_and_the_greatest_of_its_rows_in_their_order(rows, cuts, most):
+    values, found = kept(rows, cuts, most)
+    begins, ends = found.begins // 7, found.ends // 7
+    # Every row is in one interval, and no other.
+    assert [*begins] == [*(np.r_[0, ends[:-1] + 1] if len(ends) else [])]
+    assert not len(ends) or ends[-1] == len(values) - 1
+    assert all(ends[:-1] - begins[:-1] + 1 == found.rows)
+    for i, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+        for column in range(2):
+            rows = values[slice(begin, end + 1), column]
+            own = [(v, k) for k, v in enumerate(rows) if v == v]
+            told = found.first[i, column], found.second[i, column]
+            if not own:
+                assert np.isnan(told).all()
+                continue
+            least, greatest = min(own), max(own, key=lambda each: each[0])
+            assert {*told} == {least[0], greatest[0]}
+            if least[0] != greatest[0]:
+                assert told[0] == min(least, greatest, key=lambda each: each[1])[0]
+
+
+@given(ROWS, CUTS, st.sampled_from([2, 4, 16, 64]))
+def test_there_are_no_more_intervals_than_there_is_room_for_and_no_row_is_lost_needlessly(
+    rows, cuts, most
+):
+    values, found = kept(rows, cuts, most)
+    assert len(found.begins) <= (2 * most if found.rows == 1 else most)
+    assert (found.rows == 1) == (len(values) <= 2 * most)
+    if found.rows == 1:
+        assert np.array_equal(found.first, values, equal_nan=True)
+    else:
+        assert len(found.begins) > most // 2
+
+
+@given(ROWS, CUTS, CUTS)
+def test_pieces_make_no_difference(rows, cuts, others):
+    _, one = kept(rows, cuts, 8)
+    _, other = kept(rows, others, 8)
+    for a, b in zip(one, other, strict=True):
+        assert np.array_equal(a, b, equal_nan=True)
+
+
+@pytest.mark.parametrize('columns', [1, 2, 6, 40, 200, most_columns(4_000_000)])
+def test_the_room_is_kept_and_used(columns):
+    most = capacity(columns, 4_000_000)
+    assert most & (most - 1) == 0
+    # Of each interval begin and end, and two values of each curve, of 8 bytes each.
+    assert most * (16 * columns + 16) <= 4_000_000 < 2 * most * (16 * columns + 16)
+
+
+def test_no_more_curves_share_a_room_than_have_a_shape_left():
+    most = most_columns(4_000_000)
+    assert capacity(most, 4_000_000) == 256
+    assert capacity(most + 1, 4_000_000) < 256
+
+
+def held(curves):
+    return sum(value.nbytes for value in vars(curves).values() if isinstance(value, np.ndarray))
+
+
+def test_what_is_held_does_not_grow_with_the_rows():
+    curves = Extremes(6, 256)
+    rows = np.random.default_rng(3).normal(size=(8192, 6))
+    sizes = []
+    for block in range(200):
+        curves.add(np.arange(8192) + 8192 * block, rows)
+        sizes.append(held(curves))
+    assert max(sizes) == sizes[0] < 10**6
+    found = curves.intervals()
+    assert len(found.begins) <= 256 < 2 * len(found.begins)
+    assert np.array_equal(np.fmin(found.first, found.second).min(axis=0), rows.min(axis=0))
+    assert np.array_equal(np.fmax(found.first, found.second).max(axis=0), rows.max(axis=0))
+
+
+@given(st.integers(0, 400), CUTS, st.sampled_from([2, 6, 40]))
+def test_rows_at_equal_steps(count, cuts, most):
+    rows = Thinned(1, most)
+    edges = [0, *sorted(min(cut, count) for cut in cuts), count]
+    for start, end in pairwise(edges):
+        times = np.arange(start, end)
+        rows.add(times, times[:, None].astype(float))
+    assert [*rows.times] == [*range(0, count, rows.step)]
+    assert [*rows.values[:, 0]] == [*rows.times]
+    assert len(rows.times) <= most
+    assert rows.step == 1 or len(rows.times) > most // 2
+
+
+@given(st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 50)), max_size=50))
+def test_no_event_is_lost_from_the_count_and_spans_are_apart(events):
+    lane = Lane(near=100)
+    time = 0
+    for wait, lasting in events:
+        lane.add(time + wait, time + wait + lasting)
+        time += wait + lasting
+    assert lane.count == sum(span.count for span in lane.spans) == len(events)
+    for before, after in pairwise(lane.spans):
+        assert after.begin - before.end > 100
+
+
+def test_a_million_events_are_a_bounded_number_of_spans():
+    lane = Lane()
+    for number in range(1_000_000):
+        lane.add(number * 1000 + number * number % 997, number * 1000 + 997, f'kind {number % 3}')
+    assert lane.count == sum(span.count for span in lane.spans) == 1_000_000
+    assert len(lane.spans) <= 1000
+    assert (lane.spans[0].begin, lane.spans[-1].end) == (0, 999_999 * 1000 + 997)
+
+
+def test_what_says_something_else_is_something_else():
+    lane = Lane(near=10)
+    for time, text in ((0, 'a'), (5, 'a'), (8, 'b'), (30, 'b')):
+        lane.add(time, time, text)
+    assert [(s.begin, s.end, s.count, s.text) for s in lane.spans] == [
+        (0, 5, 2, 'a'),
+        (8, 8, 1, 'b'),
+        (30, 30, 1, 'b'),
+    ]
+
+
+def test_a_window_cuts_spans():
+    lane = Lane(window=(100, 200))
+    for begin, end in ((0, 99), (50, 120), (150, 150), (190, 300), (201, 202)):
+        lane.add(begin, end)
+    assert [(s.begin, s.end) for s in lane.spans] == [(100, 120), (150, 150), (190, 200)]
+    assert lane.count == 3
+
+
+def test_what_lasts_is_told_at_its_end_and_stands_where_it_began():
+    lane = Lane(near=10)
+    lane.add(30, 50, 'short')
+    lane.add(10, 70, 'long')
+    lane.add(72, 80, 'long')
+    assert [(s.begin, s.end, s.text) for s in lane.in_order] == [
+        (10, 80, 'long'),
+        (30, 50, 'short'),
+    ]
+
+
+@given(st.lists(st.text(max_size=400), max_size=60))
+def test_texts_have_a_bound(texts):
+    lane = Lane()
+    for time, text in enumerate(texts):
+        lane.add(10 * time, 10 * time, text)
+    assert lane.count == len(texts)
+    assert all(len(span.text) <= 132 for span in lane.spans)
+
+
+def test_ever_new_texts_take_no_more_room_than_there_is():
+    lane = Lane()
+    for time in range(20_000):
+        lane.add(1000 * time, 1000 * time, f'{time}<\0\udc80' * 50)
+        assert sum(size_in_json(span.text) for span in lane.spans) <= 60_000
+    assert sum(span.count for span in lane.spans) == 20_000
+
+
+def test_where_the_longest_stay_the_others_are_still_counted():
+    lane = Lane(longest=True, most=10)
+    for time in range(100):
+        lane.add(1000 * time, 1000 * time + (900 if time in (3, 50, 51) else time % 7))
+    assert lane.count == 100
+    assert len(lane.spans) <= 10
+    begins = [span.begin for span in lane.spans]
+    assert begins == sorted(begins)
+    assert {3000, 50_000, 51_000} <= {*begins}
+    assert all(span.end - span.begin in (900, *range(7)) for span in lane.spans)
+
+
+@given(st.text() | st.floats(allow_nan=False, allow_infinity=False) | st.integers())
+def test_what_a_text_takes_on_a_page_is_no_more_than_is_said(value):
+    written = json.dumps(value, ensure_ascii=False).replace('<', r'\u003c')
+    assert len(written.encode('utf-8', 'backslashreplace')) <= size_in_json(value)

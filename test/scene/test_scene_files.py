@@ -12,23 +12,30 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""What scene and linkage files say: the shipped ones, defaults, numbers, shorthands."""
+"""What scene and linkage files say, also a linkage file where a scene is expected."""
 
 from __future__ import annotations
 
-from math import pi
+from math import acos, hypot, pi, tau
+from pathlib import Path
 
+from linkage_ros.drives.constant_rate import ConstantRateParameters
 from linkage_ros.drives.topic import TopicParameters
 from linkage_ros.effects.velocity import VelocityParameters
+from linkage_ros.errors import FileError
+from linkage_ros.joint_state import JointStateWriter
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
+from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
 from linkage_ros.scene.scene import RecordParameters
 from linkage_ros.scene.storage import StorageParameters
 import pytest
 
-from .files import CONFIG, FOUR_BAR, SCENE
+from .files import CONFIG, FOUR_BAR, is_one_line, SCENE
+
+# What scene and linkage files say: the shipped ones, defaults, numbers, shorthands.
+
 
 ANGLES = [-7.0, -pi, -1.0, 0.0, 1e-9, 0.5, 2.0, 3.0, 100.0]
 
@@ -188,6 +195,7 @@ joints:
   rocker_joint: {parent: ground, child: rocker}
 """
 
+
 SLIDER_WRITTEN_OUT = b"""
 links:
   ground: {O: [0, 0], C: [0.25, 0.1]}
@@ -258,3 +266,246 @@ def test_a_bag_holds_enough_to_build_the_scene_again(build):
     again = parse_scene(scene.name, 'a bag', scene.files)
     assert again == scene
     assert Pipeline(again).closures[0].position(1.0) == pipeline.closures[0].position(1.0)
+
+
+# A linkage file where a scene is expected: it moves, from where it starts, within its range.
+
+
+BEGIN = 1_700_000_000_000_000_000
+
+
+MS = 1_000_000
+
+
+SIXTY = pi / 3.0
+
+
+# Where the inputs of the gallery end, from one triangle each; all others turn fully.
+_FARTHEST = 2.0 * acos(0.75)
+
+
+_MIDDLE = hypot(1.18 - 0.22, 0.30 - 0.01)
+
+
+LIMITED = {
+    # The arms reach B from O only as far as 0.125 − 0.05, and |OB| = 2·0.05·cos(φ/2).
+    'peaucellier': (-_FARTHEST, _FARTHEST),
+    # Coupler and right rocker, 0.08 and 0.2, folded and stretched; between them 0.2 and 0.16.
+    'double_rocker': (acos(0.8), acos(-0.2)),
+    # The bar lies along the slot.
+    'elliptic_trammel': (-0.12, 0.12),
+    # Cylinder and rocker in line, from K over I.
+    'excavator_bucket': (_MIDDLE - 0.32, _MIDDLE + 0.32),
+}
+
+
+@pytest.mark.parametrize(
+    'file', sorted((CONFIG / 'linkages').glob('*.yaml')), ids=lambda file: file.stem
+)
+def test_every_shipped_linkage_moves_for_five_seconds_with_every_loop_closed(file: Path) -> None:
+    scene = load_scene(file)
+    assert (scene.name, scene.rate, scene.record) == (file.stem, 1000.0, None)
+    pipeline = Pipeline(scene)
+    ends = LIMITED.get(file.stem)
+    cranks = []
+    for number in range(5001):
+        now = BEGIN + number * MS
+        if file.stem == 'five_bar':  # it has two inputs, which come from a topic
+            inputs = JointStateWriter(scene.members[0].inputs)
+            assert pipeline.offer(inputs.write(now, [SIXTY, SIXTY], [0.0, 0.0]), now) is None
+        ((crank, position, _, reading),) = pipeline.tick(now).looks
+        assert crank is not None
+        assert position is not None
+        assert position.status is Status.CLOSED, crank
+        assert reading is not None
+        assert len(reading[2]) == len(scene.joints)  # rates
+        cranks.append(crank.angles[0])
+    if file.stem == 'five_bar':
+        assert scene.members[0].drive == ('topic', TopicParameters())
+    elif ends is None:
+        assert scene.members[0].drive == ('constant_rate', ConstantRateParameters(1.0, SIXTY))
+        assert cranks[0] == SIXTY
+        assert cranks[-1] == pytest.approx(SIXTY + 5.0, rel=1e-15)
+    else:
+        low, high = ends
+        unit = high - low
+        assert cranks[0] == pytest.approx(low + 2.0 / 3.0 * unit, abs=1e-14 * unit)
+        # Within five seconds a sine of four has been at both its ends, to a tick.
+        assert min(cranks) == pytest.approx(low + 0.02 * unit, abs=1e-6 * unit)
+        assert max(cranks) == pytest.approx(high - 0.02 * unit, abs=1e-6 * unit)
+
+
+# A coupler and a rocker, 8 and 3, that are folded where the crank's pin is 5 from the rocker's
+# pivot, on a crank of 4 and a ground of 6: the crank goes from there round to the other side.
+FOLDS = """\
+links:
+  ground: {O2: [0, 0], O4: [6, 0]}
+  crank: {O2: [0, 0], A: [4, 0]}
+  coupler: {A: [0, 0], B: [8, 0]}
+  rocker: {O4: [0, 0], B: [3, 0]}
+input: {joint: crank_joint, parent: ground, child: crank}
+assembly: {B: left}
+joints: {rocker_joint: {parent: ground, child: rocker}}
+"""
+
+
+LOW = acos((4**2 + 6**2 - 5**2) / (2 * 4 * 6))
+
+
+HIGH = tau - LOW
+
+
+NEAR = 0.02 * (HIGH - LOW)
+
+
+"""Where the middle 96 % begin, from an end of the range."""
+
+
+# Its crank and its rocker so long that the crank turns fully.
+TURNS = FOLDS.replace('[4, 0]', '[2, 0]').replace('[3, 0]', '[5, 0]')
+
+
+# Text of the file; where it starts; the lowest and the highest value that it comes to in 4 s.
+STARTS = {
+    'a full turn': (TURNS, 0.436, 0.436, 4.436),
+    'a full turn, backward beyond one': (TURNS, -7.0, -7.0, -3.0),
+    'a full turn, at an end of what is searched': (TURNS, pi, pi, pi + 4.0),
+    'the middle': (FOLDS, pi, LOW + NEAR, HIGH - NEAR),
+    'within the 96 %': (FOLDS, 2.0, LOW + NEAR, HIGH - NEAR),
+    'within them, a turn lower': (FOLDS, 2.0 - tau, LOW + NEAR - tau, HIGH - NEAR - tau),
+    'nearer to the lower end': (FOLDS, LOW + 0.01, LOW + 0.01, HIGH - NEAR),
+    'nearer to the upper end': (FOLDS, HIGH - 0.01, LOW + NEAR, HIGH - 0.01),
+}
+
+
+@pytest.mark.parametrize('kind', STARTS)
+def test_a_run_begins_where_the_pose_says(tmp_path: Path, kind: str) -> None:
+    text, start, lowest, highest = STARTS[kind]
+    file = tmp_path / 'designed.yaml'
+    file.write_text(f'{text}pose: {{inputs: [{start!r}]}}\n')
+    pipeline = Pipeline(load_scene(file))
+    values = []
+    for number in range(4001):
+        ((crank, position, _, _),) = pipeline.tick(BEGIN + number * MS).looks
+        assert crank is not None
+        assert position is not None
+        assert position.status is Status.CLOSED
+        values.append(crank.angles[0])
+    assert values[0] == pytest.approx(start, abs=4e-15)
+    assert min(values) == pytest.approx(lowest, abs=1e-5)
+    assert max(values) == pytest.approx(highest, abs=1e-5)
+
+
+@pytest.mark.parametrize('end', [LOW, HIGH])
+@pytest.mark.parametrize('beyond', [0.0, 1e-12, -1e-12])
+def test_a_start_at_a_toggle_is_where_the_swing_turns_back(
+    tmp_path: Path, end: float, beyond: float
+) -> None:
+    file = tmp_path / 'designed.yaml'
+    file.write_text(f'{FOLDS}pose: {{inputs: [{end + beyond!r}]}}\n')
+    pipeline = Pipeline(load_scene(file))
+    ((crank, _, _, _),) = pipeline.tick(BEGIN).looks
+    assert crank is not None
+    assert crank.angles[0] == pytest.approx(end, abs=2e-12)
+    for number in range(1, 4000):
+        ((crank, position, _, _),) = pipeline.tick(BEGIN + number * MS).looks
+        assert position is not None
+        assert position.status is Status.CLOSED, number
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        (
+            f'{FOLDS}pose: {{inputs: [0.5]}}',
+            'no loop closes at 0.5 rad; start within 0.97339 to 5.3098 rad',
+        ),
+        (
+            (CONFIG / 'linkages/elliptic_trammel.yaml').read_text('utf-8')
+            + 'pose: {inputs: [0.13]}',
+            'no loop closes at 0.13 m; start within -0.12 to 0.12 m',
+        ),
+    ],
+)
+def test_a_start_where_no_loop_closes(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / 'designed.yaml').write_text(text)
+    with pytest.raises(FileError) as caught:
+        load_scene(tmp_path / 'designed.yaml')
+    assert is_one_line(caught.value)
+    line = 1 + text[: text.index('pose:')].count('\n')
+    assert f'designed.yaml:{line}: pose.inputs: {said}' in str(caught.value)
+
+
+def test_a_pose_with_points_is_where_an_iteration_starts_and_no_run(tmp_path: Path) -> None:
+    text = (CONFIG / 'linkages/class_3.yaml').read_text('utf-8')
+    assert 'inputs: [0.0], points:' in text
+    (tmp_path / 'posed.yaml').write_text(text)
+    assert load_scene(tmp_path / 'posed.yaml').members[0].drive[1].start == SIXTY
+
+
+def test_what_is_iterated_needs_the_points_of_its_pose(tmp_path: Path) -> None:
+    text = (CONFIG / 'linkages/class_3.yaml').read_text('utf-8')
+    head, _, tail = text.partition(', points: {')
+    (tmp_path / 'posed.yaml').write_text(head + tail.partition('}')[2])
+    with pytest.raises(FileError) as caught:
+        load_scene(tmp_path / 'posed.yaml')
+    assert is_one_line(caught.value)
+    line = 1 + text[: text.index('pose:')].count('\n')
+    assert f"posed.yaml:{line}: pose.points: does not say where 'crank_arm' lies" in str(
+        caught.value
+    )
+
+
+def test_a_bag_holds_all_of_it(tmp_path: Path) -> None:
+    (tmp_path / 'designed.yaml').write_bytes(FOUR_BAR)
+    scene = load_scene(tmp_path / 'designed.yaml')
+    assert set(scene.files) == {'scene.yaml', 'linkage.yaml'}
+    assert scene.files['linkage.yaml'] == FOUR_BAR
+    again = parse_scene(scene.name, 'a bag', scene.files)
+    assert again == scene
+    one, other = Pipeline(scene), Pipeline(again)
+    for number in range(100):
+        now = BEGIN + number * MS
+        assert one.tick(now).message == other.tick(now).message != b''
+
+
+def test_what_stands_for_it_is_a_scene_of_the_user_s_own(tmp_path: Path) -> None:
+    (tmp_path / 'linkage.yaml').write_bytes(FOUR_BAR)
+    alone = load_scene(tmp_path / 'linkage.yaml')
+    (tmp_path / 'scene.yaml').write_bytes(alone.files['scene.yaml'])
+    beside = load_scene(tmp_path / 'scene.yaml')
+    assert beside.files == alone.files
+    assert (beside.members, beside.rate) == (alone.members, alone.rate)
+
+
+NEITHER = 'is neither a scene nor a linkage; write linkage: FILE for a scene, links: {…} for a'
+
+
+# Text of the file; what is said of it.
+WRONG = {
+    'nothing': ('{}', f': {NEITHER}'),
+    'parameters of a node': ('/**: {ros__parameters: {scene: x.yaml}}', f': {NEITHER}'),
+    'a scene without a linkage': (
+        'rate: 5',
+        ": the key 'linkage' is missing; add linkage: a text",
+    ),
+    'a linkage with a rate': (
+        FOLDS + 'rate: 5',
+        ':9: rate: is a key of scenes, and this is a linkage; write it beside linkage: file.',
+    ),
+    'a linkage with a slip': (FOLDS + 'pse: {}', ":9: pse: unknown key; did you mean 'pose'?"),
+    'a scene with links': ('linkage: x.yaml\nlinks: {}', ":1: linkage: '"),
+    'a linkage that is none': ('links: {}', ": the key 'input' is missing; add input: a mapping"),
+    'half a shorthand': ('four_bar: {a: 1}', ":1: four_bar: the key 'b' is missing; add b: a"),
+    'a linkage that closes nowhere': ('four_bar: {a: 1, b: 1, c: 1, d: 9}', ':1: four_bar: the l'),
+}
+
+
+@pytest.mark.parametrize('kind', WRONG)
+def test_a_file_that_is_no_scene_and_no_linkage(tmp_path: Path, kind: str) -> None:
+    text, said = WRONG[kind]
+    (tmp_path / 'file.yaml').write_text(text)
+    with pytest.raises(FileError) as caught:
+        load_scene(tmp_path / 'file.yaml')
+    assert is_one_line(caught.value)
+    assert f'file.yaml{said}' in str(caught.value)
