@@ -112,7 +112,7 @@ test: $(STAMP)
 	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory lint || status=$$?; \
 	$(PYTEST) -m 'not ros' --numprocesses auto $(BY_FILE) || status=$$?; \
-	$(PYTEST) -m 'ros and not alone' --numprocesses 2 $(BY_FILE) test/ros $(call marked,ros) || status=$$?; \
+	$(PYTEST) -m 'ros and not alone' --numprocesses 2 $(BY_FILE) test/node $(call marked,ros) || status=$$?; \
 	$(PYTEST) -m alone $(call marked,alone) || status=$$?; \
 	exit $$status
 
@@ -135,7 +135,7 @@ topologies: $(STAMP)
 	@$(BIN)/python -m campaigns.topologies
 
 compiled: $(STAMP)
-	@LINKAGE_STATES=100000 $(BIN)/python -m pytest -q test/kinematics/compiled
+	@LINKAGE_STATES=100000 $(BIN)/python -m pytest -q test/kinematics/compiling
 
 accuracy_page: $(STAMP)
 	@$(BIN)/python -m docs.make_accuracy

@@ -169,9 +169,9 @@ setup(
     zip_safe=True,
     entry_points={
         'console_scripts': [
-            'linkage_node = linkage_ros.ros.linkage_node:main',
-            'crank_source = linkage_ros.ros.crank_source:main',
-            'pd_controller = linkage_ros.ros.pd_controller:main',
+            'linkage_node = linkage_ros.node.linkage_node:main',
+            'crank_source = linkage_ros.node.crank_source:main',
+            'pd_controller = linkage_ros.node.pd_controller:main',
             'linkage = linkage_ros.cli.main:main',
         ],
     },

@@ -28,7 +28,7 @@ import sys
 from time import monotonic, sleep
 
 from bench.raw_node import keep_last, node, subscription, taker
-from linkage_ros.stop import stop_on_signals
+from linkage_ros.signals import stop_on_signals
 
 _PATIENCE = 5.0
 """How long one waits for its first message, in [s]."""

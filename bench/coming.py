@@ -32,7 +32,7 @@ from typing import Any
 from bench.report import say, Table
 from bench.ticks import cpu_time, write_turning
 from linkage_ros.processes import Graph, MeasurementError, Process
-from linkage_ros.shipped import shipped
+from linkage_ros.resources import shipped
 
 _APPEARING = 15.0
 """How long the node may take to tick, in [s]."""
@@ -138,7 +138,7 @@ def _measure(
         run = stack.enter_context
         listener = run(graph.run('bench.listener'))
         ours = ('--ros-args', '-p', f'scene:={scene}')
-        node = run(graph.run('linkage_ros.ros.linkage_node', ours, more))
+        node = run(graph.run('linkage_ros.node.linkage_node', ours, more))
         before = _heard(listener, node)
         for _ in range(busy):
             run(graph.run('bench.busy'))

@@ -34,15 +34,15 @@ import time
 
 from bench import ROOT
 from bench.report import in_turn, ratios, say, spread, Table
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.batch import Array
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiled.c import C
-from linkage_ros.kinematics.compiled.linkage import Compiled
-from linkage_ros.kinematics.compiled.source import source, Subject
+from linkage_ros.kinematics.compiling.c import C
+from linkage_ros.kinematics.compiling.linkage import Compiled
+from linkage_ros.kinematics.compiling.source import source, Subject
 from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.processes import MeasurementError
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
 import numpy as np
 
 RATE, ACCELERATION = 3.0, 0.5

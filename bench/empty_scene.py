@@ -31,7 +31,7 @@ from math import atan2, cos, isclose, sin, sqrt
 from bench import ROOT
 from bench.report import compare, in_turn, Table
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.processes import MeasurementError
 from linkage_ros.scene.load import parse_scene
 

@@ -19,7 +19,7 @@ How fast linkages are solved with acceleration: one state at a time, and a milli
 They are compared with pylinkage, and with the formulas of a four-bar in one straight function: no
 status, no pose, no steps. That function serves linkages whose crank turns fully and passes no
 change point. Its arithmetic is that of `linkage_ros.kinematics.dyads.rrr` over
-`linkage_ros.kinematics.crank_diagonal`.
+`linkage_ros.kinematics.diagonals`.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from math import atan2, cos, sin, sqrt, tau
 
 from bench import ROOT
 from bench.report import compare, in_turn, say, Table
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.batch import Batch
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiled.linkage import Compiled
+from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.processes import MeasurementError
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -75,7 +75,7 @@ def measure_latency(graph: Graph, folder: Path, plan: LatencyPlan) -> Table:
         run = stack.enter_context
         ours = run(
             graph.run(
-                'linkage_ros.ros.linkage_node',
+                'linkage_ros.node.linkage_node',
                 ['--ros-args', '-p', f'scene:={scene}', *_remapped(_OURS)],
             )
         )

@@ -35,7 +35,7 @@ from typing import Any
 from bench.raw_node import keep_last, node, subscription, taker
 from diagnostic_msgs.msg import DiagnosticArray
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.stop import stop_on_signals
+from linkage_ros.signals import stop_on_signals
 
 _POLL = 0.005
 _DEPTH = 2000

@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from bench.raw_node import node, publisher, subscription, taker, waiter
-from linkage_ros.stop import stop_on_signals
+from linkage_ros.signals import stop_on_signals
 
 _LONGEST_WAIT = 100_000_000
 

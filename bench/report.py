@@ -25,7 +25,7 @@ from pathlib import Path
 import time
 
 from bench import ROOT
-from linkage_ros.cli import tables
+from linkage_ros.cli import terminal
 from linkage_ros.measuring import alternating, describe_machine, spread_of
 from linkage_ros.pages.markdown import table_lines
 
@@ -50,10 +50,10 @@ class Table:
     head: Sequence[str]
     rows: list[Sequence[str]] = field(default_factory=list)
 
-    def for_terminal(self) -> tables.Table:
+    def for_terminal(self) -> terminal.Table:
         """Return it as a table for the terminal, with numbers aligned to the right."""
         name, *values = self.head
-        return tables.Table(self.title, [name, *(f'>{value}' for value in values)], self.rows)
+        return terminal.Table(self.title, [name, *(f'>{value}' for value in values)], self.rows)
 
     def markdown(self) -> str:
         """Return it as Markdown."""
@@ -69,7 +69,7 @@ def say(line: str) -> None:
 
 def show(table: Table) -> None:
     """Print a table, and an empty line after it."""
-    tables.show(table.for_terminal())
+    terminal.show(table.for_terminal())
     say('')
 
 

@@ -184,7 +184,7 @@ def ours(folder: Path, rate: float, record: bool = False) -> Contender:
     return Contender(
         'linkage_node + bag' if record else 'linkage_node',
         rate,
-        'linkage_ros.ros.linkage_node',
+        'linkage_ros.node.linkage_node',
         ('--ros-args', '-p', f'scene:={scene}'),
     )
 
@@ -206,7 +206,7 @@ def many(folder: Path, rate: float, count: int) -> Contender:
     return Contender(
         f'{count} four-bars in one node',
         rate,
-        'linkage_ros.ros.linkage_node',
+        'linkage_ros.node.linkage_node',
         ('--ros-args', '-p', f'scene:={scene}'),
     )
 
@@ -242,7 +242,7 @@ def measure_ticks(
     """
     found: dict[Contender, list[Measurement]] = {contender: [] for contender in contenders}
     with ExitStack() as stack:
-        stack.enter_context(graph.run('linkage_ros.ros.crank_source'))
+        stack.enter_context(graph.run('linkage_ros.node.crank_source'))
         listener = stack.enter_context(graph.run('bench.listener'))
         for _ in range(busy):
             stack.enter_context(graph.run('bench.busy'))

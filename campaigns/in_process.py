@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 from unittest import mock
 
 from linkage_ros.cli import main as command_line
-from linkage_ros.stop import Stop
+from linkage_ros.signals import Stop
 
 MEMORY = 2**32
 """Addresses that a process may have, in bytes; numpy and matplotlib take one and a half GiB."""

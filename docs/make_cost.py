@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from linkage_ros.cli.cost import all_effects
-from linkage_ros.cli.tables import Table
+from linkage_ros.cli.terminal import Table
 from linkage_ros.measuring import describe_machine
 from linkage_ros.pages.markdown import filled, table_lines
 

@@ -33,9 +33,9 @@ from typing import NamedTuple
 from linkage_ros.cli.parameter_tables import REGISTRIES, table_of
 from linkage_ros.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
 from linkage_ros.errors import FileError
+from linkage_ros.files.parameters import summary
 from linkage_ros.pages import markdown
-from linkage_ros.parameters import summary
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import yaml
 

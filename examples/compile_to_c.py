@@ -19,8 +19,8 @@ from pathlib import Path
 import subprocess
 
 import linkage_ros as lr
-from linkage_ros.kinematics.compiled.c import C
-from linkage_ros.kinematics.compiled.source import source, Subject
+from linkage_ros.kinematics.compiling.c import C
+from linkage_ros.kinematics.compiling.source import source, Subject
 
 closure = lr.load('four_bar')
 subject = Subject(closure, 'four_bar', 'four_bar.yaml', 0, closure.joint_names)

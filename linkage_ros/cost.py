@@ -35,10 +35,10 @@ from typing import NamedTuple
 from linkage_ros.effects.stage import bringing, brings, EFFECTS, in_order, LOADED, module_of
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.survey import usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
 from linkage_ros.measuring import spread_of
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Member, Scene
 
 _BEGIN = 1_000_000_000

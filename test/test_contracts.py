@@ -39,7 +39,7 @@ from linkage_ros.effects.stage import EFFECTS, NEEDS
 from linkage_ros.effects.tolerance import ToleranceParameters
 from linkage_ros.errors import FileError
 from linkage_ros.faults.fault import FAULTS
-from linkage_ros.parameters import declared
+from linkage_ros.files.parameters import declared
 import pytest
 
 from .support.scenes import LINKAGES, pipeline_of, scene_of

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from linkage_ros.errors import FileError
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
 import pytest
 
@@ -88,7 +88,7 @@ linkages:
   - {{name: right, linkage: half_open.yaml, {turning}, effects: {{velocity: {{}}}}}}
 """)
     whole = Pipeline(scene)
-    monkeypatch.setattr('linkage_ros.pipeline.Line.whole', None)
+    monkeypatch.setattr('linkage_ros.pipeline.pipeline.Line.whole', None)
     apart = Pipeline(scene)
     usual = 0
     for number in range(400):

@@ -122,7 +122,7 @@ SOLVER_SCENES = {
 # published, and which files it passed through.
 PROGRAM = """
 import json, sys
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 pipeline = Pipeline(load_scene(sys.argv[1]))
 modules = sorted(sys.modules)
@@ -268,6 +268,6 @@ def test_a_robot_model_is_made_where_it_is_asked_for_alone(tmp_path):
         look = Look(tmp_path, BARE + scene)
         assert 'models' not in packages(look.modules | look.passed)
     pytest.importorskip('rclpy')
-    loaded = run_python('import sys, linkage_ros.ros.node; print(*sys.modules)').split()
-    assert 'linkage_ros.ros.node' in loaded
+    loaded = run_python('import sys, linkage_ros.node.node; print(*sys.modules)').split()
+    assert 'linkage_ros.node.node' in loaded
     assert 'models' not in packages(loaded)

@@ -27,10 +27,10 @@ import sys
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.pipeline import Look
+from linkage_ros.pipeline.pipeline import Look
 import pytest
 
-from .ros.loops import FIVE_BAR
+from .node.loops import FIVE_BAR
 from .support.messages import read_joint_state as read
 from .support.messages import STORE
 from .support.scenes import pipeline_of
@@ -126,7 +126,7 @@ def test_what_is_not_called_for_is_not_imported(tmp_path, effects, imported):
     (tmp_path / 'linkage.yaml').write_bytes(FOUR_BAR)
     (tmp_path / 'scene.yaml').write_text(f'linkage: linkage.yaml\neffects: {effects}')
     program = (
-        'import sys; from linkage_ros.pipeline import Pipeline; '
+        'import sys; from linkage_ros.pipeline.pipeline import Pipeline; '
         'from linkage_ros.scene.load import load_scene; '
         f'Pipeline(load_scene({str(tmp_path / "scene.yaml")!r})); '
         'print(*sys.modules)'

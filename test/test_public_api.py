@@ -29,7 +29,7 @@ from typing import Any
 import xml.etree.ElementTree as ET
 
 import linkage_ros as lr
-from linkage_ros.shipped import shipped
+from linkage_ros.resources import shipped
 from linkage_ros.solvers.table import TableClosure
 import pytest
 

@@ -32,7 +32,7 @@ PROGRAM = """
 import hashlib, sys
 from math import cos, sin
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 scene = load_scene(sys.argv[1])
 pipeline = Pipeline(scene)

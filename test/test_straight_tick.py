@@ -19,14 +19,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from linkage_ros.kinematics.groups import find_groups
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.linkage_text import linkage_text
+from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.linkage import GROUND, Mass
+from linkage_ros.kinematics.topology import find_groups
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline import Look, Pipeline
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.linkage_text import linkage_text
+from linkage_ros.pipeline.pipeline import Look, Pipeline
 from linkage_ros.scene.load import parse_scene
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
 from .support.scenes import pipeline_of
@@ -168,8 +168,8 @@ def test_a_reset_compiles_nothing(effects, monkeypatch):
     scene = parse_scene('s', 's', files)
     first = Pipeline(scene)
     message = first.tick(BEGIN).message
-    monkeypatch.setattr('linkage_ros.kinematics.compiled.linkage.traced', None)
-    monkeypatch.setattr('linkage_ros.kinematics.compiled.linkage.python_body', None)
+    monkeypatch.setattr('linkage_ros.kinematics.compiling.linkage.traced', None)
+    monkeypatch.setattr('linkage_ros.kinematics.compiling.linkage.python_body', None)
     monkeypatch.setattr('builtins.exec', None)
     assert Pipeline(scene, first.closures).tick(BEGIN).message == message
 

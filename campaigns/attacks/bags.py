@@ -39,7 +39,7 @@ from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC

@@ -38,10 +38,10 @@ from campaigns.campaign import tried_in_parts
 from campaigns.in_process import confined, in_process
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
-from linkage_ros.shipped import shipped
+from linkage_ros.resources import shipped
 
 _NUMBER = re.compile(rb'(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.])')
 _NAME = re.compile(rb'[A-Za-z_]\w*')

@@ -39,12 +39,12 @@ from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter
 from linkage_ros.processes import Graph, MeasurementError
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
-from linkage_ros.shipped import shipped
+from linkage_ros.resources import shipped
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
@@ -199,7 +199,7 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
             *('-p', f'runs_directory:={folder}', '-p', 'diagnostics_period:=0.5'),
         )
         try:
-            with graph.run('linkage_ros.ros.linkage_node', node_arguments) as node:
+            with graph.run('linkage_ros.node.linkage_node', node_arguments) as node:
                 with graph.run('campaigns.attacks.graph', (str(seconds), str(seed))) as attacker:
                     outcome = attacker.read(patience=seconds + 8 * _PATIENCE)
                 node.check()

@@ -32,7 +32,7 @@ import sys
 import tempfile
 import time
 
-from linkage_ros.shipped import shipped
+from linkage_ros.resources import shipped
 
 _SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 _LATEST = 1.5

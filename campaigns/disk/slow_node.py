@@ -28,7 +28,7 @@ import sys
 from time import sleep
 from typing import Any
 
-from linkage_ros.ros import linkage_node
+from linkage_ros.node import linkage_node
 
 _CALLS = ('fsync', 'pwrite', 'replace', 'posix_fallocate')
 

@@ -170,7 +170,7 @@ def _run(plan: Plan, work: Path, folder: Path, file: Path | None) -> Stalled:
     # Below 102, so that the ports stay below those which the kernel hands out.
     graph = Graph(2 + os.getpid() % 100, work, longest=round(plan.seconds) + 60)
     arguments = ['--ros-args', '-p', f'scene:={scene}']
-    module = 'linkage_ros.ros.linkage_node'
+    module = 'linkage_ros.node.linkage_node'
     if file:
         module, arguments = 'campaigns.disk.slow_node', [str(file), *arguments]
     log = work / f'{module.rsplit(".", 1)[-1]}.log'

@@ -101,13 +101,13 @@ def run(minutes: float) -> DdsRun:
 def _record(graph: Graph, scene: Path, bag: Path, done: DdsRun) -> None:
     """Run node and source, and look at the node; both are ended, the node with its bag closed."""
     node_arguments = ['--ros-args', '-p', f'scene:={scene}']
-    with graph.run('linkage_ros.ros.linkage_node', node_arguments) as node:
+    with graph.run('linkage_ros.node.linkage_node', node_arguments) as node:
         until = time.monotonic() + _START
         while not (bag / 'metadata.yaml').exists() and time.monotonic() < until:
             node.check()
             time.sleep(0.05)
         source_arguments = ['--ros-args', '-p', f'rate:={_CRANK_RATE}.0']
-        with graph.run('linkage_ros.ros.crank_source', source_arguments) as source:
+        with graph.run('linkage_ros.node.crank_source', source_arguments) as source:
             begin = time.monotonic()
             seconds = 60.0 * done.minutes
             step = max(seconds / _LOOKS, min(1.0, seconds / 40))

@@ -46,7 +46,7 @@ from campaigns.topologies.run import (
     run,
     Tally,
 )
-from linkage_ros.scene.linkage_text import linkage_text
+from linkage_ros.files.linkage_text import linkage_text
 import numpy as np
 
 INTRO = """

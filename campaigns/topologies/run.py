@@ -40,8 +40,8 @@ from campaigns.topologies.families import FAMILIES
 from campaigns.topologies.judge import closure_of, Findings, judge_states
 from campaigns.topologies.judge_ranges import judge_ranges
 from campaigns.topologies.topology import both_ways, Topology
+from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.scene.linkage_text import linkage_text
 
 FILES = ('draw', 'urdf', 'mjcf')
 """Commands that write a file; beside these there are `check`, and `accuracy`, which is slow."""

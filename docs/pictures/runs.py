@@ -29,7 +29,7 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.effects.stage import Reading
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline import Look, Pipeline
+from linkage_ros.pipeline.pipeline import Look, Pipeline
 from linkage_ros.scene.load import load_scene
 import numpy as np
 from numpy.typing import NDArray

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from linkage_ros.parameters import number
+from linkage_ros.files.parameters import number
 
 AFTER = 'noise'
 

@@ -42,7 +42,7 @@ from linkage_ros.cost import (
 )
 from linkage_ros.effects.stage import Reading
 from linkage_ros.measuring import Progress, Spread
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 
 

@@ -32,15 +32,15 @@ from typing import Any, NamedTuple
 
 from linkage_ros.accuracy.methods import Method
 from linkage_ros.accuracy.reference import Truth
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.ranges import reach
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.survey import grid, Way
+from linkage_ros.kinematics.sweep_analysis import grid, Way
 from linkage_ros.measuring import Spread
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
-from linkage_ros.shipped import shipped
+from linkage_ros.resources import shipped
 import numpy as np
 
 DISTANCES = tuple(10.0 ** (-k / 3.0) for k in range(6, 28))

@@ -34,7 +34,7 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cost import feed
 from linkage_ros.errors import RecordingError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 
 FASTEST = 1000.0

@@ -34,7 +34,7 @@ from linkage_ros.bag.bag_file import compression_type
 from linkage_ros.bag.storage import COMPRESSIONS, FLUSH_AFTER, NONE, Storage
 from linkage_ros.errors import RecordingError
 from linkage_ros.measuring import alternating, Progress, Spread, spread_of
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 
 _LONGER = 1.1

@@ -38,13 +38,13 @@ from typing import NamedTuple
 from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Table
 from linkage_ros.drives.chirp import Chirp, curve
 from linkage_ros.errors import LinkageError
+from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.survey import usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
 from linkage_ros.measuring import Progress, Spread, spread_of
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.processes import Graph, MeasurementError
-from linkage_ros.scene.linkage_text import linkage_text
 from linkage_ros.scene.scene import Scene
 
 CHIRP, ACCELERATION = 'chirp', 'constant acceleration'
@@ -202,8 +202,8 @@ def use_states(folder: Path, linkage: Linkage, rate: float, seconds: float) -> l
     found = []
     with (
         _in_one_line(),
-        graph.run('linkage_ros.ros.linkage_node', arguments) as server,
-        graph.run('linkage_ros.ros.consumer', [json.dumps(task)]) as consumer,
+        graph.run('linkage_ros.node.linkage_node', arguments) as server,
+        graph.run('linkage_ros.node.staleness_probe', [json.dumps(task)]) as consumer,
     ):
         for _ in range(2):
             consumer.read(_PATIENCE)

@@ -20,7 +20,7 @@ from __future__ import annotations
 from linkage_ros.accuracy.page.numbers import cell_text, numeric_columns
 from linkage_ros.accuracy.results import Results
 from linkage_ros.accuracy.results import Table as Measured
-from linkage_ros.cli.tables import show, Table
+from linkage_ros.cli.terminal import show, Table
 
 
 def print_results(results: Results) -> None:

@@ -27,8 +27,8 @@ from linkage_ros.bag.reader import Bag, information_of, serialized_metadata
 from linkage_ros.bag.recording_stats import counts_in, FAILURE
 from linkage_ros.bag.run_events import lost_beginning, run_said
 from linkage_ros.cli.bag_reading import run_or_blank, unfinished_text
-from linkage_ros.cli.worst_states import Examined, WorstStates
 from linkage_ros.kinematics.four_bars import four_bars
+from linkage_ros.replay.worst_residuals import Examined, WorstStates
 from linkage_ros.scene.scene import Member, Scene
 
 

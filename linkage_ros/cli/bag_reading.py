@@ -32,9 +32,9 @@ from linkage_ros.bag.recover import NOTHING_LOST, RECOVERED
 from linkage_ros.bag.run_events import run_account, run_said, RunAccount
 from linkage_ros.cli.progress import progress
 from linkage_ros.errors import BagError, clean, listed
-from linkage_ros.replay import recorded_scene
+from linkage_ros.replay.replay import recorded_scene
 from linkage_ros.scene.scene import Scene
-from linkage_ros.stop import heeded, StoppedError
+from linkage_ros.signals import heeded, StoppedError
 
 _MIB = 2**20
 _BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its own
@@ -90,7 +90,7 @@ def scene_of(bag: Bag, *, trust_effects: bool) -> Scene:
     scene = recorded_scene(bag)
     if not trust_effects or not scene.not_imported:
         return scene
-    from linkage_ros.effects.own import found_in
+    from linkage_ros.effects.user_effects import found_in
 
     for name in scene.not_imported:
         where = found_in(name)

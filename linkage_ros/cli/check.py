@@ -22,15 +22,16 @@ from collections.abc import Iterator, Mapping
 from math import isfinite, tau
 from threading import Event
 
-from linkage_ros.cli.linkage_file import angle_text, value_text
-from linkage_ros.cli.tables import show, Table
+from linkage_ros.cli.arguments import angle_text, value_text
+from linkage_ros.cli.terminal import show, Table
+from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.four_bars import four_bars
 from linkage_ros.kinematics.linkage import Limits
 from linkage_ros.kinematics.ranges import InputRange
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Driven, Dyad, Group, Iterated
-from linkage_ros.kinematics.survey import (
+from linkage_ros.kinematics.sweep_analysis import (
     conditionings,
     Extreme,
     Extremes,
@@ -38,7 +39,6 @@ from linkage_ros.kinematics.survey import (
     Way,
     worst_residual,
 )
-from linkage_ros.scene.linkage_file import load
 
 _SINGULAR = (
     ('toggles', Status.TOGGLE),
@@ -248,7 +248,7 @@ def _other_assemblies(closure: Closure) -> Iterator[Table]:
         if not isinstance(group, Iterated) or pose is None:
             continue
         # local import: it loads numpy
-        from linkage_ros.kinematics.assemblies import other_assemblies, STARTS
+        from linkage_ros.kinematics.assembly_modes import other_assemblies, STARTS
 
         others = other_assemblies(closure, number)
         inputs = ', '.join(f'{value + 0.0:.9g}' for value in pose.inputs)

@@ -29,14 +29,14 @@ import re
 from threading import Event
 
 from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quoted
+from linkage_ros.files.atomic_write import write_whole
+from linkage_ros.files.linkage_file import read_closure
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiled.c import C
-from linkage_ros.kinematics.compiled.javascript import JavaScript
-from linkage_ros.kinematics.compiled.python_module import PythonModule
-from linkage_ros.kinematics.compiled.source import Language, source, Subject
-from linkage_ros.scene.linkage_file import read_closure
-from linkage_ros.scene.yaml_file import read_yaml
-from linkage_ros.whole_file import write_whole
+from linkage_ros.kinematics.compiling.c import C
+from linkage_ros.kinematics.compiling.javascript import JavaScript
+from linkage_ros.kinematics.compiling.python_module import PythonModule
+from linkage_ros.kinematics.compiling.source import Language, source, Subject
 
 LANGUAGES: dict[str, Callable[[Subject], Language]] = {
     '.c': lambda subject: C(subject.name, header=False),

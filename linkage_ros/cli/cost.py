@@ -26,14 +26,14 @@ from threading import Event
 
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli.tables import show, Table
+from linkage_ros.cli.terminal import show, Table
 from linkage_ros.cost import compare, EffectCost, measure, SceneCost, Times
 from linkage_ros.effects.stage import NEEDS
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.resources import shipped
 from linkage_ros.scene.load import LINKAGE_FILE, load_scene, parse_scene, SCENE_FILE
 from linkage_ros.scene.scene import Scene
-from linkage_ros.shipped import shipped
 
 ALL = 'all'
 """Name of the scene of all effects."""

@@ -33,20 +33,20 @@ import sys
 from threading import Event
 
 from linkage_ros.cli.plot import draw
-from linkage_ros.cli.run import add_run_arguments, run_scene
-from linkage_ros.cli.tables import show, Table
+from linkage_ros.cli.run_part import add_run_arguments, run_scene
+from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import did_you_mean, LinkageError, listed
+from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Member, Scene
-from linkage_ros.shipped import shipped
-from linkage_ros.stop import heeded
+from linkage_ros.signals import heeded
 
 _DOMAINS = 101
 """Domain ids up to this one are safe with the ports of every operating system."""
 
 _BESIDE = {
-    'topic': ('linkage_ros.ros.crank_source',),
-    'torque': ('linkage_ros.ros.pd_controller', 'swing:=1.0'),
+    'topic': ('linkage_ros.node.crank_source',),
+    'torque': ('linkage_ros.node.pd_controller', 'swing:=1.0'),
 }
 """What drives that listen to a topic need beside them, with parameters; others need nothing."""
 

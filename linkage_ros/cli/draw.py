@@ -21,10 +21,10 @@ import argparse
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli.linkage_file import add_at, inputs
+from linkage_ros.cli.arguments import add_at, inputs
 from linkage_ros.drawing.figure import picture, view
-from linkage_ros.kinematics.survey import usual_inputs
-from linkage_ros.scene.linkage_file import load
+from linkage_ros.files.linkage_file import load
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -36,8 +36,6 @@ from linkage_ros.bag.contents import layout_of
 from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.bag_reading import opened, run_or_blank, unfinished_text
 from linkage_ros.cli.progress import progress
-from linkage_ros.cli.proof import turning_joints
-from linkage_ros.cli.table_files import block_rows, check_kind, table_file
 from linkage_ros.cli.tick_rows import (
     Found,
     LOGGED,
@@ -49,10 +47,12 @@ from linkage_ros.cli.tick_rows import (
     TIME,
 )
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError, listed
+from linkage_ros.files.tables import block_rows, check_kind, table_file
 from linkage_ros.messages.joint_values import JOINT_STATE, Key, POSITION, TYPES, UNITS
-from linkage_ros.replay import own_joint_states, recorded_scene
+from linkage_ros.replay.replay import own_joint_states, recorded_scene
+from linkage_ros.replay.verify import turning_joints
 from linkage_ros.scene.scene import Scene
-from linkage_ros.stop import StoppedError
+from linkage_ros.signals import StoppedError
 
 _MIB = 2**20
 

@@ -29,12 +29,12 @@ from threading import Event
 
 from linkage_ros.cli.model_file import add_output, put
 from linkage_ros.errors import LinkageError
-from linkage_ros.models.imported import imported
-from linkage_ros.models.urdf_file import read_urdf
-from linkage_ros.regular_file import read_regular
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.linkage_text import linkage_text
-from linkage_ros.scene.yaml_file import parse_yaml
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.linkage_text import linkage_text
+from linkage_ros.files.regular_file import read_regular
+from linkage_ros.files.yaml_file import parse_yaml
+from linkage_ros.robot_models.from_urdf import imported
+from linkage_ros.robot_models.urdf_file import read_urdf
 
 _LARGEST_FILE = 10_000_000
 

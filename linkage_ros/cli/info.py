@@ -35,6 +35,7 @@ from typing import Any
 
 from linkage_ros.bag.contents import contents_of, layout_of
 from linkage_ros.bag.reader import Bag
+from linkage_ros.cli.arguments import value_text, wrapped
 from linkage_ros.cli.bag_account import (
     account_of,
     replay_account,
@@ -42,12 +43,11 @@ from linkage_ros.cli.bag_account import (
     worst_account,
 )
 from linkage_ros.cli.bag_reading import add_trust, opened, scene_of
-from linkage_ros.cli.linkage_file import value_text, wrapped
 from linkage_ros.cli.progress import progress
-from linkage_ros.cli.tables import show, Table
-from linkage_ros.cli.worst_states import examine
+from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import clean, LinkageError
-from linkage_ros.stop import heeded
+from linkage_ros.replay.worst_residuals import examine
+from linkage_ros.signals import heeded
 
 _MIB = 2**20
 

@@ -25,7 +25,7 @@ from threading import Event
 from linkage_ros import __version__
 from linkage_ros.cli.outlet import clean_output
 from linkage_ros.errors import LinkageError, missing_packages_reported
-from linkage_ros.stop import end_soon, raising, stop_on_signals, StoppedError
+from linkage_ros.signals import end_soon, raising, stop_on_signals, StoppedError
 
 COMMANDS = {
     'run': 'run a scene as a ROS 2 node, with a live display',

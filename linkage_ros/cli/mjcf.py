@@ -21,7 +21,7 @@ import argparse
 from threading import Event
 
 from linkage_ros.cli.model_file import add_files, model_of, put
-from linkage_ros.models.mjcf import mjcf
+from linkage_ros.robot_models.mjcf_part import mjcf
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

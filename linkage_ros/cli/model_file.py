@@ -21,12 +21,12 @@ import argparse
 from pathlib import Path
 import sys
 
-from linkage_ros.models.part import Part, PartError
-from linkage_ros.scene.linkage_file import read_closure
+from linkage_ros.files.atomic_write import write_whole
+from linkage_ros.files.linkage_file import read_closure
+from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.robot_models.part_part import Part, PartError
 from linkage_ros.scene.load import kind_of
 from linkage_ros.scene.robot_model import scene_model, Write
-from linkage_ros.scene.yaml_file import read_yaml
-from linkage_ros.whole_file import write_whole
 
 
 def add_files(parser: argparse.ArgumentParser, kind: str) -> None:
@@ -50,7 +50,7 @@ def model_of(file: str, write: Write) -> bytes:
     """
     content, _ = read_yaml(file)
     if kind_of(content) == 'scene':
-        from linkage_ros.pipeline import Pipeline
+        from linkage_ros.pipeline.pipeline import Pipeline
         from linkage_ros.scene.load import load_scene
 
         scene = load_scene(file)

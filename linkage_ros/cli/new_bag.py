@@ -36,12 +36,12 @@ from linkage_ros.bag.run_events import (
 )
 from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli.what_if import Done, WhatIf
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.single_values import time_message
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.replay import own_effects_here, versions_here
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.counterfactual import Done, WhatIf
+from linkage_ros.replay.replay import own_effects_here, versions_here
 from linkage_ros.scene.scene import Scene
 
 _FLUSHED_EVERY = 50_000
@@ -231,7 +231,7 @@ def _described(bag: Bag, name: str, kind: str, qos: QosProfile) -> Topic:
         if topic.type == kind and topic.definition:
             return replace(topic, name=name, qos=qos)
     try:
-        from linkage_ros.ros.bag_topics import bag_topic, message_type
+        from linkage_ros.node.bag_topics import bag_topic, message_type
         from rclpy.qos import QoSProfile as RosProfile
     except ImportError:
         raise LinkageError(

@@ -20,11 +20,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib import import_module
 
-from linkage_ros.cli.tables import Table
+from linkage_ros.cli.terminal import Table
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS, module_of
 from linkage_ros.faults.fault import FAULTS
-from linkage_ros.parameters import parameter_rows, summary
+from linkage_ros.files.parameters import parameter_rows, summary
 from linkage_ros.solvers.registry import SOLVERS
 
 REGISTRIES: Mapping[str, Mapping[str, str]] = {

@@ -37,10 +37,10 @@ from linkage_ros.cli.bag_reading import opened
 from linkage_ros.cli.progress import progress, Told
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.ros.bag_topics import offer
-from linkage_ros.ros.playback import LATE, Part, Playback
-from linkage_ros.ros.player import CLOCK, play, player_node, Wishes
-from linkage_ros.stop import heeded
+from linkage_ros.node.bag_topics import offer
+from linkage_ros.node.playback import LATE, Part, Playback
+from linkage_ros.node.player import CLOCK, play, player_node, Wishes
+from linkage_ros.signals import heeded
 
 _CLOCK_RATE = 40.0  # as ``ros2 bag play``
 

@@ -26,12 +26,12 @@ from typing import Any
 
 from linkage_ros.cli.bag_reading import add_trust, beside, opened, scene_of
 from linkage_ros.drawing.painting import save
-from linkage_ros.effects.turns import wrapped
+from linkage_ros.effects.angle_unwrap import wrapped
 from linkage_ros.errors import BagError, LinkageError, shortened
 from linkage_ros.kinematics.linkage import Input, RevoluteJoint
 from linkage_ros.messages.joint_state import JointStateReader, Rejection
-from linkage_ros.replay import replay
-from linkage_ros.stop import StoppedError
+from linkage_ros.replay.replay import replay
+from linkage_ros.signals import StoppedError
 
 _COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
 """Okabe and Ito's, which colour-blind readers can tell."""

@@ -24,7 +24,7 @@ from threading import Event
 
 from linkage_ros.bag.recover import recover, Recovery
 from linkage_ros.cli.progress import progress
-from linkage_ros.cli.tables import show, Table
+from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import clean
 
 WHOLE, STOPPED, LOSS = 0, 1, 3

@@ -13,184 +13,239 @@
 # limitations under the License.
 
 
-"""
-Run the scene of a bag once more over its samples, and compare.
-
-Every joint state, and what else was published, is made anew and held against the recorded bytes.
-Exit code 0: all are the same; 3: some differ; 1: it could not be told, was stopped, or the bag is
-damaged and what lies before the damage is the same.
-
-With --scene another scene is run, and its joints are compared with the recorded ones; -o writes it
-to a new bag, which replays by itself. Then a difference is no failure.
-"""
+"""How a replay is told: as JSON has it, and as text. Times are in [ns], and named so."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Iterator
-from dataclasses import replace
-import json
-from pathlib import Path
-import sys
-from threading import Event
+from collections.abc import Iterator, Mapping
+from math import isfinite
 from typing import Any
 
-from linkage_ros.bag.reader import Bag, RUN_FILE
-from linkage_ros.bag.run_events import run_account
-from linkage_ros.cli.bag_reading import add_trust, BagReading, opened, scene_of
-from linkage_ros.cli.proof import DIFFERENT, IDENTICAL, prove, turning_joints
-from linkage_ros.cli.replay_account import (
-    bag_account,
-    first_text,
-    greatest_table,
-    joints_table,
-    proof_account,
-    topics_table,
-    versions_text,
-)
-from linkage_ros.cli.replay_other import replayed_with
-from linkage_ros.cli.tables import show
-from linkage_ros.errors import BagError, clean, LinkageError
-from linkage_ros.replay import own_effects_here, ReplayedTick, versions_here
-from linkage_ros.scene.load import load_scene
-
-EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
+from linkage_ros.bag.reader import Bag
+from linkage_ros.cli.bag_reading import BagReading, gaps, unfinished_text
+from linkage_ros.cli.terminal import Table
+from linkage_ros.errors import clean
+from linkage_ros.messages.joint_values import UNITS
+from linkage_ros.replay.compare import At, Comparison, First, TopicComparison, ulps
+from linkage_ros.replay.verify import beginning_text, Proof
+from linkage_ros.scene.scene import Scene
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
-    parser.add_argument('--scene', type=Path, help='another scene to run, or a linkage')
-    parser.add_argument(
-        '-o', '--output', type=Path, metavar='NEWBAG', help='folder of a new bag; with --scene'
-    )
-    parser.add_argument(
-        '--crank-topic',
-        help="the samples' topic, with --scene; absent, the run's own, /crank_states, or the only "
-        'one that has the input joints',
-    )
-    parser.add_argument('--json', action='store_true', help='the same as JSON')
-    add_trust(parser)
+def unit_of(joint: str, quantity: str, turning: Mapping[str, bool]) -> str:
+    """Return the unit of a joint's number."""
+    return UNITS[quantity][not turning.get(joint, True)]
 
 
-def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Replay the bag; the module says what is returned."""
-    for option, value in (('-o', arguments.output), ('--crank-topic', arguments.crank_topic)):
-        if value is not None and arguments.scene is None:
-            raise LinkageError(option, 'is for another scene', 'name it with --scene')
-    bag = opened(arguments.bag, stop)
-    reading = BagReading(bag, stop)
-    if arguments.scene is None:
-        account = replayed(bag, reading, trust_effects=arguments.trust_effects)
-        code = {IDENTICAL: 0, DIFFERENT: EXIT_DIFFERENT}.get(account['verdict'], EXIT_INCOMPLETE)
-    else:
-        scene = load_scene(arguments.scene)
-        if RUN_FILE in bag.attachments and 'seed' not in scene.members[0].content:
-            # What differs is the scene, and not the noise.
-            scene = replace(scene, seed=run_account(bag).seed)
-        account = replayed_with(bag, reading, scene, arguments.crank_topic, arguments.output)
-        code = 0
-    if arguments.json:
-        print(json.dumps(account, indent=1, allow_nan=False))
-    elif arguments.scene is None:
-        _show_proof(account)
-    else:
-        _show_what_if(account)
-    for line in _shortcomings(account):
-        print(f'linkage replay: {line}', file=sys.stderr)
-    return code or (EXIT_INCOMPLETE if reading.damage or reading.stopped else 0)
-
-
-def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> dict[str, Any]:
-    """
-    Run a bag's own scene once more; return what came of it.
-
-    Raises
-    ------
-    LinkageError
-        Where the bag carries no scene that can be run, or nothing to compare.
-
-    """
-    try:
-        scene = scene_of(bag, trust_effects=trust_effects)
-    except BagError as error:
-        raise BagError(error.where, error.reason, 'name a scene to run with --scene') from None
-    begin: list[int] = []
-
-    def look(tick: ReplayedTick) -> None:
-        if not begin:
-            begin.append(tick.time)
-
-    with reading.told() as messages:
-        proof = prove(bag, scene, messages, look)
-    if not begin and not reading.damage and not reading.stopped:
-        raise BagError(bag.path, 'holds no joint states', 'record a run with a crank')
-    run = run_account(bag)
-    versions = {
-        'bag': {**run.versions, **run.own_effects},
-        'here': {**versions_here(), **own_effects_here(scene)},
+def bag_account(bag: Bag, scene: Scene, reading: BagReading, begin: list[int]) -> dict[str, Any]:
+    """Return which bag was replayed as which scene, how far, and when it began, in [ns]."""
+    return {
+        'bag': str(bag.path),
+        'scene': scene.name,
+        'begin_ns': begin[0] if begin else None,
+        'truncated': bag.truncated,
+        'unfinished': unfinished_text(bag) if bag.truncated else None,
+        'gaps': list(gaps(bag)),
+        'damage': reading.damage or None,
+        'stopped': reading.stopped,
     }
-    account = proof_account(proof, turning_joints(scene), versions)
-    return bag_account(bag, scene, reading, begin) | account
 
 
-def _show_proof(account: dict[str, Any]) -> None:
-    begin = account['begin_ns'] or 0
-    differ, ticks = account['different_ticks'], account['compared_ticks']
-    verdict = account['verdict']
-    if verdict == IDENTICAL:
-        text = f'identical: what {ticks} ticks have made comes to the same again'
-    else:
-        text = f'{verdict}: {differ} of {ticks} ticks differ' if ticks else verdict
-    print(f'{account["bag"]}: {text}')
-    if account['beginning_missing']:
-        print(account['beginning_missing'])
-    for gap in account['gaps'] if differ else ():
-        print(clean(gap))
-    first = account['first_difference']
-    if first and differ:
-        print(clean(f'first: {first_text(first, begin)}'))
-        last = account['last_different_tick']['tick']
-        if last < account['ticks'] and last != first['tick']:
-            print(f'from tick {last + 1} on all are the same')
-    elif first:
-        print(clean(f'not told, first: {first_text(first, begin)}'))
-    if account['withheld_ticks']:
-        print(f'{account["withheld_ticks"]} ticks are without a message, then and now')
-    for line in versions_text(account['versions']):
-        print(line)
-    print()
-    show(topics_table(account))
-    if account['greatest']:
-        print()
-        show(greatest_table(account, begin))
+def proof_account(
+    proof: Proof, turning: Mapping[str, bool], versions: Mapping[str, Mapping[str, str]]
+) -> dict[str, Any]:
+    """
+    Return what there is to say of a proof.
+
+    Parameters
+    ----------
+    proof
+        The proof.
+    turning
+        Of each joint whether it turns, or slides.
+    versions
+        Those of the ``bag``, and those ``here``.
+
+    """
+    found = proof.comparison
+    return {
+        'verdict': proof.verdict,
+        'ticks': proof.ticks,
+        'compared_ticks': found.ticks,
+        'different_ticks': found.differing,
+        'withheld_ticks': found.withheld,
+        'untold_ticks': proof.untold,
+        'beginning_missing': beginning_text(proof) if proof.beginning else None,
+        'topics': [topic_account(topic) for topic in found.topics],
+        'first_difference': first_account(found.first or proof.first_untold, turning),
+        'last_different_tick': at_account(found.last) if found.last else None,
+        'greatest': greatest(found, turning),
+        'versions': {name: dict(of) for name, of in versions.items()},
+    }
 
 
-def _show_what_if(account: dict[str, Any]) -> None:
-    print(
-        f'{account["bag"]}, as {account["scene"]}: {account["joint_states"]} joint states, '
-        f'from {clean(account["crank_topic"])}'
+def topic_account(topic: TopicComparison) -> dict[str, Any]:
+    """Return how the messages of a topic came out."""
+    return {
+        'name': topic.name,
+        'recorded': topic.recorded,
+        'same': topic.same,
+        'same_but_for_turns': topic.but_turns,
+        'different': topic.different,
+        'not_made_now': topic.gone,
+        'not_recorded': topic.not_recorded,
+    }
+
+
+def first_account(first: First | None, turning: Mapping[str, bool]) -> dict[str, Any] | None:
+    """Return a difference, with how far the two are apart."""
+    if first is None:
+        return None
+    account: dict[str, Any] = {**at_account(first.at), 'topic': first.topic, 'what': first.what}
+    if first.recorded is not None and first.now is not None:
+        account |= {
+            'joint': first.joint,
+            'unit': unit_of(first.joint, first.what, turning),
+            'recorded': _finite(first.recorded),
+            'now': _finite(first.now),
+            'difference': _finite(abs(first.now - first.recorded)),
+            'ulp': ulps(first.recorded, first.now),
+        }
+    return account
+
+
+def at_account(at: At) -> dict[str, Any]:
+    """Return where something was."""
+    return {'tick': at.tick, 'time_ns': at.time}
+
+
+def greatest(found: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
+    """Return the greatest differences of each quantity and unit that differs at all."""
+    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    for topic in found.topics:
+        for (joint, quantity), deviation in topic.deviations.items():
+            if not deviation.differing:
+                continue
+            unit = unit_of(joint, quantity, turning)
+            row = rows.setdefault((quantity, unit), {'difference': -1.0, 'ulp': -1})
+            if deviation.greatest > row['difference']:
+                where = {'joint': joint, **at_account(deviation.at)}
+                row |= {'difference': deviation.greatest, 'difference_at': where}
+            if deviation.ulps > row['ulp']:
+                where = {'joint': joint, **at_account(deviation.ulps_at)}
+                row |= {'ulp': deviation.ulps, 'ulp_at': where}
+    return [
+        {'quantity': quantity, 'unit': unit, **row, 'difference': _finite(row['difference'])}
+        for (quantity, unit), row in rows.items()
+    ]
+
+
+def joints_account(found: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
+    """Return of every number that both have how far they are apart."""
+    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    for topic in found.topics:
+        for key, deviation in topic.deviations.items():
+            joint, quantity = key
+            # Motions repeat what the joint states say.
+            rows.setdefault(
+                key,
+                {
+                    'joint': joint,
+                    'quantity': quantity,
+                    'unit': unit_of(joint, quantity, turning),
+                    'compared': deviation.compared,
+                    'different': deviation.differing,
+                    'rms': _finite(deviation.rms),
+                    'greatest': _finite(deviation.greatest),
+                    'greatest_at': at_account(deviation.at) if deviation.differing else None,
+                },
+            )
+    return list(rows.values())
+
+
+def first_text(first: Mapping[str, Any], begin: int) -> str:
+    """Return the first difference in words; times are told from a time in [ns]."""
+    text = f'tick {first["tick"]}, at {(first["time_ns"] - begin) / 1e9:+.6f} s '
+    text += f'({first["time_ns"]} ns), {first["topic"]}: '
+    if 'joint' not in first:
+        return text + str(first['what'])
+    unit = first['unit']
+    return text + (
+        f'{first["joint"]} {first["what"]}: {first["recorded"]!r} recorded, {first["now"]!r} now, '
+        f'{_number(first["difference"])} {unit} or {first["ulp"]} ulp apart'
     )
-    for key, when in (('joints_only_recorded', 'recorded'), ('joints_only_now', 'now')):
-        if account[key] and account['topics']:
-            print(f'only {when}: {", ".join(account[key])}')
-    if account['topics']:
-        print()
-        show(topics_table(account))
-    if account['joints']:
-        print()
-        show(joints_table(account, account['begin_ns'] or 0))
-    if account['new_bag']:
-        print()
-        counts = ', '.join(f'{count} of {name}' for name, count in account['written'].items())
-        print(f'{account["new_bag"]}: {counts}')
 
 
-def _shortcomings(account: dict[str, Any]) -> Iterator[str]:
-    """Yield why not all of the bag was replayed."""
-    if account['truncated']:
-        yield f'{account["bag"]}: unfinished: {account["unfinished"]}; what it holds was replayed'
-    if account['damage']:
-        yield f'{account["damage"]}; what lies before was replayed'
-    if account['stopped']:
-        yield 'stopped; the rest of the bag was not replayed'
+def topics_table(account: Mapping[str, Any]) -> Table:
+    """Return the topics as a table."""
+    heads = ['topic', '>recorded', '>same bytes', '>different', '>not made now', '>not recorded']
+    keys = ['recorded', 'same', 'different', 'not_made_now', 'not_recorded']
+    if any(topic['same_but_for_turns'] for topic in account['topics']):
+        heads.insert(3, '>but for turns')
+        keys.insert(2, 'same_but_for_turns')
+    rows = [
+        (clean(topic['name']), *(str(topic[key]) for key in keys)) for topic in account['topics']
+    ]
+    return Table('', heads, rows)
+
+
+def greatest_table(account: Mapping[str, Any], begin: int) -> Table:
+    """Return the greatest differences as a table."""
+    rows = [
+        (
+            f'{row["quantity"]} [{row["unit"]}]',
+            _number(row['difference']),
+            _place(row['difference_at'], begin) if 'difference_at' in row else '',
+            str(row['ulp']),
+            _place(row['ulp_at'], begin) if 'ulp_at' in row else '',
+        )
+        for row in account['greatest']
+    ]
+    return Table('Greatest differences', ('', '>apart', 'where', '>ulp', 'where'), rows)
+
+
+def joints_table(account: Mapping[str, Any], begin: int) -> Table:
+    """Return the differences joint by joint as a table."""
+    rows = [
+        (
+            clean(row['joint']),
+            f'{row["quantity"]} [{row["unit"]}]',
+            str(row['compared']),
+            _number(row['rms']),
+            _number(row['greatest']),
+            _tick(row['greatest_at'], begin) if row['greatest_at'] else '',
+        )
+        for row in account['joints']
+    ]
+    return Table('', ('joint', '', '>compared', '>rms', '>greatest', 'where'), rows)
+
+
+def versions_text(versions: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
+    """Yield the versions of what made the bag, and those of here where they are others."""
+    then, here = versions['bag'], versions['here']
+    same = dict(then) == dict(here)
+    yield f'made {"and replayed " if same else ""}by {_versions(then)}'
+    if not same:
+        yield f'replayed by {_versions(here)}'
+
+
+def _versions(said: Mapping[str, str]) -> str:
+    words = {'linkage_ros': 'linkage_ros', 'python': 'Python', 'machine': 'on'}
+    told = [f'{word} {clean(said[key])}' for key, word in words.items() if key in said]
+    told += [f'{clean(key)} ({clean(said[key])})' for key in said if key not in words]
+    return ', '.join(told) or 'versions that it does not tell'
+
+
+def _place(where: Mapping[str, Any], begin: int) -> str:
+    return f'{clean(where["joint"])}, {_tick(where, begin)}'
+
+
+def _tick(where: Mapping[str, Any], begin: int) -> str:
+    return f'tick {where["tick"]}, {(where["time_ns"] - begin) / 1e9:+.6f} s'
+
+
+def _number(value: float | None) -> str:
+    return 'no number' if value is None else f'{value:.3g}'
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None

@@ -26,13 +26,13 @@ from linkage_ros.bag.run_events import recorded_events, run_account, RunAccount
 from linkage_ros.cli.bag_reading import BagReading
 from linkage_ros.cli.crank_topic import find_crank_topic
 from linkage_ros.cli.new_bag import Names, names_for, NewBag, Source
-from linkage_ros.cli.proof import turning_joints
-from linkage_ros.cli.replay_account import bag_account, joints_account, topic_account
-from linkage_ros.cli.replay_comparison import At, Comparison
-from linkage_ros.cli.what_if import check_drives, Remade, WhatIf
+from linkage_ros.cli.replay import bag_account, joints_account, topic_account
 from linkage_ros.errors import LinkageError, listed
 from linkage_ros.messages.joint_values import JOINT_STATE
-from linkage_ros.replay import own_joint_states, recorded_scene
+from linkage_ros.replay.compare import At, Comparison
+from linkage_ros.replay.counterfactual import check_drives, Remade, WhatIf
+from linkage_ros.replay.replay import own_joint_states, recorded_scene
+from linkage_ros.replay.verify import turning_joints
 from linkage_ros.scene.scene import Scene
 
 

@@ -40,14 +40,14 @@ from linkage_ros.cli.bag_reading import add_trust, beside, gaps, opened, scene_o
 from linkage_ros.cli.info import tables
 from linkage_ros.cli.progress import progress
 from linkage_ros.errors import LinkageError
+from linkage_ros.files.atomic_write import replace_whole
 from linkage_ros.report.blocks import Progress
 from linkage_ros.report.html import ReportHeader, run_html, TableOf
 from linkage_ros.report.labels import seconds_text
 from linkage_ros.report.reading import read_run
 from linkage_ros.report.run import Run, Window
 from linkage_ros.scene.scene import Scene
-from linkage_ros.stop import StoppedError
-from linkage_ros.whole_file import replace_whole
+from linkage_ros.signals import StoppedError
 
 _MIB = 2**20
 _LONGEST = 2**62

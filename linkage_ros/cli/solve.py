@@ -32,13 +32,13 @@ import sys
 from threading import Event
 from typing import Any, NamedTuple
 
-from linkage_ros.cli.linkage_file import add_at, fixed, inputs, values, wrapped
-from linkage_ros.cli.tables import show, Table, text
+from linkage_ros.cli.arguments import add_at, fixed, inputs, values, wrapped
+from linkage_ros.cli.terminal import show, Table, text
 from linkage_ros.errors import LinkageError
+from linkage_ros.files.atomic_write import write_whole
+from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.survey import Way
-from linkage_ros.scene.linkage_file import load
-from linkage_ros.whole_file import write_whole
+from linkage_ros.kinematics.sweep_analysis import Way
 
 _STEPS = 36
 _DIGITS = 6

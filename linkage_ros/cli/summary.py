@@ -21,12 +21,12 @@ from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.cli.bag_reading import gaps
-from linkage_ros.cli.proof import beginning_text, DIFFERENT, prove, UNTOLD
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.status import Status
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.replay import recorded_scene, ReplayedTick
-from linkage_ros.ros.node import LinkageNode
+from linkage_ros.node.node import LinkageNode
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.replay import recorded_scene, ReplayedTick
+from linkage_ros.replay.verify import beginning_text, DIFFERENT, prove, UNTOLD
 
 
 def summary(node: LinkageNode) -> str:

@@ -20,9 +20,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import degrees
 
-from linkage_ros.cli.linkage_file import angle_text
+from linkage_ros.cli.arguments import angle_text
 from linkage_ros.cli.synthesis_tasks import Answer
-from linkage_ros.cli.tables import Table
+from linkage_ros.cli.terminal import Table
 from linkage_ros.synthesis.defects import Assessment, misses, Needs
 from linkage_ros.synthesis.design import FourBar
 

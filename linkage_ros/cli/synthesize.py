@@ -32,9 +32,9 @@ from threading import Event
 from linkage_ros.cli.progress import progress, Told
 from linkage_ros.cli.synthesis_tables import tables
 from linkage_ros.cli.synthesis_tasks import Answer, answers, CANDIDATES, Search
-from linkage_ros.cli.tables import show
+from linkage_ros.cli.terminal import show
 from linkage_ros.errors import LinkageError
-from linkage_ros.scene.linkage_text import write_linkage
+from linkage_ros.files.linkage_text import write_linkage
 from linkage_ros.synthesis.defects import distance, misses, Needs
 
 _NOT_MET = 1
@@ -242,7 +242,7 @@ def _show(shown: Sequence[Answer], needs: Needs) -> None:
 def _draw(file: Path | None, shown: Sequence[Answer]) -> None:
     if file is None:
         return
-    from linkage_ros.drawing.design import draw_design
+    from linkage_ros.drawing.design_part import draw_design
 
     for number, answer in enumerate(shown, 1):
         own = file if len(shown) == 1 else file.with_stem(f'{file.stem}-{number}')

@@ -23,7 +23,7 @@ from math import isfinite
 from pathlib import Path
 
 from linkage_ros.errors import FileError, quoted
-from linkage_ros.regular_file import read_regular
+from linkage_ros.files.regular_file import read_regular
 
 _MOST = 1000
 _LARGEST_FILE = 10_000_000

@@ -21,7 +21,7 @@ import argparse
 from threading import Event
 
 from linkage_ros.cli.model_file import add_files, model_of, put
-from linkage_ros.models.urdf import urdf
+from linkage_ros.robot_models.urdf import urdf
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -22,7 +22,7 @@ from math import nan, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.kinematics.survey import samples, Way
+from linkage_ros.kinematics.sweep_analysis import samples, Way
 
 _SAME_PATH = 0.01
 """How far a path may be from another, of its length, and be drawn as the same."""

@@ -24,7 +24,7 @@ from typing import NamedTuple
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.kinematics.survey import Way
+from linkage_ros.kinematics.sweep_analysis import Way
 from linkage_ros.synthesis.design import Assembly, COUPLER, Design, Wanted
 from linkage_ros.synthesis.proof import closed_position, closure_of, Met, prove, SIDES
 import numpy as np

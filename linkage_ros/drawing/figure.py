@@ -43,7 +43,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.kinematics.survey import Way
+from linkage_ros.kinematics.sweep_analysis import Way
 
 _GHOSTS = 5
 

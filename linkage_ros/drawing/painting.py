@@ -28,7 +28,7 @@ from typing import Any
 from linkage_ros.drawing.labels import Label, place_labels
 from linkage_ros.drawing.shapes import Circle, Polygon, Segment, Shape
 from linkage_ros.errors import LinkageError
-from linkage_ros.whole_file import write_whole
+from linkage_ros.files.atomic_write import write_whole
 
 COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000')
 """Okabe and Ito's, which colour-blind readers can tell."""

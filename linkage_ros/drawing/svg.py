@@ -25,7 +25,7 @@ from linkage_ros.drawing.painting import COLOURS, corners, FACES, GHOST, INK, ou
 from linkage_ros.drawing.shapes import Circle, Polygon, shapes, skeleton
 from linkage_ros.errors import quoted
 from linkage_ros.kinematics.closure import Closure, Position
-from linkage_ros.kinematics.survey import usual_inputs
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
 _LONGER_SIDE = 420.0
 """Of a picture, in pixels."""

@@ -37,8 +37,8 @@ from linkage_ros.bag.run_events import run_said
 from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import BagError, DefinitionError, listed
+from linkage_ros.files.parameters import choice, file, flag, number, text
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
-from linkage_ros.parameters import choice, file, flag, number, text
 
 _TYPE = 'sensor_msgs/msg/JointState'
 

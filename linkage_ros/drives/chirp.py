@@ -39,8 +39,8 @@ from typing import NamedTuple
 
 from linkage_ros.drives.clocked import as_integers, build_clocked, ClockedDrive, Curve, LARGEST
 from linkage_ros.drives.drive import Context
+from linkage_ros.files.parameters import choice, each, flag, number
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.parameters import choice, each, flag, number
 
 
 @dataclass(frozen=True, slots=True)

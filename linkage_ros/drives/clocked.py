@@ -28,7 +28,7 @@ from typing import TypeVar
 from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.drives.limits import refuse_beyond
 from linkage_ros.errors import DefinitionError, listed
-from linkage_ros.written import Lines
+from linkage_ros.generated_code import Lines
 
 LARGEST = 1e10
 """No value or rate of a machine's input is beyond this, in [rad], [m], [rad/s] or [m/s]."""

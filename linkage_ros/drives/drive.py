@@ -19,7 +19,7 @@ The drives: where the crank comes from.
 Each is a module, imported only where a scene names the drive, with
 
 ``PARAMETERS``
-    The type of its parameters (see `linkage_ros.parameters`).
+    The type of its parameters (see `linkage_ros.files.parameters`).
 ``build(parameters, context: Context) -> Drive``
     Build it.
 
@@ -39,8 +39,8 @@ from functools import cached_property
 from random import Random
 from typing import Any, NamedTuple, Protocol, TYPE_CHECKING
 
+from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.written import Lines
 
 if TYPE_CHECKING:
     from linkage_ros.dynamics.loads import Friction, Loads

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from linkage_ros.errors import DefinitionError, quoted
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.survey import Way
+from linkage_ros.kinematics.sweep_analysis import Way
 
 
 def refuse_beyond(

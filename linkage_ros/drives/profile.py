@@ -42,8 +42,8 @@ from math import copysign, inf, sqrt
 from linkage_ros.drives.clocked import build_clocked, ClockedDrive, Curve, LARGEST
 from linkage_ros.drives.drive import Context
 from linkage_ros.errors import DefinitionError
+from linkage_ros.files.parameters import choice, each, flag, rows
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.parameters import choice, each, flag, rows
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,8 +28,8 @@ from math import cos, sin, tau
 
 from linkage_ros.drives.clocked import as_integers, build_clocked, ClockedDrive, Curve, LARGEST
 from linkage_ros.drives.drive import Context
+from linkage_ros.files.parameters import each, number
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.parameters import each, number
 
 
 @dataclass(frozen=True, slots=True)

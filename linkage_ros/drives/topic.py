@@ -21,10 +21,10 @@ from dataclasses import dataclass
 from math import isfinite
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
+from linkage_ros.files.parameters import flag, number
+from linkage_ros.generated_code import Lines
 from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.parameters import flag, number
-from linkage_ros.written import Lines
 
 LARGEST = 1e10
 """Angles beyond this, in [rad], are 2e-6 rad apart as doubles: none of a machine. Rates alike."""

@@ -32,12 +32,12 @@ from linkage_ros.drives.drive import Context, CrankState, Drive, Reader
 from linkage_ros.dynamics.integrators.method import METHODS
 from linkage_ros.dynamics.motion import LARGEST, Motion, OneFreedom
 from linkage_ros.errors import DefinitionError
+from linkage_ros.files.parameters import choice, number
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.messages.joint_effort import EffortCommand, JointEffortReader
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.parameters import choice, number
 
 TOPIC = 'crank_commands'
 

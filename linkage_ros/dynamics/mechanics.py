@@ -44,8 +44,8 @@ from typing import NamedTuple
 from linkage_ros.dynamics.loads import check_loads, check_masses, Friction, Loads
 from linkage_ros.kinematics.arithmetic import all_finite, copysign, where
 from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
-from linkage_ros.kinematics.compiled.linkage import Compiled
-from linkage_ros.kinematics.compiled.trace import Motion as CompiledMotion
+from linkage_ros.kinematics.compiling.linkage import Compiled
+from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
 from linkage_ros.kinematics.linkage import GROUND
 
 _ROUNDING = 1e-9

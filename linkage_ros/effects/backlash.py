@@ -48,7 +48,7 @@ from math import pi, tau
 
 from linkage_ros.drives.drive import Context, CrankBehindPlay, CrankState
 from linkage_ros.effects.stage import DriveStage
-from linkage_ros.parameters import each, Number, number
+from linkage_ros.files.parameters import each, Number, number
 
 _LARGEST = 6.0
 

@@ -32,7 +32,7 @@ from operator import add
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading, Sensor
-from linkage_ros.parameters import each, Number
+from linkage_ros.files.parameters import each, Number
 
 
 @dataclass(frozen=True, slots=True)

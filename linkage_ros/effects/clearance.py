@@ -44,8 +44,8 @@ from math import hypot
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.files.parameters import each, Number
 from linkage_ros.kinematics.arithmetic import called, vector
-from linkage_ros.parameters import each, Number
 
 _SMALLEST = 1e-12
 """A force below this part of the largest one is rounding, and has no direction."""

@@ -39,9 +39,9 @@ from typing import NamedTuple
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Motion, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
+from linkage_ros.files.parameters import each, Number
 from linkage_ros.kinematics.arithmetic import facing
 from linkage_ros.kinematics.structure import Joint
-from linkage_ros.parameters import each, Number
 
 _STIFFEST = 1e15
 

@@ -51,7 +51,7 @@ from dataclasses import dataclass
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
 from linkage_ros.effects.stage import Reading, restamped
-from linkage_ros.parameters import choice, number
+from linkage_ros.files.parameters import choice, number
 
 _AUTOMATIC = 'automatic'
 

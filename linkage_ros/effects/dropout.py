@@ -46,7 +46,7 @@ from random import Random
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading, restamped
 from linkage_ros.errors import DefinitionError
-from linkage_ros.parameters import choice, number
+from linkage_ros.files.parameters import choice, number
 
 
 @dataclass(frozen=True, slots=True)

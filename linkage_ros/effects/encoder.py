@@ -55,7 +55,7 @@ from math import floor, tau
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading, Sensor
 from linkage_ros.errors import DefinitionError
-from linkage_ros.parameters import choice, each, flag, number, whole
+from linkage_ros.files.parameters import choice, each, flag, number, whole
 
 
 @dataclass(frozen=True, slots=True)

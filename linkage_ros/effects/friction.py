@@ -33,7 +33,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from linkage_ros.dynamics.loads import Friction, JointFriction
-from linkage_ros.parameters import each, number
+from linkage_ros.files.parameters import each, number
 
 _STRONGEST = 1e9
 

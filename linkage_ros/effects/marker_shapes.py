@@ -34,7 +34,7 @@ from linkage_ros.drawing.painting import COLOURS, corners, FACES, INK, outline
 from linkage_ros.drawing.shapes import carried_shapes, Circle, Polygon, Segment, Shape
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.survey import usual_inputs
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.messages.marker_array import (
     ARROW,
     Colour,

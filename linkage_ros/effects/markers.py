@@ -28,9 +28,9 @@ after its lifetime, so that what is silent is not seen standing.
 Forces are arrows; see `linkage_ros.effects.marker_arrows`.
 
 Links are red while the conditioning of the group that they belong to (see
-`linkage_ros.kinematics.nearness`) is below √2·sin(μ/2), μ being the threshold: of a dyad, while
-its transmission angle is smaller than μ. Where a loop does not close there is no pose, and none is
-invented: what moves is deleted, and a text says by how much it does not close.
+`linkage_ros.kinematics.singularity_margin`) is below √2·sin(μ/2), μ being the threshold: of a
+dyad, while its transmission angle is smaller than μ. Where a loop does not close there is no pose,
+and none is invented: what moves is deleted, and a text says by how much it does not close.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ from linkage_ros.drives.drive import Context
 from linkage_ros.effects.marker_arrows import Arrows
 from linkage_ros.effects.marker_shapes import ALARM, Key, marker_shapes
 from linkage_ros.effects.stage import Motion, Reading, Writer
+from linkage_ros.files.parameters import number, text
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Driven, Dyad, Group
-from linkage_ros.kinematics.survey import usual_inputs
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.messages.marker_array import DELETE, MarkerArrayWriter
-from linkage_ros.parameters import number, text
 
 TOPIC = '~/markers'
 MESSAGE = 'visualization_msgs/msg/MarkerArray'

@@ -41,7 +41,7 @@ from math import sqrt
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading, Sensor
-from linkage_ros.parameters import each, number
+from linkage_ros.files.parameters import each, number
 
 _Source = tuple[int, float, Callable[[float, float], float]]
 """Place of the joint, how strong its noise is, and what draws it: normal(mean, deviation)."""

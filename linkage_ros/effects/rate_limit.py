@@ -39,7 +39,7 @@ from typing import TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.stage import Reading, restamped, Sensor
-from linkage_ros.parameters import choice, number
+from linkage_ros.files.parameters import choice, number
 
 if TYPE_CHECKING:
     from linkage_ros.effects.encoder import Encoder

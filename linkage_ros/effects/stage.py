@@ -19,7 +19,7 @@ The effects, in the order in which physics applies them.
 Each is a module, imported only where a scene names the effect, with
 
 ``PARAMETERS``
-    The type of its parameters (see `linkage_ros.parameters`).
+    The type of its parameters (see `linkage_ros.files.parameters`).
 
 and with what builds its part of the tick; which, says where in the tick it stands:
 
@@ -50,9 +50,9 @@ An effect that publishes a message of its own has also
     method ``due(now) -> bool`` and that says no, it is not asked at all, and no motion is worked
     out for it.
 
-A scene may also name a module of one's own, by its dotted name: see `linkage_ros.effects.own`.
-What a module, a sensor or a writer may leave out is looked up here alone: `Effect`, `SensorStage`
-and `WriterStage` say what stands in its place.
+A scene may also name a module of one's own, by its dotted name: see
+`linkage_ros.effects.user_effects`. What a module, a sensor or a writer may leave out is looked up
+here alone: `Effect`, `SensorStage` and `WriterStage` say what stands in its place.
 """
 
 from __future__ import annotations
@@ -126,7 +126,9 @@ def module_of(effect: str) -> ModuleType:
     """Import an effect: one of this package, or a module of one's own by its dotted name."""
     if '.' not in effect:
         return import_module(EFFECTS[effect])
-    from linkage_ros.effects.own import own_module  # local import: only where a scene has one
+    from linkage_ros.effects.user_effects import (
+        own_module,  # local import: only where a scene has one
+    )
 
     return own_module(effect)
 
@@ -135,7 +137,7 @@ def in_order(named: Collection[str]) -> tuple[str, ...]:
     """Return effects in the order in which they act."""
     if not any('.' in name for name in named):
         return tuple(name for name in EFFECTS if name in named)
-    from linkage_ros.effects.own import with_own  # local import: as above
+    from linkage_ros.effects.user_effects import with_own  # local import: as above
 
     return with_own(named)
 
@@ -144,7 +146,7 @@ def needs(effect: str) -> tuple[str, ...]:
     """Return what an effect starts from."""
     if '.' not in effect:
         return NEEDS.get(effect, ())
-    from linkage_ros.effects.own import own_needs  # local import: as above
+    from linkage_ros.effects.user_effects import own_needs  # local import: as above
 
     return own_needs(effect)
 

@@ -44,9 +44,9 @@ from dataclasses import dataclass, replace
 from random import Random
 
 from linkage_ros.errors import DefinitionError
+from linkage_ros.files.parameters import each, names, number, Point
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.parameters import each, names, number, Point
 
 TRUNCATED = 3.0
 """A deviation is at most this many standard deviations."""

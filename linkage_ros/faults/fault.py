@@ -19,7 +19,7 @@ The faults: what can be made to go wrong while a scene runs, at set times or on 
 Each is a module, imported only where a scene names the fault, with
 
 ``PARAMETERS``
-    The type of its parameters (see `linkage_ros.parameters`).
+    The type of its parameters (see `linkage_ros.files.parameters`).
 
 and with one function that builds what it does while its `Switch` is on; which, says where:
 

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 
 from linkage_ros.effects.stage import Reading, Sensor
 from linkage_ros.faults.fault import Switch
-from linkage_ros.parameters import name
+from linkage_ros.files.parameters import name
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,8 +26,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from linkage_ros.faults.fault import Switch
+from linkage_ros.files.parameters import number
 from linkage_ros.messages.single_values import TIME_END
-from linkage_ros.parameters import number
 
 
 @dataclass(frozen=True, slots=True)

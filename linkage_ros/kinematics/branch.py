@@ -13,265 +13,390 @@
 # limitations under the License.
 
 """
-The branch of a single input that a pose names: all solutions that lead from it without a toggle.
+The curve of solutions of links that are iterated, followed from cell to cell without a leap.
 
-It is a function of the unwrapped input. Where the curve of solutions turns back, the branch ends,
-and with it the range of the input. Where, after some whole turns of the input, all links are where
-they were, it begins again, and goes on for ever. There are finitely many poses to a crank
-direction, and a turn leads from one to another, so that a branch without an end comes back; how
-many turns are followed is bounded all the same. A branch that is shorter than a turn has one pose
-to a crank direction: whole turns of the input change nothing there, as they do not with dyads.
+With n unknowns u and one input x, the n constraints F(u, x) = 0 leave a curve in z = (u, x). It is
+followed by its length, so that a toggle, where the curve turns back in x, is a place like others.
+A cell goes from one solution to the next, s being the way along the first one's tangent; between
+them stands the cubic c(s) that has their places and tangents. A cell is taken only if it holds
+one piece of curve. For B the Jacobian of F and of the way along at c(h/2), and δB a bound, entry
+by entry, of how much it changes within the box about the cubic::
+
+    |B⁻¹|·δB contracts: some w > 0 has |B⁻¹|·δB·w ≤ q·w, with q ≤ 0.6
+    |B⁻¹·(F(c(h/2)), 0)| is small against the box
+
+Then B is regular all over the box, and for each s there is at most one solution in it (Krawczyk's
+test: A. Neumaier, Interval Methods for Systems of Equations, Cambridge 1990, theorem 5.1.8).
+Another assembly cannot be in the box, however near it comes. The bound by the unknowns is one of
+the sines and cosines themselves; what known links do within a cell is taken from its ends and its
+middle, and the residual from the middle, where that of a cubic through both ends is largest.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections.abc import Callable
-from math import floor, inf, nextafter, remainder, tau
+from collections.abc import Callable, Iterator, Sequence
+from math import inf, sqrt
 from typing import NamedTuple
 
-from linkage_ros.kinematics.continuation import Cell, Continuation, Node
-from linkage_ros.kinematics.equations import Array
+from linkage_ros.kinematics.equations import Array, Constraint, derivative, equations, spread
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.step import State
 import numpy as np
 
-_MOST_TURNS = 64
-_MOST_LAPS = 32
-"""Of a slide: each is twice as long as the one before."""
+_CONTRACTS = 0.6
+"""Largest q; the step is set for two thirds of it."""
 
-_SAME = 1e-9
-"""What known places and angles may differ by and be the same."""
+_LONGEST = 0.25
+_SHORTEST = 2.0**-36
+"""Of a step, in [rad] or lengths; the longest grows with how far away the links are."""
 
-_LAST_FLOATS = 32.0 * UNIT_ROUNDOFF
-"""Of the input, or of 1: how near its end a toggle cannot be told from its neighbours."""
+_MOST_CELLS = 2**13
+"""Of a call: some 27 are usual for a turn, and 300 for links that go far away on lines."""
 
-_NEXT_TO_END = 2.0**-10
-"""In [rad] or lengths: how far links may go where those before them are next to a toggle."""
+_AWAY = 2.0**20
+"""In lengths: what is so far away, on lines that get parallel, does not come back."""
+
+_STRAIGHT = 0.25
+"""What the slope of x may depart by from a straight line within a cell, of its change."""
+
+_ACCEPTED = 256.0 * UNIT_ROUNDOFF
+"""Of the size of the coordinates: what a constraint may be off by at a solution."""
+
+KnownAt = Callable[[float], State | None]
+"""What is known of the links before, at an input; nothing where they do not close."""
+
+RatesAt = Callable[[float], tuple[State, State] | None]
+"""What is known, and its derivatives by the input; nothing where there are none."""
 
 
-class Interval(NamedTuple):
+class Node(NamedTuple):
+    """A place of the curve: the unknowns and the input behind them, and the unit tangent."""
+
+    place: Array
+    tangent: Array
+
+
+class Cell(NamedTuple):
     """
-    Where a branch goes, in the coordinate of its input.
+    A piece of the curve, from one node to the next.
 
     Attributes
     ----------
-    low, high
-        Its ends; of one that comes back, from the pose to where it begins again.
-    limited
-        Of each end whether the linkage ends there; else it was not followed farther.
-    turns
-        After how many whole turns of the input it begins again; 0 where it does not.
+    begin, end
+        The nodes.
+    width
+        How far the end lies along the tangent of the begin.
+    folds
+        Whether the end is where the curve turns back in x.
 
     """
 
-    low: float
-    high: float
-    limited: tuple[bool, bool]
-    turns: int
+    begin: Node
+    end: Node
+    width: float
+    folds: bool = False
 
-    @property
-    def period(self) -> int:
-        """How many whole turns of the input change nothing; 0 where each turn is another."""
-        return self.turns or int(self.high - self.low < tau)
+    def control(self) -> Array:
+        """Return the four control points of the cubic, as rows."""
+        (z, t), (z_end, t_end), h = self.begin, self.end, self.width
+        ahead = t_end * (h / 3.0 / float(t @ t_end))
+        return np.array([z, z + t * (h / 3.0), z_end - ahead, z_end])
+
+    def at(self, part: float) -> Array:
+        """Return the cubic at a part of the width, from 0 to 1."""
+        p, r = part, 1.0 - part
+        weights = np.array([r * r * r, 3.0 * r * r * p, 3.0 * r * p * p, p * p * p])
+        return weights @ self.control()
+
+    def part_of(self, x: float) -> float:
+        """Return where the cubic has an input, as a part of the width."""
+        a, b, c, d = (float(value) - x for value in self.control()[:, -1])
+        low, high = 0.0, 1.0
+        rising = d > a
+        part = a / (a - d) if a != d else 0.0
+        for _ in range(60):
+            r = 1.0 - part
+            value = r * r * (r * a + 3.0 * part * b) + part * part * (3.0 * r * c + part * d)
+            if value == 0.0:
+                break
+            if (value > 0.0) == rising:
+                high = part
+            else:
+                low = part
+            slope = 3.0 * (r * r * (b - a) + 2.0 * r * part * (c - b) + part * part * (d - c))
+            new = part - value / slope if slope else inf
+            if not low < new < high:
+                new = 0.5 * (low + high)
+            if abs(new - part) <= 1e-15:
+                break
+            part = new
+        return part
 
 
-class Start(NamedTuple):
+class Continuation:
     """
-    Where an iteration starts.
-
-    Attributes
-    ----------
-    unknowns
-        Next to the solution; at an end of the branch, the solution.
-    farthest
-        How far from them the solution may be.
-    turned
-        What the unknowns' angles gained by the turns before, in [rad].
-    ends
-        Whether it is at the end of the branch, within the last few floats: a toggle.
-
-    """
-
-    unknowns: Array
-    farthest: float
-    turned: Array
-    ends: bool
-
-
-class _Side:
-    """
-    One side of the pose, followed as far as it was asked for.
-
-    ``inputs`` are those where the ``cells`` end, times the sign, and ``end`` is that where the
-    branch ends, once that is found.
-    """
-
-    __slots__ = ('cells', 'end', 'inputs', 'laps', 'node', 'sign')
-
-    def __init__(self, node: Node, sign: float) -> None:
-        self.sign = sign
-        self.node = node
-        self.cells: list[Cell] = []
-        self.inputs: list[float] = []
-        self.laps = 0
-        self.end: float | None = None
-
-
-class Branch:
-    """
-    A branch.
+    Follows the solutions of constraints as one input goes.
 
     Parameters
     ----------
-    continuation
-        Follows it.
-    unknowns, x
-        The solution at the pose, and the input there.
-    known_at
-        Returns what is known before at an input, nothing where that does not close.
-    turning
-        Whether the input turns.
-    far
-        How far a slide is followed at least.
+    constraints
+        As many equations as there are unknowns.
+    known_at, rates_at
+        What is known before.
 
     """
 
-    __slots__ = ('_continuation', '_far', '_gained', '_known_at', '_sides', '_turning', '_turns',
-                 '_x', 'interval')  # fmt: skip
+    __slots__ = ('_constraints', '_known_at', '_rates_at')
 
     def __init__(
-        self,
-        continuation: Continuation,
-        unknowns: Array,
-        x: float,
-        known_at: Callable[[float], State | None],
-        *,
-        turning: bool,
-        far: float,
+        self, constraints: Sequence[Constraint], known_at: KnownAt, rates_at: RatesAt
     ) -> None:
-        self._continuation = continuation
+        self._constraints = constraints
         self._known_at = known_at
-        self._turning = turning
-        self._far = far
-        self._x = x
-        node = continuation.first(unknowns, x)
-        self._sides = tuple(_Side(node, sign) for sign in (-1.0, 1.0)) if node else ()
-        self._turns = 0
-        self._gained = np.zeros_like(unknowns)
-        self.interval = self._followed(node, x)
+        self._rates_at = rates_at
 
-    def start(self, x: float) -> Start | None:
-        """Return where the iteration starts at an input; nothing where the branch is not."""
-        turned = 0.0
-        low, high, _, turns = self.interval
-        if not self._sides:
+    def first(self, unknowns: Array, x: float) -> Node | None:
+        """Return the node at a solution, its tangent towards larger inputs."""
+        system = self._system(np.append(unknowns, x))
+        if system is None:
             return None
-        if turns:
-            period = turns * tau
-            turned = floor((x - low) / period)
-            x = min(max(x - turned * period, low), high)
-        elif self._turning and not low <= x <= high and self.interval.period:
-            x -= tau * round((x - 0.5 * (low + high)) / tau)
-        side = self._sides[int(x >= self._x)]
-        while side.end is None and side.sign * x > self._reached(side) and self._lap(side):
-            pass
-        if side.sign * x > self._reached(side):
-            return None
-        gained = turned * self._gained
-        number = bisect_left(side.inputs, side.sign * x)
-        if number == len(side.cells):
-            # Next to a toggle of the links before, where cells get too small to go on.
-            return Start(side.node.place[:-1], _NEXT_TO_END, gained, False)
-        cell = side.cells[number]
-        if cell.folds and abs(x - cell.end.place[-1]) <= _LAST_FLOATS * max(1.0, abs(x)):
-            return Start(cell.end.place[:-1], inf, gained, True)
-        size = float(np.abs(cell.end.place - cell.begin.place).max())
-        return Start(cell.at(cell.part_of(x))[:-1], 0.2 * size, gained, False)
+        _, slopes = system
+        tangent = np.linalg.svd(slopes)[2][-1]
+        return Node(np.append(unknowns, x), tangent if tangent[-1] >= 0.0 else -tangent)
 
-    def nearest_end(self, x: float) -> Array | None:
-        """Return the unknowns at the end of the branch behind which an input lies."""
-        return self._sides[int(x >= self._x)].node.place[:-1] if self._sides else None
-
-    def _followed(self, node: Node | None, x: float) -> Interval:
-        """Follow the branch to its ends, or to where it comes back."""
-        if node is None:
-            return Interval(x, x, (True, True), 0)
-        back, ahead = self._sides
-        if not self._turning:
-            self._lap(back)
-            self._lap(ahead)
-        else:
-            while self._lap(ahead):
-                if self._comes_back(node, ahead):
-                    return Interval(x, x + self._turns * tau, (False, False), self._turns)
-            while self._lap(back):
-                pass
-        ends = -self._reached(back), self._reached(ahead)
-        return Interval(*ends, (back.end is not None, ahead.end is not None), 0)
-
-    def _reached(self, side: _Side) -> float:
-        """Return how far a side was followed, times its sign."""
-        if side.end is not None:
-            return side.sign * side.end
-        return side.inputs[-1] if side.inputs else side.sign * self._x
-
-    def _lap(self, side: _Side) -> bool:
-        """Follow a side a turn farther, or to twice as far; return whether it goes on there."""
-        if side.end is not None or side.laps >= (_MOST_TURNS if self._turning else _MOST_LAPS):
+    def alone(self, node: Node, away: Array) -> bool:
+        """Return whether a node's solution is the only one at its input within a distance."""
+        known = self._known_at(float(node.place[-1]))
+        if known is None:
             return False
-        side.laps += 1
-        if self._turning:
-            last = self._x + side.sign * side.laps * tau
-        else:
-            last = side.sign * max(self._far, side.sign * self._x) * 2.0 ** (side.laps - 1)
-        for cell in self._continuation.cells(side.node, side.sign, last):
-            side.cells.append(cell)
-            side.inputs.append(side.sign * float(cell.end.place[-1]))
-            side.node = cell.end
-        at = float(side.node.place[-1])
-        if side.cells and side.cells[-1].folds:
-            side.end = at
-        elif side.sign * (last - at) > 0.0:
-            side.end = self._last_known(at, side.sign)
-            if side.end == at and side.cells:
-                # Where branches cross the group is singular, too: which one goes on is not told.
-                side.cells[-1] = side.cells[-1]._replace(folds=True)
-        return side.end is None
+        unknowns = node.place[:-1]
+        still = State([0.0] * len(known[0]), [0j] * len(known[1]))
+        try:
+            inverse = np.linalg.inv(self._jacobian(unknowns, known))
+        except np.linalg.LinAlgError:
+            return False
+        change = spread(self._constraints, unknowns, known, away, still)
+        return _radius(np.abs(inverse) @ change) < 1.0
 
-    def _last_known(self, x: float, sign: float) -> float:
-        """Return the last float at which the links before close, next to where cells end."""
-        inside, step = x, 2.0**-50
-        while step < 2.0**-20 and self._known_at(inside + sign * step) is not None:
-            inside, step = inside + sign * step, 2.0 * step
-        outside = inside + sign * step
-        if self._known_at(outside) is not None:
-            return x
-        while abs(outside - inside) > 0.0 and nextafter(inside, outside) != outside:
-            middle = 0.5 * (inside + outside)
-            if self._known_at(middle) is None:
-                outside = middle
+    def cells(self, node: Node, sign: float, last: float) -> Iterator[Cell]:
+        """
+        Yield cell after cell, up to a toggle, or to an input that is not passed.
+
+        They end, too, where no cell can be shown to hold one curve alone, as where two cross.
+
+        Parameters
+        ----------
+        node
+            Where to begin.
+        sign
+            +1 towards larger inputs, −1 towards smaller ones.
+        last
+            The input where to end.
+
+        """
+        if node.tangent[-1] * sign < 0.0:
+            node = Node(node.place, -node.tangent)
+        step = 2.0**-5
+        count = 0
+        while sign * (last - node.place[-1]) > 0.0 and count < _MOST_CELLS:
+            far = float(max(np.abs(node.place[1:-1:3]).max(), np.abs(node.place[2:-1:3]).max()))
+            if far > _AWAY:
+                return
+            step = min(step, _LONGEST * max(1.0, far))
+            left = sign * (last - node.place[-1])
+            slope = sign * float(node.tangent[-1])
+            whole = slope > 0.0 and step * slope >= 0.9 * left
+            tried = self._cell(node, step, last if whole else None)
+            cell, growth = tried
+            if cell is not None and sign * (cell.end.place[-1] - last) > 0.0:
+                cell, growth = None, 0.5
+            if cell is None:
+                step *= growth
+                if step < _SHORTEST:
+                    return
+                continue
+            if sign * float(cell.end.tangent[-1]) <= 0.0:
+                yield self._folded(cell)
+                return
+            yield cell
+            count += 1
+            node = cell.end
+            step = cell.width * growth
+
+    def _cell(self, node: Node, step: float, last: float | None) -> tuple[Cell | None, float]:
+        """
+        Return the next cell, or nothing, and by how much its step should be changed.
+
+        With ``last`` it ends at that input.
+        """
+        z, tangent = node
+        if last is None:
+            row, goal = tangent, float(tangent @ z) + step
+            start = z + step * tangent
+        else:
+            row, goal = np.zeros_like(z), last
+            row[-1] = 1.0
+            start = z + tangent * ((last - z[-1]) / tangent[-1])
+            start[-1] = last
+        place = self._corrected(start, row, goal)
+        if place is None:
+            return None, 0.25
+        end = self._node(place, tangent)
+        if end is None:
+            return None, 0.25
+        cell = Cell(node, end, float(tangent @ (place - z)))
+        facing = float(tangent @ end.tangent)
+        if facing < 0.5 or cell.width <= 0.0 or not self._straight(cell):
+            return None, 0.5
+        contraction = self._contraction(cell)
+        if not contraction <= _CONTRACTS:
+            return None, max(0.1, min(0.5, 0.6 * _CONTRACTS / contraction))
+        return cell, min(2.0, 0.67 * _CONTRACTS / max(contraction, 1e-3))
+
+    def _straight(self, cell: Cell) -> bool:
+        """Return whether x goes one way within a cell, or turns back once, and not twice."""
+        a, b, c, d = cell.control()[:, -1].tolist()
+        begin, middle, end = b - a, c - b, d - c
+        most = max(min(abs(begin), abs(end)), abs(begin - end))
+        return bool(abs(middle - 0.5 * (begin + end)) <= _STRAIGHT * most)
+
+    def _contraction(self, cell: Cell) -> float:
+        """Return q of a cell; infinite where the middle is no good approximation."""
+        control = cell.control()
+        middle = 0.125 * (control[0] + control[3]) + 0.375 * (control[1] + control[2])
+        moved = np.abs(control - middle).max(axis=0)
+        at = float(middle[-1])
+        found = self._rates_at(at)
+        if found is None:
+            return inf
+        known, speeds = found
+        n = len(middle) - 1
+        errors, slopes = self._slopes(middle, known, speeds)
+        matrix = np.vstack([slopes, cell.begin.tangent])
+        try:
+            inverse = np.linalg.inv(matrix)
+        except np.linalg.LinAlgError:
+            return inf
+        off = np.abs(inverse[:, :n] @ errors)
+        moved += 5.0 * off.max()
+        change = np.zeros((n + 1, n + 1))
+        ways = [_apart(known, end) for end in self._known_at_ends(cell) if end is not None]
+        if len(ways) < 2:
+            return inf
+        way = State(
+            np.max([w[0] for w in ways], axis=0).tolist(),
+            np.max([w[1] for w in ways], axis=0).tolist() if ways[0][1] else [],
+        )
+        change[:n, :n] = spread(self._constraints, middle[:n], known, moved[:n], way)
+        for node in cell[:2]:
+            ends = self._rates_at(float(node.place[-1]))
+            if ends is None:
+                return inf
+            slope = self._slopes(node.place, *ends)[1][:, -1]
+            change[:n, -1] = np.maximum(change[:n, -1], np.abs(slope - slopes[:, -1]))
+        grown = np.abs(inverse) @ change
+        q = _radius(grown)
+        if off.max() > 0.1 * float(np.abs(control[3] - control[0]).max()):
+            return inf
+        return q
+
+    def _known_at_ends(self, cell: Cell) -> tuple[State | None, State | None]:
+        return (
+            self._known_at(float(cell.begin.place[-1])),
+            self._known_at(float(cell.end.place[-1])),
+        )
+
+    def _folded(self, cell: Cell) -> Cell:
+        """Return what of a cell lies before the place where x turns back."""
+        z, tangent = cell.begin
+        low, high = (0.0, float(tangent[-1])), (cell.width, float(cell.end.tangent[-1]))
+        end, width = cell.end, cell.width
+        for _ in range(60):
+            width = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
+            if not low[0] < width < high[0]:
+                width = 0.5 * (low[0] + high[0])
+            place = self._corrected(
+                cell.at(width / cell.width), tangent, float(tangent @ z) + width
+            )
+            node = self._node(place, tangent) if place is not None else None
+            if node is None:
+                break
+            end, slope = node, float(node.tangent[-1])
+            if abs(slope) < 1e-14 or high[0] - low[0] < 1e-15:
+                break
+            # Illinois: the end that stays counts half, so that both close in.
+            if slope * low[1] > 0.0:
+                low, high = (width, slope), (high[0], 0.5 * high[1])
             else:
-                inside = middle
-        return inside
+                low, high = (low[0], 0.5 * low[1]), (width, slope)
+        return Cell(cell.begin, end, float(tangent @ (end.place - z)), True)
 
-    def _comes_back(self, first: Node, side: _Side) -> bool:
-        """Return whether all is where it began, and note after how many turns, and what gained."""
-        begun, now = self._known_at(self._x), self._known_at(float(side.node.place[-1]))
-        if begun is None or now is None:
-            return False
-        # A slide that differs by a whole number of turns would be one in 10⁹.
-        (x, pins), (x_now, pins_now) = begun, now
-        angles = (remainder(a - b, tau) for a, b in zip(x, x_now, strict=True))
-        if max(map(abs, angles)) > _SAME * (1.0 + abs(self._x)):
-            return False
-        if max((abs(a - b) for a, b in zip(pins, pins_now, strict=True)), default=0.0) > _SAME:
-            return False
-        moved = side.node.place[:-1] - first.place[:-1]
-        gained = np.zeros_like(moved)
-        gained[0::3] = tau * np.round(moved[0::3] / tau)
-        away = np.abs(moved - gained)
-        if not self._continuation.alone(first, away):
-            return False
-        self._turns, self._gained = side.laps, gained
-        return True
+    def _node(self, place: Array, ahead: Array) -> Node | None:
+        system = self._system(place)
+        if system is None:
+            return None
+        right = np.zeros(len(place))
+        right[-1] = 1.0
+        try:
+            tangent = np.linalg.solve(np.vstack([system[1], ahead]), right)
+        except np.linalg.LinAlgError:
+            return None
+        return Node(place, tangent / sqrt(float(tangent @ tangent)))
+
+    def _corrected(self, start: Array, row: Array, goal: float) -> Array | None:
+        """Return the solution at which a combination of the coordinates has a value."""
+        place, last = start, inf
+        size = 1.0 + float(np.abs(start).max())
+        for _ in range(12):
+            system = self._system(place)
+            if system is None:
+                return None
+            errors, slopes = system
+            right = np.append(-errors, goal - float(row @ place))
+            try:
+                step = np.linalg.solve(np.vstack([slopes, row]), right)
+            except np.linalg.LinAlgError:
+                return None
+            length = float(np.abs(step).max())
+            if length >= last or length <= 4.0 * UNIT_ROUNDOFF * size:
+                good = float(np.abs(errors).max()) <= _ACCEPTED * size
+                return place if good else None
+            if not length < 0.5:
+                return None
+            place, last = place + step, length
+        return None
+
+    def _system(self, place: Array) -> tuple[Array, Array] | None:
+        """Return the constraints' errors, and their derivatives by the unknowns and the input."""
+        found = self._rates_at(float(place[-1]))
+        return None if found is None else self._slopes(place, *found)
+
+    def _jacobian(self, unknowns: Array, known: State) -> Array:
+        _, jacobian = equations(self._constraints, unknowns.tolist(), known)
+        return np.array(jacobian)
+
+    def _slopes(self, place: Array, known: State, speeds: State) -> tuple[Array, Array]:
+        unknowns = place[:-1].tolist()
+        errors, jacobian = equations(self._constraints, unknowns, known)
+        still = [0.0] * len(unknowns)
+        drift = derivative(self._constraints, unknowns, known, speeds, still, None, still)
+        return np.array(errors), np.column_stack([jacobian, drift])
+
+
+def _apart(one: State, other: State) -> tuple[list[float], list[float]]:
+    return (
+        [abs(a - b) for a, b in zip(one[0], other[0], strict=True)],
+        [abs(a - b) for a, b in zip(one[1], other[1], strict=True)],
+    )
+
+
+def _radius(matrix: Array) -> float:
+    """Return a bound of the spectral radius of a matrix without negative entries."""
+    weights = np.ones(len(matrix))
+    bound = inf
+    for _ in range(12):
+        new = matrix @ weights
+        bound = min(bound, float((new / weights).max()))
+        weights = new + 1e-6 * float(new.max()) + 1e-300
+        weights /= weights.max()
+    return bound

@@ -33,28 +33,28 @@ from linkage_ros.errors import clean, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.cylinder import without_mirrored, zero_length
-from linkage_ros.kinematics.groups import find_groups
 from linkage_ros.kinematics.limits import Bounds, limited
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.machine_ranges import input_ranges
-from linkage_ros.kinematics.nearness import (
+from linkage_ros.kinematics.plan import Planner
+from linkage_ros.kinematics.ranges import closing_ranges, InputRange
+from linkage_ros.kinematics.singularity_margin import (
     Nearness,
     nearness,
     singular_inputs,
     SingularInput,
 )
-from linkage_ros.kinematics.ranges import closing_ranges, InputRange
-from linkage_ros.kinematics.solution import Planner
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import Pose, State
 from linkage_ros.kinematics.structure import Structure
+from linkage_ros.kinematics.topology import find_groups
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Batch
-    from linkage_ros.kinematics.compiled.linkage import Compiled
-    from linkage_ros.kinematics.compiled.solve import Solver
-    from linkage_ros.kinematics.compiled.trace import Wanted
-    from linkage_ros.kinematics.follower import Follower
+    from linkage_ros.kinematics.compiling.linkage import Compiled
+    from linkage_ros.kinematics.compiling.solve import Solver
+    from linkage_ros.kinematics.compiling.trace import Wanted
+    from linkage_ros.kinematics.point_tracker import Follower
     from numpy.typing import ArrayLike
 
 
@@ -428,7 +428,10 @@ class Closure:
             Which numbers of these; all published joints if not given.
 
         """
-        from linkage_ros.kinematics.compiled import linkage, trace  # local import: they trace
+        from linkage_ros.kinematics.compiling import (
+            linkage,  # local import: they trace
+            trace,  # local import: they trace
+        )
 
         wanted = wanted or trace.joints
         for compiled in self._compiled:
@@ -480,7 +483,7 @@ class Closure:
 
     @cached_property
     def _solver(self) -> Solver:
-        from linkage_ros.kinematics.compiled.solve import Solver  # local import: needs numpy
+        from linkage_ros.kinematics.compiling.solve import Solver  # local import: needs numpy
 
         return Solver(self, len(self.linkage.joints))
 
@@ -529,7 +532,9 @@ class Closure:
             Each with the name of its link, and where it lies in that link's frame, in [m].
 
         """
-        from linkage_ros.kinematics.follower import Follower  # local import: only forces need it
+        from linkage_ros.kinematics.point_tracker import (
+            Follower,  # local import: only forces need it
+        )
 
         return Follower(self._known, points)
 

@@ -30,14 +30,14 @@ from linkage_ros.kinematics.equations import (
     OnLine,
     Parallel,
 )
-from linkage_ros.kinematics.iteration import Iteration
+from linkage_ros.kinematics.initial_guess import starting_pose
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.starting_pose import starting_pose
+from linkage_ros.kinematics.newton_group import Iteration
 from linkage_ros.kinematics.step import State, Step
 from linkage_ros.kinematics.structure import Joint
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.solution import Planner
+    from linkage_ros.kinematics.plan import Planner
 
 
 class Constraints:

@@ -29,7 +29,7 @@ from math import frexp, hypot, ldexp
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
 from linkage_ros.kinematics.linkage import GROUND, Linkage, Point
-from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail
+from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail
 from linkage_ros.kinematics.step import Step
 from linkage_ros.kinematics.structure import Joint, Structure
 

@@ -24,7 +24,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.limits import Bound
 from linkage_ros.kinematics.machine_ranges import within_own, within_published
 from linkage_ros.kinematics.ranges import describe, InputRange
-from linkage_ros.kinematics.survey import grid, samples
+from linkage_ros.kinematics.sweep_analysis import grid, samples
 
 
 def check_limits(closure: Closure) -> None:

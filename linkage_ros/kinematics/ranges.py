@@ -28,13 +28,13 @@ from functools import partial
 from math import acos, asin, ceil, inf, lcm, pi, sqrt, tau
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
+from linkage_ros.kinematics.diagonals import CrankDiagonal
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.golden import golden
-from linkage_ros.kinematics.places import FixedPoint, PointOnLink, PointOnRail, Turned
+from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, Turned
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.branch import Branch
+    from linkage_ros.kinematics.branch_part import Branch
     from linkage_ros.kinematics.closure import Closure
 
 _SAMPLES = 720

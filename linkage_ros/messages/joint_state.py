@@ -28,6 +28,7 @@ from enum import Enum
 from struct import Struct
 from typing import Any, NamedTuple
 
+from linkage_ros.generated_code import Lines
 from linkage_ros.messages.layout import (
     ArrayWriter,
     byte_order,
@@ -41,7 +42,6 @@ from linkage_ros.messages.layout import (
     pattern,
     STAMP_END,
 )
-from linkage_ros.written import Lines
 
 JOINT_STATE = declared(
     'Time stamp, string frame_id, string[] name, '

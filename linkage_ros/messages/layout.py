@@ -34,7 +34,7 @@ from struct import calcsize, pack, Struct, unpack
 from struct import error as StructError
 from typing import Any, NamedTuple
 
-from linkage_ros.written import Lines, written
+from linkage_ros.generated_code import Lines, written
 
 NANOSECONDS = 1_000_000_000
 """A second, in [ns]."""

@@ -19,9 +19,9 @@ A run as the data of its page: numbers as base64 of their bytes, least significa
 All data are bounded, whatever the length of the run (see `linkage_ros.report.decimation`).
 
 Links are positioned by the recorded joints, for many instants at once. They hang on each other by
-the published joints, like those of a robot model (`linkage_ros.models.tree`), and each is turned
-by its own recorded value. The loops are not solved: where a sensor is wrong, or late against
-another, links that share a pin come apart there, and the page shows by how much. Where the
+the published joints, like those of a robot model (`linkage_ros.robot_models.tree`), and each is
+turned by its own recorded value. The loops are not solved: where a sensor is wrong, or late
+against another, links that share a pin come apart there, and the page shows by how much. Where the
 published joints do not determine the position of a link, the loops are closed at the recorded
 inputs instead.
 """
@@ -38,12 +38,12 @@ from linkage_ros.drawing.painting import COLOURS, FACES, INK
 from linkage_ros.errors import DefinitionError, LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.survey import usual_inputs
-from linkage_ros.models.names import prefixed
-from linkage_ros.models.tree import grow, Tree
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.report.decimation import EDGES, Histogram, Numbers, SHAPE_BYTES
 from linkage_ros.report.labels import LANES, QUANTITIES, short, size_in_json
 from linkage_ros.report.run import APART, Curves, Frames, Lane, LinkageRun, Run
+from linkage_ros.robot_models.part import prefixed
+from linkage_ros.robot_models.tree import grow, Tree
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -28,7 +28,7 @@ from linkage_ros.bag.contents import Contents
 from linkage_ros.bag.reader import Bag
 from linkage_ros.bag.run_events import run_account
 from linkage_ros.errors import LinkageError
-from linkage_ros.replay import recorded_scene
+from linkage_ros.replay.replay import recorded_scene
 from linkage_ros.report.blocks import Blocks, Entry, Progress, RunClock, times_of
 from linkage_ros.report.curves import Kept, NO_ROOM, UNITS
 from linkage_ros.report.decimation import STATE_BYTES

@@ -28,8 +28,8 @@ from collections.abc import Mapping, Sequence
 from linkage_ros.bag.reader import Bag
 from linkage_ros.errors import BagError
 from linkage_ros.messages.joint_state import Rejection
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.replay import read_change, turn
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.replay import read_change, turn
 from linkage_ros.report.blocks import Rows
 from linkage_ros.report.decimation import Flags, Numbers, Times
 from linkage_ros.report.labels import short

@@ -24,7 +24,7 @@ from linkage_ros.bag.reader import Bag
 from linkage_ros.bag.run_events import lost_beginning, run_said, RunAccount
 from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.status import Status
-from linkage_ros.replay import own_joint_states
+from linkage_ros.replay.replay import own_joint_states
 from linkage_ros.report.blocks import Entry, Rows, rows_of, RunClock
 from linkage_ros.report.curves import MOST_LINKAGES, SceneCurves
 from linkage_ros.report.decimation import Flags, Numbers, Times

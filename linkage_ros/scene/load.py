@@ -31,11 +31,13 @@ from linkage_ros.dynamics.loads import Loads, Spring
 from linkage_ros.effects.stage import EFFECTS, in_order, module_of
 from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
 from linkage_ros.faults.fault import Fault, FAULTS
+from linkage_ros.files.linkage_file import looks_like_linkage, read_closure
+from linkage_ros.files.parameters import declared, Parts, read_parameters
 from linkage_ros.files.section import Section
+from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.parameters import declared, Parts, read_parameters
-from linkage_ros.scene.linkage_file import looks_like_linkage, read_closure
+from linkage_ros.resources import named_file
 from linkage_ros.scene.scene import (
     AS_THE_RUN_GOES,
     LEASTS,
@@ -46,8 +48,6 @@ from linkage_ros.scene.scene import (
     SPLITS,
     StorageParameters,
 )
-from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
-from linkage_ros.shipped import named_file
 from linkage_ros.solvers.registry import SOLVERS
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
@@ -139,7 +139,7 @@ def kind_of(content: Section) -> Literal['scene', 'linkage']:
 
 def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
     """Return the scene that a linkage file stands for."""
-    from linkage_ros.scene.linkage_text import scene_text_for  # local import: not for scenes
+    from linkage_ros.files.linkage_text import scene_text_for  # local import: not for scenes
 
     try:
         closure = read_closure(content, publish_inputs=True)

@@ -24,10 +24,10 @@ from typing import Any
 from linkage_ros.bag.storage import COMPRESSIONS, Storage
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.faults.fault import Fault
+from linkage_ros.files.parameters import choice, number, Parts, whole
 from linkage_ros.files.section import Section
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Linkage
-from linkage_ros.parameters import choice, number, Parts, whole
 
 SPLITS = {'split_bytes': 1_000_000, 'split_seconds': 1.0}
 """

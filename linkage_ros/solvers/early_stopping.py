@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from linkage_ros.kinematics.iteration import IteratedPose, Iteration
+from linkage_ros.kinematics.newton_group import IteratedPose, Iteration
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State, Step
 import numpy as np

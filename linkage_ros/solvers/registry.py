@@ -16,7 +16,7 @@
 """
 The solvers that a scene can name; each is imported only where a scene names it.
 
-A module has ``PARAMETERS``, the type of its parameters (see `linkage_ros.parameters`), and
+A module has ``PARAMETERS``, the type of its parameters (see `linkage_ros.files.parameters`), and
 ``build(parameters, linkage) -> Closure``.
 """
 

@@ -33,8 +33,8 @@ from linkage_ros.kinematics.closure import (
     Position,
     Velocity,
 )
-from linkage_ros.kinematics.nearness import Nearness, SingularInput
 from linkage_ros.kinematics.ranges import InputRange
+from linkage_ros.kinematics.singularity_margin import Nearness, SingularInput
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:

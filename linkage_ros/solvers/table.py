@@ -41,12 +41,12 @@ from time import perf_counter
 from typing import Any, cast, Literal, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
+from linkage_ros.files.parameters import number, point
 from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
-from linkage_ros.kinematics.survey import Way
-from linkage_ros.parameters import number, point
+from linkage_ros.kinematics.sweep_analysis import Way
 from linkage_ros.solvers.solver import Solver
 import numpy as np
 
@@ -166,7 +166,10 @@ class TableClosure(Solver):
         self.proven = self.proven_rate = inf
         if knots is None:
             from linkage_ros.solvers.loops import LoopFinder  # local import: to prove only
-            from linkage_ros.solvers.proof import knots_for, TableRequest  # local import: likewise
+            from linkage_ros.solvers.table_proof import (  # local import: likewise
+                knots_for,
+                TableRequest,
+            )
 
             assert tolerance is not None
             finder = LoopFinder(linkage, self.structure, self._known)

@@ -39,8 +39,8 @@ from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Mass
+from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
-from linkage_ros.shipped import shipped
 import mpmath
 import pytest
 from scipy.integrate import solve_ivp

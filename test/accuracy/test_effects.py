@@ -23,8 +23,8 @@ from math import isclose, pi, radians, sin, sqrt, tau
 from linkage_ros.accuracy.effects import departure, measure_effects, WHOLE
 from linkage_ros.cost import feed, Names, Variants
 from linkage_ros.measuring import Spread
+from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
-from linkage_ros.shipped import shipped
 import pytest
 
 TICKS = 2000  # two turns of the crank at 1 kHz, as the feed goes

@@ -41,7 +41,7 @@ from linkage_ros.accuracy.reference import Reference, Truth
 from linkage_ros.accuracy.solving import PEERS
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
-from linkage_ros.kinematics.survey import Way
+from linkage_ros.kinematics.sweep_analysis import Way
 from linkage_ros.solvers.table import Order
 import numpy as np
 import pytest

@@ -26,8 +26,8 @@ from linkage_ros.accuracy.solving_results import part_of
 from linkage_ros.bag.storage import Storage
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.measuring import Spread
+from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
-from linkage_ros.shipped import shipped
 from mcap.reader import make_reader
 import pytest
 

@@ -37,7 +37,7 @@ from linkage_ros.accuracy.reference import Reference, SingularError
 from linkage_ros.accuracy.solving import confirmed, true_states
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
-from linkage_ros.kinematics.survey import usual_inputs
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from mpmath import mp, mpf
 import pytest
 

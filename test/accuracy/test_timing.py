@@ -32,8 +32,8 @@ from linkage_ros.accuracy.ticking import (
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import describe
 from linkage_ros.measuring import BLOCK, Contender, FEWEST, in_turn, MOST
+from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
-from linkage_ros.shipped import shipped
 import pytest
 
 # Times are of a state, of all methods in turn, and nothing else happens meanwhile.

@@ -28,8 +28,8 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import BagError
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.replay import recorded_scene, replay
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.replay import recorded_scene, replay
 import pytest
 
 SECOND = 1_000_000_000

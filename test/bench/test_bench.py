@@ -26,7 +26,7 @@ import sys
 
 from bench.kinematics_speed import AVAILABLE
 from bench.report import ratios, spread, Table
-from linkage_ros.cli.tables import text
+from linkage_ros.cli.terminal import text
 from linkage_ros.measuring import percentile
 import pytest
 

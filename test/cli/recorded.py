@@ -30,7 +30,7 @@ from linkage_ros.bag.topic import QosProfile, Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import time_message
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 from rosbags.highlevel import AnyReader
 

@@ -25,7 +25,7 @@ from linkage_ros.cli import accuracy as command
 from linkage_ros.cli.accuracy_tables import print_results
 from linkage_ros.errors import LinkageError
 from linkage_ros.measuring import Spread
-from linkage_ros.shipped import shipped
+from linkage_ros.resources import shipped
 import pytest
 
 # ``linkage accuracy``: what it prints and writes, and what it refuses.

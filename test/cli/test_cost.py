@@ -24,7 +24,7 @@ from pathlib import Path
 from threading import Event
 
 from linkage_ros.cli import cost as command
-from linkage_ros.cli.tables import Table
+from linkage_ros.cli.terminal import Table
 from linkage_ros.cost import (
     _difference,
     _times,
@@ -41,7 +41,7 @@ from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import LinkageError
 from linkage_ros.faults.fault import FAULTS
 from linkage_ros.pages.markdown import filled, marks
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest
 

@@ -34,12 +34,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli import export, table_files
+from linkage_ros.cli import export
 from linkage_ros.errors import LinkageError
+from linkage_ros.files import tables
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.joint_trajectory import JointTrajectoryWriter
 from linkage_ros.messages.joint_values import JOINT_STATE, MessageValues, TRAJECTORY, WRENCHES
-from linkage_ros.shipped import shipped
+from linkage_ros.resources import shipped
 import numpy as np
 import pytest
 
@@ -537,7 +538,7 @@ def test_blocks_follow_each_other(
 ) -> None:
     whole, blocks = tmp_path / 'a.parquet', tmp_path / 'b.parquet'
     assert answer(export, bag, '-o', whole) == 0
-    monkeypatch.setattr(table_files, '_CELLS', 1000)  # 35 rows of 28 columns
+    monkeypatch.setattr(tables, '_CELLS', 1000)  # 35 rows of 28 columns
     assert answer(export, bag, '-o', blocks) == 0
     assert parquet.ParquetFile(blocks).num_row_groups == 12
     assert read_parquet(blocks) == read_parquet(whole)

@@ -20,7 +20,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay import recorded_scene, replay
+from linkage_ros.replay.replay import recorded_scene, replay
 import pytest
 from rosbags.highlevel import AnyReader
 

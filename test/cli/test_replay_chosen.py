@@ -21,8 +21,8 @@ import json
 from pathlib import Path
 
 from linkage_ros.bag.reader import read_bag
-from linkage_ros.replay import recorded_scene, replay
-from linkage_ros.shipped import shipped
+from linkage_ros.replay.replay import recorded_scene, replay
+from linkage_ros.resources import shipped
 import pytest
 
 from .conftest import Run

@@ -28,7 +28,7 @@ from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli import report as command
 from linkage_ros.errors import LinkageError
-from linkage_ros.stop import StoppedError
+from linkage_ros.signals import StoppedError
 import pytest
 
 from .conftest import Run

@@ -25,7 +25,7 @@ import sys
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.replay import recorded_scene
+from linkage_ros.replay.replay import recorded_scene
 import pytest
 
 from .conftest import environment, Run
@@ -47,7 +47,7 @@ def scene(tmp_path: Path) -> Path:
 def crank(tmp_path: Path):
     process = subprocess.Popen(
         [
-            *(sys.executable, '-m', 'linkage_ros.ros.crank_source', '--ros-args'),
+            *(sys.executable, '-m', 'linkage_ros.node.crank_source', '--ros-args'),
             *('-p', 'rate:=200.0', '-p', 'seconds:=30.0', '-p', 'joint:=crank_joint'),
             *('-r', 'crank_states:=motor'),
         ],

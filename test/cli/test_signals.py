@@ -36,7 +36,7 @@ SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
 # What each command is told, and what it reads with. Where it computes, all of them close loops.
-PARSE = 'linkage_ros.scene.yaml_file:parse_yaml'
+PARSE = 'linkage_ros.files.yaml_file:parse_yaml'
 
 
 READS = {
@@ -100,7 +100,7 @@ sys.exit(main())
 # The main thread waits for the wish again and again, and signals come all the time.
 STORM = """
 import signal, time
-from linkage_ros.stop import stop_on_signals
+from linkage_ros.signals import stop_on_signals
 stop = stop_on_signals()
 signal.signal(signal.SIGALRM, signal.getsignal(signal.SIGINT))
 signal.setitimer(signal.ITIMER_REAL, 1e-3, 1e-3)

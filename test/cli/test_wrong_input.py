@@ -146,7 +146,7 @@ def make(kind: str, place: Path) -> None:
 COMMAND = 'from linkage_ros.cli.main import main'
 
 
-NODE = 'from linkage_ros.ros.linkage_node import main'
+NODE = 'from linkage_ros.node.linkage_node import main'
 
 
 NEED_BAGS = (

@@ -26,8 +26,8 @@ import sys
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.faults.fault import FAULTS
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.linkage_file import load
+from linkage_ros.files.linkage_file import load
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
 

@@ -27,11 +27,11 @@ from hypothesis import strategies as st
 from linkage_ros.drawing.curves import drawn_once, sweep, wrapped_curve
 from linkage_ros.drawing.labels import Label, place_labels
 from linkage_ros.drawing.shapes import Circle, hull, Polygon, rounded, Segment, shapes, skeleton
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.survey import usual_inputs, Way
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
+from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
 import pytest
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'

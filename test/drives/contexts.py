@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 
 from ..support.scenes import closure_of, FOUR_BAR, pipeline_of
 

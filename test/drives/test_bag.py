@@ -29,7 +29,7 @@ from linkage_ros.drives.drive import CrankState
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.errors import BagError, DefinitionError
 from linkage_ros.messages.joint_state import CrankSample, JointStateWriter, Rejection
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest
 

@@ -26,7 +26,7 @@ from hypothesis import strategies as st
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.drives.topic import TopicDrive, TopicParameters
 from linkage_ros.messages.joint_state import CrankSample, Rejection
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
 

@@ -23,6 +23,8 @@ from pathlib import Path
 import random
 
 from linkage_ros.dynamics.loads import Loads, Spring
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import parse_yaml, read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
     GROUND,
@@ -32,8 +34,6 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import parse_yaml, read_yaml
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'
 

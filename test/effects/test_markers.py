@@ -27,9 +27,9 @@ from hypothesis import strategies as st
 from linkage_ros.drawing.painting import outline
 from linkage_ros.drawing.shapes import carried_shapes, Polygon
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.survey import usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
 

@@ -28,17 +28,17 @@ import sys
 from linkage_ros.bag.reader import RUN_FILE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli.violations import violations
-from linkage_ros.effects.own import FUNCTIONS
 from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.effects.user_effects import FUNCTIONS
 from linkage_ros.errors import FileError
+from linkage_ros.files.schema import scene_schema
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import time_message
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.replay import own_effects_here
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.replay import own_effects_here
 from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.schema import scene_schema
-from linkage_ros.scene.yaml_file import read_yaml
+from linkage_ros.scene.violations import violations
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -48,7 +48,7 @@ RATE = 3.0
 HEAD = """
 from dataclasses import dataclass
 
-from linkage_ros.parameters import number
+from linkage_ros.files.parameters import number
 
 
 @dataclass(frozen=True, slots=True)
@@ -329,10 +329,10 @@ def test_the_schema_takes_it_and_still_refuses_what_is_misspelt(tmp_path, packag
 
 def test_a_scene_without_one_does_not_import_what_looks_for_them():
     code = (
-        'import sys\nfrom linkage_ros.pipeline import Pipeline\n'
+        'import sys\nfrom linkage_ros.pipeline.pipeline import Pipeline\n'
         'from linkage_ros.scene.load import load_scene\n'
         "Pipeline(load_scene('config/scenes/worn_press.yaml'))\n"
-        "assert 'linkage_ros.effects.own' not in sys.modules\n"
+        "assert 'linkage_ros.effects.user_effects' not in sys.modules\n"
     )
     subprocess.run([sys.executable, '-c', code], cwd=ROOT, check=True)
 
@@ -412,7 +412,7 @@ def test_a_bag_names_it_and_replays_where_it_is_found(tmp_path, package):
 
 
 def test_the_node_writes_it_into_its_bag(tmp_path, package):
-    run_recording = pytest.importorskip('linkage_ros.ros.run_recording', reason='needs rclpy')
+    run_recording = pytest.importorskip('linkage_ros.node.run_recording', reason='needs rclpy')
     mine = package(add=HEAD + ADD)
     scene = load_scene(scene_file(tmp_path, [f'{mine}.add: {{}}']))
     files = run_recording._attachments(scene, [], 'with the run', Pipeline(scene).lines)

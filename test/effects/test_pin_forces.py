@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 from linkage_ros.effects import pin_forces
 from linkage_ros.effects.stage import Motion, Reading
 from linkage_ros.kinematics.status import Status
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
 

@@ -22,8 +22,8 @@ from math import nextafter, pi, tau
 
 from hypothesis import given
 from hypothesis import strategies as st
+from linkage_ros.effects.angle_unwrap import all_wrapped, Continuous, wrapped
 from linkage_ros.effects.stage import Reading
-from linkage_ros.effects.turns import all_wrapped, Continuous, wrapped
 import pytest
 
 EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')

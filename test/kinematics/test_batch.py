@@ -31,7 +31,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiled import array_form
+from linkage_ros.kinematics.compiling import numpy_blocks
 from linkage_ros.kinematics.linkage import Pose, RevoluteJoint
 from linkage_ros.kinematics.status import Status
 from mpmath import mp, mpc, mpf
@@ -139,8 +139,8 @@ def truths(family: str) -> list[tuple[FourBarCase, Any]]:
 
 @pytest.fixture(params=['tangent', 'sine and cosine'])
 def half_angle(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    by_tangent = request.param == 'tangent' and array_form._BY_TANGENT
-    monkeypatch.setattr(array_form, '_BY_TANGENT', by_tangent)
+    by_tangent = request.param == 'tangent' and numpy_blocks._BY_TANGENT
+    monkeypatch.setattr(numpy_blocks, '_BY_TANGENT', by_tangent)
 
 
 @pytest.mark.slow

@@ -22,11 +22,11 @@ from functools import cache
 from math import pi, remainder, tau
 import random
 
-from linkage_ros.kinematics.assemblies import other_assemblies
+from linkage_ros.kinematics.assembly_modes import other_assemblies
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, Pose
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.survey import Way
+from linkage_ros.kinematics.sweep_analysis import Way
 from linkage_ros.solvers.table import TableClosure
 from mpmath import mp
 import numpy as np

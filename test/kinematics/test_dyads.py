@@ -22,12 +22,12 @@ from math import cos, hypot, ldexp, pi, remainder, sin, tau
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import FileError
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.linkage_text import scene_text_for
+from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.survey import Way
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.linkage_text import scene_text_for
-from linkage_ros.scene.yaml_file import parse_yaml
+from linkage_ros.kinematics.sweep_analysis import Way
 import pytest
 
 from .linkages import four_bar_linkage, FourBar, inverted_slider_crank_linkage, InvertedSliderCrank

@@ -26,11 +26,11 @@ import json
 from math import radians, remainder, sqrt, tau
 from pathlib import Path
 
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.structure import Dyad, Iterated
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
 import pytest
 
 from ..support.scenes import size_of

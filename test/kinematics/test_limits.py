@@ -28,7 +28,7 @@ from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.survey import Way
+from linkage_ros.kinematics.sweep_analysis import Way
 from linkage_ros.solvers.newton import NewtonClosure
 from linkage_ros.solvers.table import TableClosure
 import numpy as np

@@ -30,7 +30,7 @@ from linkage_ros.kinematics.grashof import four_bar_type
 from linkage_ros.kinematics.linkage import Input, Linkage, Pose, RevoluteJoint
 from linkage_ros.kinematics.ranges import describe, InputRange
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.survey import (
+from linkage_ros.kinematics.sweep_analysis import (
     extremes,
     grid,
     samples,

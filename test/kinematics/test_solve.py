@@ -32,18 +32,11 @@ from campaigns.topologies.families import FAMILIES
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import (
-    crank_diagonal,
-    dyads,
-    free_diagonal,
-    iteration,
-    places,
-    rail,
-)
+from linkage_ros.kinematics import diagonals, dyads, free_diagonal, newton_group, point_steps, rail
 from linkage_ros.kinematics.batch import Batch, CODES
 from linkage_ros.kinematics.closure import Closure, Position
-from linkage_ros.kinematics.compiled.linkage import Answer, Compiled
-from linkage_ros.kinematics.compiled.solve import BLOCK
+from linkage_ros.kinematics.compiling.linkage import Answer, Compiled
+from linkage_ros.kinematics.compiling.solve import BLOCK
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -367,9 +360,11 @@ def test_every_kind_of_step_is_tested() -> None:
     kinds = [
         import_module(f'{dyads.__name__}.{name}') for _, name, _ in iter_modules(dyads.__path__)
     ]
-    assert {type(step) for step in steps} == classes_with('close', places, iteration, *kinds)
+    assert {type(step) for step in steps} == classes_with(
+        'close', point_steps, newton_group, *kinds
+    )
     parts = [getattr(step, name, None) for step in steps for name in ('diagonal', 'rail')]
-    wanted = classes_with('at', crank_diagonal, free_diagonal, rail)
+    wanted = classes_with('at', diagonals, free_diagonal, rail)
     assert {type(part) for part in parts if part is not None} == wanted
 
 

@@ -52,7 +52,7 @@ def test_core_imports_without_extras(prefix, import_core):
     file, _ = import_core(
         prefix / 'bin' / 'python',
         # The report draws, so that it may need its extra.
-        skip=('ros', 'cli', 'accuracy'),
+        skip=('node', 'cli', 'accuracy'),
         refuse=ROS + REPORT,
         cwd=prefix,
     )

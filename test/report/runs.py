@@ -29,7 +29,7 @@ from linkage_ros.report.reading import read_run
 from linkage_ros.report.run import Run, Window
 import numpy as np
 
-from ..ros.ticked import Moment, run
+from ..node.ticked import Moment, run
 from ..support.messages import STORE
 
 MS = 1_000_000

@@ -209,7 +209,7 @@ def test_ever_new_diagnostics_take_no_ever_growing_room(tmp_path):
 
 def test_the_counts_that_are_followed_are_those_that_the_node_tells():
     pytest.importorskip('diagnostic_msgs')
-    from linkage_ros.ros import diagnostics  # local import: needs rclpy
+    from linkage_ros.node import diagnostics  # local import: needs rclpy
 
     source = Path(diagnostics.__file__).read_text()
     for key in _COUNTED:

@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 
 from .runs import but, curve, from_then_on, MS, on_lanes, read, recorded, Said, sample
-from ..ros.ticked import Moment
+from ..node.ticked import Moment
 
 QUIET = 'faults: {quiet: {silence: {}}, worn: {stuck: {joint: rocker_joint}}}\n'
 SHORT_MEMORY = 'drive: {topic: {max_age: 0.2}}\n'

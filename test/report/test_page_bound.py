@@ -27,10 +27,12 @@ from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.report import report
 from linkage_ros.errors import LinkageError
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pages.document import plotting_library
-from linkage_ros.replay import recorded_scene
+from linkage_ros.replay.replay import recorded_scene
 from linkage_ros.report.blocks import Blocks, Progress
 from linkage_ros.report.curves import Kept, MOST_LINKAGES
 from linkage_ros.report.data import page_data
@@ -58,9 +60,7 @@ from linkage_ros.report.run import (
     Window,
 )
 from linkage_ros.report.scene_run import SceneRun
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
-from linkage_ros.shipped import shipped
+from linkage_ros.resources import shipped
 import numpy as np
 import pytest
 

@@ -25,20 +25,20 @@ from linkage_ros.bag.reader import read_bag
 from linkage_ros.drawing.figure import view
 from linkage_ros.drawing.link_frames import drawn_in_frames, link_frames
 from linkage_ros.drawing.shapes import carried_shapes, Circle, shapes
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.survey import samples, usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import samples, usual_inputs, Way
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.report.data import page_data, poses
-from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.yaml_file import read_yaml
-from linkage_ros.shipped import shipped
 import numpy as np
 import pytest
 
 from .runs import BEGIN, MS, read
-from ..ros.ticked import Moment, run
+from ..node.ticked import Moment, run
 
 # Links stand where the closure puts them, by the published joints alone, in the whole gallery.
 

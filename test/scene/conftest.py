@@ -17,7 +17,7 @@
 
 from __future__ import annotations
 
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene
 import pytest
 

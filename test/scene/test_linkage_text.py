@@ -26,10 +26,10 @@ import resource
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import LinkageError
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.linkage_text import linkage_text, number_text, write_linkage
+from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.linkage import Limits, Linkage, Mass, Pose, RevoluteJoint, SlideJoint
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.linkage_text import linkage_text, number_text, write_linkage
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 import yaml
 

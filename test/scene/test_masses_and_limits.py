@@ -19,10 +19,10 @@ from __future__ import annotations
 from math import inf
 
 from linkage_ros.errors import FileError
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.linkage_text import linkage_text
+from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.linkage import Limits, Mass
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.linkage_text import linkage_text
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 
 from .files import CONFIG, is_one_line

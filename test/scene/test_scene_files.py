@@ -26,7 +26,7 @@ from linkage_ros.errors import FileError
 from linkage_ros.kinematics.linkage import RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline import Pipeline
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import load_scene, parse_scene
 from linkage_ros.scene.scene import RecordParameters, StorageParameters
 import pytest

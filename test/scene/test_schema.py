@@ -30,8 +30,8 @@ from linkage_ros.drives.drive import DRIVES
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import FileError
 from linkage_ros.faults.fault import FAULTS
-from linkage_ros.files.section import Section
-from linkage_ros.parameters import (
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.parameters import (
     Choice,
     choice,
     declared,
@@ -62,10 +62,10 @@ from linkage_ros.parameters import (
     text,
     whole,
 )
-from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.files.schema import as_text, linkage_schema, parameter_types, scene_schema
+from linkage_ros.files.section import Section
+from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.scene.load import load_scene, parse_scene
-from linkage_ros.scene.schema import as_text, linkage_schema, parameter_types, scene_schema
-from linkage_ros.scene.yaml_file import parse_yaml
 import pytest
 import yaml
 

@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.scene.linkage_file import read_linkage
+from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 from linkage_ros.scene.scene import Scene
-from linkage_ros.scene.yaml_file import parse_yaml
 
 ROOT = Path(__file__).parents[2]
 LINKAGES = ROOT / 'config' / 'linkages'

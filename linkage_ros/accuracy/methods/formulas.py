@@ -29,7 +29,7 @@ same sign belongs to the other assembly. The formula is used as it is printed, w
 throughout. It gives no rates.
 
 **Single precision:** the closed form in numbers of 32 bits, inputs and constants included. It is
-the stable form by the half angle, as in `linkage_ros.kinematics.crank_diagonal`. With
+the stable form by the half angle, as in `linkage_ros.kinematics.diagonals`. With
 near = 2√(ad)·sin(φ/2) and far = 2√(ad)·cos(φ/2), s² = (d − a)² + near²::
 
     K² = (s² − (b − c)²)·((b + c)² − s²)
@@ -45,9 +45,9 @@ from typing import Any, NamedTuple
 
 from linkage_ros.accuracy.methods import ACCELERATION, Joints, Method, Motion, RATE
 from linkage_ros.kinematics.four_bars import four_bars
-from linkage_ros.kinematics.groups import find_groups
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
 from linkage_ros.kinematics.structure import Driven
+from linkage_ros.kinematics.topology import find_groups
 import numpy as np
 
 

@@ -44,8 +44,8 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import copysign
-from linkage_ros.kinematics.crank_diagonal import CrankDiagonal
 from linkage_ros.kinematics.diagonal import AnyDiagonal
+from linkage_ros.kinematics.diagonals import CrankDiagonal
 from linkage_ros.kinematics.dyads.rrr import RRRDyad, RRRPose
 from linkage_ros.kinematics.rounding import margin
 from linkage_ros.kinematics.step import State

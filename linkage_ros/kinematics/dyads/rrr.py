@@ -51,8 +51,8 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import atan2
-from linkage_ros.kinematics.crank_diagonal import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.diagonal import AnyDiagonal, Diagonal, Growth, GrowthChange
+from linkage_ros.kinematics.diagonals import CrankDiagonal, UnsignedDiagonal
 from linkage_ros.kinematics.plane import folded
 from linkage_ros.kinematics.rounding import margin, SMALLEST
 from linkage_ros.kinematics.status import Status

@@ -36,7 +36,7 @@ from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.survey import Way
+from linkage_ros.kinematics.sweep_analysis import Way
 from linkage_ros.synthesis.design import Design, ROCKER
 from linkage_ros.synthesis.function.expression import Array, Expression, named
 import numpy as np

@@ -37,11 +37,11 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.cli.main import main
 from linkage_ros.cost import feed
 from linkage_ros.messages.single_values import text_message
-from linkage_ros.pipeline import Pipeline
-from linkage_ros.replay import change_text
-from linkage_ros.ros.bag_topics import bag_topic, message_type
-from linkage_ros.ros.run_recording import EXTRA, RunRecording
-from linkage_ros.ros.tick_loop import TickLoop
+from linkage_ros.node.bag_topics import bag_topic, message_type
+from linkage_ros.node.run_recording import EXTRA, RunRecording
+from linkage_ros.node.tick_loop import TickLoop
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.replay import change_text
 from linkage_ros.scene.load import load_scene
 import numpy as np
 import pytest

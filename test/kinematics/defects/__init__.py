@@ -18,9 +18,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.scene.linkage_file import read_linkage
-from linkage_ros.scene.yaml_file import read_yaml
 
 FOLDER = Path(__file__).parent
 

@@ -1,0 +1,201 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Effects of one's own: modules that a scene names by their dotted names, ``my_package.my_effect``.
+
+Python finds them as it finds any module, on ``PYTHONPATH`` or in a sourced workspace. They have
+what the effects of this package have (see `linkage_ros.effects.stage`), and
+
+``AFTER``
+    The effect of this package behind which it acts, whether a scene names that or not. Of several
+    behind the same one the alphabet decides.
+``NEEDS``
+    The quantities that it starts from, of `QUANTITIES`; they are then computed. May be left out. A
+    ``stage`` starts from `velocity` in any case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from hashlib import sha256
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+import sys
+from types import ModuleType
+from typing import Any
+
+from linkage_ros.effects.stage import EFFECTS, NEEDS
+from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
+from linkage_ros.files.parameters import declared
+
+QUANTITIES = ('velocity', 'acceleration', 'effort', 'pin_forces')
+"""What an effect can ask for."""
+
+FUNCTIONS = ('alter', 'drive_stage', 'stage', 'sensor', 'writer')
+"""Of these it has one at least."""
+
+_LAST_FOR_SENSORS = 'dropout'
+_IDENTIFYING_DIGITS = 16
+_ORDER = tuple(EFFECTS)
+
+
+@cache
+def own_module(name: str) -> ModuleType:
+    """
+    Import an effect of one's own, and look whether it is one.
+
+    Parameters
+    ----------
+    name
+        The dotted name of its module.
+
+    Raises
+    ------
+    DefinitionError
+        Where there is none, or where it is no effect; ``where`` is its name.
+
+    """
+    if not all(part.isidentifier() for part in name.split('.')):
+        raise DefinitionError(name, 'is no dotted name of a module', 'write package.module')
+    try:
+        module = import_module(name)
+    except ModuleNotFoundError as error:
+        if not f'{name}.'.startswith(f'{error.name}.'):
+            raise _failed(name, error) from None
+        raise DefinitionError(
+            name,
+            f'there is no module {error.name}',
+            'put the folder that it lies in on PYTHONPATH, or source its workspace',
+        ) from None
+    except (Exception, SystemExit) as error:  # noqa: BLE001 (a module of others may do anything)
+        raise _failed(name, error) from None
+    _check(name, module)
+    return module
+
+
+def found_in(name: str) -> str:
+    """Return where Python would look for an effect of one's own; nothing of it is run for that."""
+    package = name.partition('.')[0]
+    try:
+        # Of the package alone: to look for a module within it would run the package.
+        spec = find_spec(package)
+    except (ImportError, ValueError):
+        spec = None
+    if spec is None:
+        return 'no module'
+    return quoted(spec.origin or next(iter(spec.submodule_search_locations or ()), package))
+
+
+def own_needs(name: str) -> tuple[str, ...]:
+    """Return the quantities that an effect of one's own starts from, and what these start from."""
+    module = own_module(name)
+    own = (*(('velocity',) if hasattr(module, 'stage') else ()), *getattr(module, 'NEEDS', ()))
+    needs = {need for one in own for need in (*NEEDS.get(one, ()), one)}
+    return tuple(effect for effect in QUANTITIES if effect in needs)
+
+
+def with_own(named: Iterable[str]) -> tuple[str, ...]:
+    """Return effects in the order in which they act."""
+    return tuple(sorted(named, key=_place))
+
+
+def identity(name: str) -> str:
+    """
+    Return which module an effect of one's own is, for the account of a run.
+
+    It is the version of its package, where that says one as ``__version__``, and the beginning of
+    the SHA-256 of the module's file.
+    """
+    module = own_module(name)
+    package = sys.modules[name.partition('.')[0]]
+    version = getattr(module, '__version__', getattr(package, '__version__', ''))
+    file = getattr(module, '__file__', None)
+    code = sha256(Path(file).read_bytes()).hexdigest() if file else ''
+    said = (str(version), code and f'sha256 {code[:_IDENTIFYING_DIGITS]}')
+    return ', '.join(filter(None, said)) or 'unknown'
+
+
+def _place(name: str) -> tuple[int, str]:
+    if name in EFFECTS:
+        return _ORDER.index(name), ''
+    return _ORDER.index(own_module(name).AFTER), name
+
+
+def _failed(name: str, error: BaseException) -> DefinitionError:
+    return DefinitionError(
+        name,
+        f'cannot be imported: {type(error).__name__}: {quoted(str(error))}',
+        f'put it right; `python3 -c "import {name}"` says where',
+    )
+
+
+def _check(name: str, module: ModuleType) -> None:
+    """Refuse what is no effect."""
+    parameters: Any = getattr(module, 'PARAMETERS', None)
+    try:
+        known = isinstance(parameters, type) and declared(parameters) is not None
+    except (TypeError, KeyError):
+        known = False
+    if not known:
+        raise DefinitionError(
+            name,
+            'has no PARAMETERS',
+            'name a frozen dataclass whose fields linkage_ros.files.parameters has made',
+        )
+    own = [function for function in FUNCTIONS if hasattr(module, function)]
+    if not own:
+        raise DefinitionError(name, 'does nothing', f'define one of {listed(FUNCTIONS)}')
+    topics = [key for key in ('TOPIC', 'MESSAGE', 'writer') if hasattr(module, key)]
+    if topics and len(topics) < 3:
+        raise DefinitionError(
+            name,
+            f'has {listed(topics, " and ")} alone',
+            'TOPIC, MESSAGE and writer(parameters, context) go together',
+        )
+    if topics and not str(module.TOPIC).startswith('~/'):
+        raise DefinitionError(
+            name, f'has the TOPIC {quoted(module.TOPIC)}', "write one of the node's own: '~/name'"
+        )
+    _check_order(name, module)
+
+
+def _check_order(name: str, module: ModuleType) -> None:
+    """Refuse what acts before what it starts from, or where nothing can."""
+    after = getattr(module, 'AFTER', None)
+    if after not in EFFECTS:
+        known = f'name one of {listed(EFFECTS)}'
+        said = f'AFTER is {quoted(after)}' if after is not None else 'does not say AFTER which'
+        remedy = did_you_mean(after, EFFECTS, known) if isinstance(after, str) else known
+        raise DefinitionError(name, f'{said}: that is no effect', remedy)
+    needs = getattr(module, 'NEEDS', ())
+    for need in needs:
+        if need not in QUANTITIES:
+            raise DefinitionError(
+                name, f'NEEDS {quoted(need)}', f'of quantities there are {listed(QUANTITIES)}'
+            )
+    last = max((_ORDER.index(need) for need in needs), default=0)
+    if last > _ORDER.index(after):
+        raise DefinitionError(
+            name, f'starts from {_ORDER[last]} and acts before it', f'set AFTER = {_ORDER[last]!r}'
+        )
+    if hasattr(module, 'sensor') and _ORDER.index(after) > _ORDER.index(_LAST_FOR_SENSORS):
+        raise DefinitionError(
+            name,
+            f'AFTER is {after!r}, and delay is the last that reads',
+            f'set AFTER = {_LAST_FOR_SENSORS!r}',
+        )

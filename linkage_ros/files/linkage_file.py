@@ -1,0 +1,342 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A linkage file, read into a `Linkage`; the shorthands stand for exactly such a file."""
+
+from __future__ import annotations
+
+from math import inf
+from os import PathLike
+from typing import Any
+
+from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.files.section import Section
+from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.limit_checks import check_limits
+from linkage_ros.kinematics.linkage import (
+    GROUND,
+    Input,
+    Limits,
+    Linkage,
+    Mass,
+    Pose,
+    RevoluteJoint,
+    SlideJoint,
+    Slider,
+)
+from linkage_ros.resources import named_file
+
+_KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose', 'masses')
+_MOST_LINKS, _MOST_POINTS = 400, 10_000
+"""More links than these, and points of all links, are no machine's; a check takes seconds then."""
+
+FARTHEST = 1e9
+"""Coordinates beyond this, in [m], are no machine's; below it no square overflows."""
+
+HEAVIEST = 1e12
+"""Masses beyond this, in [kg], and moments of inertia, in [kg·m²], are no machine's either."""
+
+STRONGEST = 1e12
+"""Nor are efforts beyond this, in [N·m] or [N]."""
+
+
+def looks_like_linkage(content: Section) -> bool:
+    """Return whether a file that may hold anything has the keys of a linkage."""
+    return any(key in content for key in ('links', *_SHORTHANDS))
+
+
+def load(linkage: str | PathLike[str]) -> Closure:
+    """
+    Load a linkage, ready to be solved.
+
+    Parameters
+    ----------
+    linkage
+        Path of a linkage file, or the name of a linkage that comes with the package, such as
+        ``'jansen_leg'``; `linkage_names` lists them.
+
+    Raises
+    ------
+    FileError
+        Where there is no such file or name, or the file is wrong: with file, line, key and remedy.
+    TypeError
+        Where it is neither a name nor a path.
+
+    """
+    file = named_file(linkage, 'linkages')
+    content, _ = read_yaml(file)
+    if 'linkage' in content or 'linkages' in content:
+        raise content.error('', 'is a scene', 'name a linkage file; load_scene() reads scenes')
+    return read_closure(content, file.stem)
+
+
+def read_linkage(content: Section) -> Linkage:
+    """Read a linkage and prove that it closes; errors as of `read_closure`."""
+    return read_closure(content).linkage
+
+
+def read_closure(content: Section, name: str = '', *, publish_inputs: bool = False) -> Closure:
+    """
+    Read a linkage and prove that it closes.
+
+    Parameters
+    ----------
+    content
+        The linkage file.
+    name
+        What to call the linkage.
+    publish_inputs
+        Whether its input joints are published too, before the others.
+
+    Raises
+    ------
+    FileError
+        With file, line and key of what is wrong.
+
+    """
+    for shorthand, expand in _SHORTHANDS.items():
+        if shorthand in content:
+            short = content.section(shorthand)
+            written_out = Section(content.file, '', _limited(expand(short), short))
+            short.finish()
+            content.finish()
+            linkage = _linkage(written_out, publish_inputs)
+            return _closable(content, linkage, name, shorthand)
+    for key in _KEYS:
+        content.taken(key)
+    content.finish(tuple(_SHORTHANDS))
+    return _closable(content, _linkage(content, publish_inputs), name)
+
+
+def _linkage(content: Section, publish_inputs: bool) -> Linkage:
+    links = content.section('links')
+    _bound(content, links, 'links', _MOST_LINKS)
+    points = {}
+    for name in links:
+        link = links.section(name)
+        points[name] = {point: link.point(point, most=FARTHEST) for point in link}
+
+    count = sum(map(len, points.values()))
+    if count > _MOST_POINTS:
+        raise content.error(
+            'links', f'have {count} points', f'write at most {_MOST_POINTS} points'
+        )
+
+    inputs = tuple(_input(driven) for driven in content.sections('input'))
+
+    assembly = content.section('assembly', required=False)
+    sides = {
+        name: assembly.choice(name, ('left', 'right', 'ahead', 'behind')) for name in assembly
+    }
+
+    sliders = content.section('sliders', required=False)
+    joints = content.section('joints')
+    _bound(content, sliders, 'sliders', _MOST_LINKS)
+    _bound(content, joints, 'joints', _MOST_LINKS)
+    if not list(joints):
+        raise content.error('joints', 'publishes nothing', 'name a joint')
+    for driven in inputs:
+        if driven.joint in joints:
+            raise joints.error(driven.joint, 'is the input joint', 'publish the dependent joints')
+    published = {name: _joint(joints.section(name)) for name in joints}
+    if publish_inputs:
+        published = {driven.joint: _published(driven) for driven in inputs} | published
+    return Linkage(
+        points,
+        inputs,
+        sides,  # type: ignore[arg-type]  # the choice above is the Literal
+        published,
+        {name: _slider(sliders.section(name)) for name in sliders},
+        tuple(content.texts('traced')),
+        _pose(content.section('pose')) if 'pose' in content else None,
+        _masses(content.section('masses', required=False), tuple(points)),
+    )
+
+
+def _bound(content: Section, named: Section, key: str, most: int) -> None:
+    count = len(named.mapping)
+    if count > most:
+        raise content.error(key, f'there are {count}', f'write at most {most}')
+
+
+def _input(content: Section) -> Input:
+    limits = _limits(content)
+    if 'slider' in content:
+        driven = Input(content.text('joint'), slider=content.text('slider'), limits=limits)
+    else:
+        ends = content.text('parent'), content.text('child')
+        driven = Input(content.text('joint'), *ends, limits=limits)
+    content.finish(('slider',))
+    return driven
+
+
+def _published(driven: Input) -> RevoluteJoint | SlideJoint:
+    if driven.slider:
+        return SlideJoint(driven.slider)
+    return RevoluteJoint(driven.parent, driven.child)
+
+
+def _limits(content: Section) -> Limits:
+    """Return what a joint says of its limits; `kinematics.checks` says whether they can be."""
+    low, high = content.interval('limits', most=FARTHEST)
+    return Limits(
+        low,
+        high,
+        content.number('velocity', inf, above=0.0, most=FARTHEST, unit='rad/s or m/s')
+        if 'velocity' in content
+        else inf,
+        content.number('effort', inf, above=0.0, most=STRONGEST, unit='N·m or N')
+        if 'effort' in content
+        else inf,
+    )
+
+
+def _pose(content: Section) -> Pose:
+    inputs = tuple(content.numbers('inputs', most=FARTHEST))
+    points = content.section('points', required=False)
+    pose = Pose(inputs, {name: points.point(name, most=FARTHEST) for name in points})
+    content.finish()
+    return pose
+
+
+def _masses(content: Section, links: tuple[str, ...]) -> dict[str, Mass]:
+    masses = {}
+    for name in content:
+        if name == GROUND:
+            raise content.error(name, 'the ground does not move', 'leave its mass out')
+        if name not in links:
+            moving = sorted({*links} - {GROUND})
+            raise content.error(
+                name, f'{quoted(name)} is not a link', f'name one of {listed(moving)}'
+            )
+        link = content.section(name)
+        masses[name] = Mass(
+            link.number('mass', above=0.0, most=HEAVIEST, unit='kg'),
+            link.point('center', most=FARTHEST),
+            link.number('inertia', least=0.0, most=HEAVIEST, unit='kg·m²'),
+        )
+        link.finish()
+    return masses
+
+
+def _slider(content: Section) -> Slider:
+    block = content.text('block', '')
+    slider = Slider(
+        content.text('point'),
+        content.text('along'),
+        content.text('through'),
+        content.point('direction', most=FARTHEST),
+        block,
+        content.number('angle', 0.0, least=-FARTHEST, most=FARTHEST, unit='rad') if block else 0.0,
+    )
+    content.finish(('block', 'angle'))
+    return slider
+
+
+def _joint(content: Section) -> RevoluteJoint | SlideJoint:
+    joint: RevoluteJoint | SlideJoint
+    limits = _limits(content)
+    if 'slider' in content:
+        joint = SlideJoint(content.text('slider'), limits)
+    else:
+        joint = RevoluteJoint(content.text('parent'), content.text('child'), limits)
+    content.finish(('slider',))
+    return joint
+
+
+def _closable(content: Section, linkage: Linkage, name: str, shorthand: str = '') -> Closure:
+    try:
+        closure = Closure(linkage, name)
+        if len(linkage.inputs) == 1 and not closure.closing_ranges:
+            raise DefinitionError(
+                'links',
+                'the loops close at no value of the input',
+                'the longest link of a loop must be shorter than its others together',
+            )
+        check_limits(closure)
+    except DefinitionError as error:
+        where = error.where
+        if shorthand:
+            # Of what a shorthand stands for, it says the limits alone itself.
+            where = f'{shorthand}.{where}' if where.endswith('.limits') else shorthand
+        raise content.error(where, error.reason, error.remedy) from None
+    return closure
+
+
+def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
+    """Return what a shorthand stands for, with the limits that it gives its joints."""
+    driven, joints = written_out['input'], written_out['joints']
+    own = content.section('joints', required=False)
+    for name in own:
+        if name not in joints:
+            raise own.error(
+                name, f'{quoted(name)} is no joint of it', f'name one of {listed(joints)}'
+            )
+    places = [(driven, content.section('input', required=False))]
+    places += [(joints[name], own.section(name)) for name in own]
+    for joint, of in places:
+        _limits(of)
+        of.finish()
+        joint.update(of.mapping)
+    return written_out
+
+
+def _four_bar(content: Section) -> dict[str, Any]:
+    """Write out crank a, coupler b, rocker c and ground d."""
+    a, b, c, d = (content.number(side, above=0.0, most=FARTHEST, unit='m') for side in 'abcd')
+    side = content.choice('assembly', ('left', 'right'), 'left')
+    return {
+        'links': {
+            'ground': {'O2': [0, 0], 'O4': [d, 0]},
+            'crank': {'O2': [0, 0], 'A': [a, 0]},
+            'coupler': {'A': [0, 0], 'B': [b, 0]},
+            'rocker': {'O4': [0, 0], 'B': [c, 0]},
+        },
+        'input': {'joint': 'crank_joint', 'parent': 'ground', 'child': 'crank'},
+        'assembly': {'B': side},
+        'joints': {
+            'coupler_joint': {'parent': 'crank', 'child': 'coupler'},
+            'rocker_joint': {'parent': 'ground', 'child': 'rocker'},
+        },
+    }
+
+
+def _inverted_slider_crank(content: Section) -> dict[str, Any]:
+    """Write out crank a and the place of the swivel, from the crank's pivot."""
+    a = content.number('a', above=0.0, most=FARTHEST, unit='m')
+    swivel = content.point('swivel', most=FARTHEST)
+    if swivel == (0.0, 0.0):
+        raise content.error(
+            'swivel', "[0, 0] is the crank's pivot", 'give the swivel another place'
+        )
+    side = content.choice('assembly', ('ahead', 'behind'), 'ahead')
+    return {
+        'links': {
+            'ground': {'O': [0, 0], 'C': list(swivel)},
+            'crank': {'O': [0, 0], 'B': [a, 0]},
+            'rod': {'B': [0, 0], 'end': [a + (swivel[0] ** 2 + swivel[1] ** 2) ** 0.5, 0]},
+        },
+        'sliders': {'swivel': {'point': 'C', 'along': 'rod', 'through': 'B', 'direction': [1, 0]}},
+        'input': {'joint': 'crank_joint', 'parent': 'ground', 'child': 'crank'},
+        'assembly': {'swivel': side},
+        'joints': {
+            'rod_joint': {'parent': 'crank', 'child': 'rod'},
+            'rod_slide': {'slider': 'swivel'},
+        },
+    }
+
+
+_SHORTHANDS = {'four_bar': _four_bar, 'inverted_slider_crank': _inverted_slider_crank}

@@ -1,0 +1,311 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A linkage as the text of a linkage file, and the scene that such a file stands for.
+
+Reading the text gives the same linkage. Short mappings stand on one line, as in the files that
+come with the package. Numbers are the shortest that read as the same floats; names are quoted
+where a reader of YAML 1.1 or 1.2 could take them for something else.
+
+Where a scene is expected, a linkage file stands for a scene that moves the linkage. It begins at
+`usual_inputs`. A single input turns at a constant rate, or swings through its range as a sine;
+several come from a topic. The result is the text of a scene file, read as any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import json
+from math import asin, isfinite, isinf
+from pathlib import Path
+import re
+from textwrap import wrap
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.files.atomic_write import write_whole
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import parse_yaml
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import (
+    Input,
+    Limits,
+    Linkage,
+    RevoluteJoint,
+    SlideJoint,
+    Slider,
+)
+from linkage_ros.kinematics.ranges import describe, InputRange
+from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
+
+_WIDTH = 99
+_WHOLE = 1e15
+"""Beyond it, whole numbers are easier to read with an exponent."""
+
+_PLAIN = re.compile(r'[^\W\d][\w.-]*')
+_WORDS = {'yes', 'no', 'on', 'off', 'true', 'false', 'null'}
+"""What YAML takes for something other than a name; 1.1 knows more of them than 1.2."""
+
+Content = float | str | list['Content'] | dict[str, 'Content']
+
+
+def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
+    """
+    Return the text of a linkage file.
+
+    Parameters
+    ----------
+    linkage
+        The linkage, with numbers that are finite and names that print.
+    comment
+        Paragraphs that stand at its head.
+
+    """
+    lines = list(_comment(comment))
+    for key, value in _content(linkage).items():
+        lines += _entry(key, value, '', in_rows=key in _IN_ROWS)
+    return '\n'.join(lines) + '\n'
+
+
+def write_linkage(linkage: Linkage, file: str | Path, comment: Sequence[str] = ()) -> None:
+    """
+    Write a linkage file, in the place of one that is there.
+
+    It is written beside its place and moved there, so that at every instant a whole file is there,
+    the old or the new.
+
+    Parameters
+    ----------
+    linkage, comment
+        As in `linkage_text`.
+    file
+        Where to; a symbolic link is followed.
+
+    Raises
+    ------
+    LinkageError
+        Where the file cannot be written, or where what it would say is no linkage.
+
+    """
+    data = linkage_text(linkage, comment).encode()
+    read_linkage(parse_yaml(data, str(file)))
+    write_whole(file, data)
+
+
+def number_text(value: float) -> str:
+    """Return the shortest text that every YAML reader takes for the same float."""
+    value = float(value)
+    if isinf(value):
+        return '.inf' if value > 0.0 else '-.inf'
+    written = repr(value)
+    if value.is_integer() and abs(value) < _WHOLE and written != '-0.0':
+        return str(int(value))
+    mantissa, e, exponent = written.partition('e')
+    # YAML 1.1 takes no number for one that has an exponent and no decimal point.
+    return f'{mantissa}.0e{exponent}' if e and '.' not in mantissa else written
+
+
+_IN_ROWS = ('links', 'sliders', 'joints', 'masses')
+"""Keys whose parts have a line each, however short they are."""
+
+
+def _content(linkage: Linkage) -> dict[str, Content]:
+    """Return what the file says, in its order; what is empty and may be absent is."""
+    inputs: list[Content] = [_input(given) for given in linkage.inputs]
+    content: dict[str, Content] = {
+        'links': {
+            link: {name: [*point] for name, point in points.items()}
+            for link, points in linkage.links.items()
+        },
+        'sliders': {name: _slider(slider) for name, slider in linkage.sliders.items()},
+        'input': inputs[0] if len(inputs) == 1 else inputs,
+        'assembly': dict(linkage.assembly),
+        'pose': _pose(linkage),
+        'joints': {name: _joint(joint) for name, joint in linkage.joints.items()},
+        'traced': [*linkage.traced],
+        'masses': {
+            link: {'mass': mass.mass, 'center': [*mass.center], 'inertia': mass.inertia}
+            for link, mass in linkage.masses.items()
+        },
+    }
+    needed = ('links', 'input', 'joints')
+    return {key: value for key, value in content.items() if value or key in needed}
+
+
+def _slider(slider: Slider) -> dict[str, Content]:
+    block: dict[str, Content] = (
+        {'block': slider.block, 'angle': slider.angle} if slider.block else {}
+    )
+    return {
+        'point': slider.point,
+        **block,
+        'along': slider.along,
+        'through': slider.through,
+        'direction': [*slider.direction],
+    }
+
+
+def _input(given: Input) -> dict[str, Content]:
+    limits = _limits(given.limits)
+    if given.slider:
+        return {'joint': given.joint, 'slider': given.slider, **limits}
+    return {'joint': given.joint, 'parent': given.parent, 'child': given.child, **limits}
+
+
+def _joint(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
+    limits = _limits(joint.limits)
+    if isinstance(joint, SlideJoint):
+        return {'slider': joint.slider, **limits}
+    return {'parent': joint.parent, 'child': joint.child, **limits}
+
+
+def _limits(limits: Limits) -> dict[str, Content]:
+    found: dict[str, Content] = {'limits': [limits.low, limits.high]} if limits.bounded else {}
+    for key in ('velocity', 'effort'):
+        if isfinite(value := getattr(limits, key)):
+            found[key] = value
+    return found
+
+
+def _pose(linkage: Linkage) -> dict[str, Content]:
+    if linkage.pose is None:
+        return {}
+    pose: dict[str, Content] = {'inputs': [*linkage.pose.inputs]}
+    if linkage.pose.points:
+        pose['points'] = {name: [*point] for name, point in linkage.pose.points.items()}
+    return pose
+
+
+def _comment(paragraphs: Sequence[str]) -> Iterator[str]:
+    for paragraph in paragraphs:
+        for line in paragraph.splitlines() or ['']:
+            printing = ''.join(c if c.isprintable() else ' ' for c in line)
+            # Words of any length stay whole: a comment may hold a command or a path.
+            wrapped = wrap(printing, _WIDTH - 2, break_long_words=False, break_on_hyphens=False)
+            yield from (f'# {part}' for part in wrapped) if wrapped else ['#']
+
+
+def _entry(name: str, value: Content, indent: str, *, in_rows: bool = False) -> Iterator[str]:
+    """Yield the lines of a key: one where it fits and need not be in rows, else one each part."""
+    key = f'{indent}{_name(name)}:'
+    line = f'{key} {_flow(value)}'
+    inner = indent + '  '
+    if not isinstance(value, dict | list) or not value or not (in_rows or len(line) > _WIDTH):
+        yield line
+        return
+    yield key
+    if isinstance(value, dict):
+        for part, of in value.items():
+            yield from _entry(part, of, inner)
+    else:
+        yield from (f'{inner}- {_flow(part)}' for part in value)
+
+
+def _flow(value: Content) -> str:
+    if isinstance(value, dict):
+        return f'{{{", ".join(f"{_name(key)}: {_flow(part)}" for key, part in value.items())}}}'
+    if isinstance(value, list):
+        return f'[{", ".join(map(_flow, value))}]'
+    return _name(value) if isinstance(value, str) else number_text(value)
+
+
+def _name(name: str) -> str:
+    if _PLAIN.fullmatch(name) and name.lower() not in _WORDS:
+        return name
+    return json.dumps(name, ensure_ascii=False)  # its escapes are YAML's too
+
+
+_PART = 0.96
+"""Of its range that an input swings through: at the ends of many lies a toggle, without rates."""
+
+_PERIOD = 4.0
+"""Of the swing, in [s]."""
+
+_SAME = 1e-9
+"""What a start may lie beyond the end of a range and count as it, in [rad] or of a length."""
+
+
+def scene_text_for(closure: Closure, file: str) -> str:
+    """
+    Return the text of the scene that a linkage stands for.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    file
+        Name of its file, as the scene is to give it.
+
+    Raises
+    ------
+    DefinitionError
+        Where its pose says that it starts where no loop closes.
+
+    """
+    return (
+        '# What a linkage file alone stands for where a scene is expected.\n'
+        f'linkage: {file}\n'
+        'rate: 1000\n'
+        f'drive: {_drive(closure)}\n'
+        'effects: {velocity: {}}\n'
+    )
+
+
+def _drive(closure: Closure) -> str:
+    if len(closure.linkage.inputs) > 1:
+        return '{topic: {}}'
+    start, interval = _start(closure)
+    if interval.whole:
+        return f'{{constant_rate: {{rate: 1, start: {number_text(start)}}}}}'
+    left_out = 0.5 * (1.0 - _PART) * (interval.highest - interval.lowest)
+    low, high = (
+        end if by else end + inwards
+        for end, inwards, by in zip(interval[:2], (left_out, -left_out), interval.by, strict=True)
+    )
+    # A start that lies in what is left out at an end is where the swing turns back.
+    low, high = min(low, start), max(high, start)
+    mean, amplitude = 0.5 * (low + high), 0.5 * (high - low)
+    sine = min(max((start - mean) / amplitude, -1.0), 1.0) if amplitude else 0.0
+    said = {
+        'amplitude': amplitude,
+        'frequency': 1.0 / _PERIOD,
+        'mean': mean,
+        'phase': asin(sine),
+    }
+    return f'{{sine: {{{", ".join(f"{key}: {number_text(of)}" for key, of in said.items())}}}}}'
+
+
+def _start(closure: Closure) -> tuple[float, InputRange]:
+    """Return where the single input starts, and the range in which that lies."""
+    way, pose = Way(closure), closure.linkage.pose
+    if pose is None or pose.points:
+        (start,) = usual_inputs(closure)
+        # Of a range as narrow as the rounding of its values the usual one may lie beside it.
+        interval = way.range_about(start) or way.widest_range
+        assert interval is not None, 'reading the file has proved that it closes somewhere'
+        return start, interval
+    (start,) = pose.inputs
+    near = _SAME * (1.0 if way.turning else closure.scale)
+    for value in (start, start - near, start + near):
+        interval = way.range_about(value)
+        if interval is not None:
+            if not interval.whole:
+                start = min(max(start, interval.lowest), interval.highest)
+            return start, interval
+    raise DefinitionError(
+        'pose.inputs',
+        f'no loop closes at {start:g} {"rad" if way.turning else "m"}',
+        f'start within {describe(way.ranges)}',
+    )

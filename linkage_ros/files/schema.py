@@ -1,0 +1,558 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The JSON Schemas of scene and linkage files, as `load` and `linkage_file` read them.
+
+A schema says what the reader takes, as far as it can know: names of joints, pins and links pass as
+they come. Its words are those of draft 7 and ``$defs``, which editors know, and conditions rather
+than alternatives, so that a violation names one place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+import json
+from math import inf
+from typing import Any
+
+from linkage_ros.drives.drive import DRIVES
+from linkage_ros.effects.stage import EFFECTS
+from linkage_ros.faults.fault import FAULTS
+from linkage_ros.files.linkage_file import FARTHEST, HEAVIEST, STRONGEST
+from linkage_ros.files.parameters import (
+    CHARACTER,
+    declared,
+    is_required,
+    mapping,
+    named,
+    Number,
+    parameters_schema,
+    Point,
+    Schema,
+    Text,
+)
+from linkage_ros.scene.load import (
+    COARSEST_ACCURACY,
+    FINEST_ACCURACY,
+    HIGHEST_RATE,
+    LOWEST_RATE,
+    STIFFEST,
+    STRONGEST_SPRING,
+)
+from linkage_ros.scene.scene import AS_THE_RUN_GOES, LEASTS, SPLITS, StorageParameters
+from linkage_ros.solvers.registry import SOLVERS
+
+DIALECT = 'https://json-schema.org/draft/2020-12/schema'
+
+ROS_NAME = '^[A-Za-z][A-Za-z0-9_]*$'
+
+DOTTED = r'^[^.\s]+(\.[^.\s]+)+$'
+"""Pattern of the name of a module within a package."""
+
+_RATE = 'Ticks a second [Hz]; 0: one for every crank sample.'
+_ONE_SOLVER: Schema = {'not': {'required': ['solver', 'accuracy']}}
+_NO_PLAY_UNDER_TORQUE: Schema = {
+    'if': {
+        'required': ['drive'],
+        'properties': {'drive': {'required': ['torque']}},
+    },
+    'then': {'properties': {'effects': {'properties': {'backlash': False}}}},
+}
+_OWN_EFFECT: Schema = {
+    'description': "An effect of one's own: a module that Python finds, and its parameters.",
+    'type': 'object',
+    'additionalProperties': True,
+}
+_SHORTHANDS = ('four_bar', 'inverted_slider_crank')
+_WRITTEN_OUT = ('links', 'input', 'joints')
+
+
+def as_text(schema: Schema) -> str:
+    """Return a schema as the text of its file."""
+    return json.dumps(schema, indent=2, ensure_ascii=False, allow_nan=False) + '\n'
+
+
+def _text(description: str, pattern: str = f'^{CHARACTER}+$') -> Schema:
+    return Text(description, pattern).schema()
+
+
+def _number(
+    description: str, *, least: float = -inf, most: float = inf, above: float = -inf
+) -> Schema:
+    return Number(description, '', least, most, above).schema()
+
+
+def _point(description: str, most: float) -> Schema:
+    return Point(description, '', most).schema()
+
+
+def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
+    """Return the type of parameters of each drive, effect or fault of a registry."""
+    return {name: import_module(module).PARAMETERS for name, module in registry.items()}
+
+
+def scene_schema() -> Schema:
+    """Return the schema of a scene file; it imports all drives, effects and faults."""
+    own = {key: {'$ref': f'#/$defs/{key}'} for key in _of_a_linkage()}
+    whole = mapping(
+        'A linkage or several, what drives them, what is called for, and a recording.',
+        {
+            'linkage': _text('path of the linkage file, relative to the folder of this file'),
+            'linkages': _linkages(own),
+            'rate': {
+                **_number(_RATE, least=0.0, most=HIGHEST_RATE),
+                'if': {'exclusiveMinimum': 0},
+                'then': _number(_RATE, least=LOWEST_RATE),
+                'default': 1000,
+            },
+            'angles': {
+                'description': 'Whether published angles run on, or lie in (−π, π].',
+                'enum': ['continuous', 'wrapped'],
+                'default': 'continuous',
+            },
+            'seed': {
+                'description': 'From which everything random comes; if not said, a number that '
+                'follows from the name of the scene.',
+                'type': 'integer',
+                'minimum': 0,
+                'maximum': 2**53,
+            },
+            **own,
+            'faults': {
+                **named('What can go wrong on demand, by a name for each.', _fault()),
+                'propertyNames': _text('a name: letters, digits and _, a letter first', ROS_NAME),
+            },
+            'record': _record(),
+            'robot_description': {
+                'description': 'Whether the node publishes the linkages as URDF on '
+                'robot_description.',
+                'type': 'boolean',
+                'default': False,
+            },
+        },
+    )
+    return {
+        '$schema': DIALECT,
+        'title': 'Scene',
+        **whole,
+        'if': {'required': ['linkages']},
+        'then': {'properties': {'linkage': False}},
+        'else': {'required': ['linkage'], **_NO_PLAY_UNDER_TORQUE},
+        **_ONE_SOLVER,
+        '$defs': _of_a_linkage(),
+    }
+
+
+def _linkages(own: Mapping[str, Schema]) -> Schema:
+    one = mapping(
+        'A linkage; what it does not say for itself is as the scene says.',
+        {
+            'name': _text(
+                'its name, which its joints have before their own: letters, digits and _',
+                ROS_NAME,
+            ),
+            'linkage': _text('path of its file, relative to the folder of this file'),
+            **own,
+        },
+        required=('name', 'linkage'),
+    )
+    one |= _ONE_SOLVER | _NO_PLAY_UNDER_TORQUE
+    return {
+        'description': 'Several linkages in the place of one.',
+        'if': {'type': 'array'},
+        'then': {'minItems': 1, 'items': one},
+        'else': one,
+    }
+
+
+def _of_a_linkage() -> dict[str, Schema]:
+    """Return what the scene says for all linkages, and each may say for itself."""
+    drives, effects = (
+        {name: parameters_schema(of) for name, of in parameter_types(registry).items()}
+        for registry in (DRIVES, EFFECTS)
+    )
+    return {
+        'publish_input': {
+            'description': 'Whether the input joints are published too, before the others; '
+            'without it, they are where the drive is no topic, or effort is named.',
+            'type': 'boolean',
+        },
+        'beyond_limits': {
+            'description': 'What is published while a joint is beyond its limits: the same as '
+            'within them, or nothing.',
+            'enum': ['publish', 'silent'],
+            'default': 'publish',
+        },
+        'drive': {
+            **mapping('Where the crank comes from: one drive.', drives),
+            'maxProperties': 1,
+            'default': {'topic': {}},
+        },
+        'effects': {
+            **mapping('What is called for beyond positions.', effects),
+            'patternProperties': {DOTTED: _OWN_EFFECT},
+            'default': {},
+        },
+        'solver': _solver(),
+        'accuracy': _number(
+            'Of the positions [rad or m]: the cheapest solver that proves it is chosen.',
+            least=FINEST_ACCURACY,
+            most=COARSEST_ACCURACY,
+        ),
+        'loads': mapping(
+            'The forces that act on the links, where effects or the drive ask for them.',
+            {
+                'gravity': {**_point('gravity: [x, y] [m/s²]', 1e3), 'default': [0, 0]},
+                'springs': named('springs between points of links, by name', _spring()),
+                'drive_inertia': {
+                    **_number(
+                        'of the motor, at the input [kg·m², or kg of a slide]',
+                        least=0.0,
+                        most=STRONGEST_SPRING,
+                    ),
+                    'default': 0,
+                },
+            },
+        ),
+    }
+
+
+def _solver() -> Schema:
+    solvers = parameter_types(SOLVERS)
+    alone = [
+        name
+        for name, of in solvers.items()
+        if not any(is_required(entry) for entry, _ in declared(of))
+    ]
+    one = mapping(
+        'How the loops are closed: one solver.',
+        {name: parameters_schema(of) for name, of in solvers.items()},
+    )
+    others = ', '.join(f'{{{name}: {{…}}}}' for name in solvers if name not in alone)
+    return {
+        'description': one['description'],
+        'if': {'type': 'string'},
+        'then': {'enum': alone, 'description': f'or with its parameters: {others}'},
+        'else': {**one, 'minProperties': 1, 'maxProperties': 1},
+        'default': 'closed_form',
+    }
+
+
+def _spring() -> Schema:
+    end = _text('where it ends: LINK.POINT', rf'^{CHARACTER}+\.{CHARACTER}+$')
+    free = _number('length without a force [m]', least=0.0, most=STRONGEST_SPRING)
+    damping = _number('damping along it [N·s/m]', least=0.0, most=STIFFEST)
+    return mapping(
+        'A spring, with a damper beside it.',
+        {
+            'from': end,
+            'to': end,
+            'stiffness': _number('stiffness [N/m]', least=0.0, most=STIFFEST),
+            'free_length': {**free, 'default': 0},
+            'damping': {**damping, 'default': 0},
+        },
+        required=('from', 'to', 'stiffness'),
+    )
+
+
+def _fault() -> Schema:
+    kinds = {name: parameters_schema(of) for name, of in parameter_types(FAULTS).items()}
+    return {
+        **mapping(
+            'A fault of one kind, injected by service, or at the times that are said.',
+            {
+                **kinds,
+                'at': {
+                    'description': 'when it is injected by itself, from the first tick on [s]',
+                    'type': 'array',
+                    'items': _number('a time [s]', least=0.0, most=1e9),
+                },
+                'seconds': _number('how long it lasts then [s]', least=1e-6, most=1e9),
+            },
+        ),
+        'oneOf': [{'required': [kind]} for kind in kinds],
+        'if': {'required': ['at'], 'properties': {'at': {'minItems': 1}}},
+        'then': {'required': ['seconds']},
+        'else': {'properties': {'seconds': False}},
+    }
+
+
+def _record() -> Schema:
+    storage = parameters_schema(StorageParameters)['properties']
+    for key, least in LEASTS.items():
+        above = {'if': {'exclusiveMinimum': 0}, 'then': {'minimum': least}}
+        storage[key] = {**storage[key], **above}
+    whole = mapping(
+        'How the run is recorded; without it, it is not.',
+        {
+            'directory': {
+                **_text("folder of the bags' folders, relative to where the node is started"),
+                'default': 'runs',
+            },
+            'name': {
+                **_text(
+                    "name of the bag's folder; '': the scene's name and the time; one that exists "
+                    'gets a number',
+                    rf'^(?!\.\.?$)(?!.*/){CHARACTER}*$',
+                ),
+                'default': '',
+            },
+            'queue': {
+                'description': 'how many messages wait for the disk before more are dropped; one '
+                'of more than 16 KiB counts as one for each 16 KiB',
+                'type': 'integer',
+                'minimum': 100,
+                'maximum': 10_000_000,
+                'default': 20_000,
+            },
+            **storage,
+        },
+    )
+    one = {'required': ['split_bytes'], 'properties': {'split_bytes': {'maximum': 0}}}
+    split = {'anyOf': [{'not': one}, _wanted('split_seconds')]}
+    one_file = f'without {" or ".join(SPLITS)} there is one file'
+    alone = {'properties': {'keep_files': {'description': one_file, 'maximum': 0}}}
+    in_memory = 'leave it out: with snapshot_seconds the run is kept in memory'
+    not_in_memory = 'leave it out: without snapshot_seconds nothing is kept in memory'
+    for_a_run = {'description': in_memory, 'maximum': 0}
+    for_memory = {'description': not_in_memory, 'maximum': 0}
+    return {
+        **whole,
+        'allOf': [
+            {'if': split, 'else': alone},
+            {
+                'if': _wanted('snapshot_seconds'),
+                'then': {'properties': dict.fromkeys(AS_THE_RUN_GOES, for_a_run)},
+                'else': {'properties': {'snapshot_bytes': for_memory}},
+            },
+        ],
+    }
+
+
+def _wanted(key: str) -> Schema:
+    """Return the schema of a mapping in which a number is given that is not 0."""
+    return {'required': [key], 'properties': {key: {'exclusiveMinimum': 0}}}
+
+
+def linkage_schema() -> Schema:
+    """Return the schema of a linkage file."""
+    whole = mapping('A planar linkage.', {**_keys(), **_shorthands()})
+    return {
+        '$schema': DIALECT,
+        'title': 'Linkage',
+        **whole,
+        'if': {'anyOf': [{'required': [shorthand]} for shorthand in _SHORTHANDS]},
+        'then': {'maxProperties': 1},
+        'else': {'required': list(_WRITTEN_OUT)},
+    }
+
+
+def _keys() -> dict[str, Schema]:
+    place = _point('where the point lies in the frame of its link: [x, y] [m]', FARTHEST)
+    return {
+        'links': named(
+            'Links, each with its points; a point on two links is a pin; one link is the ground.',
+            named('points of the link, by name', place),
+        ),
+        'input': _input(),
+        'assembly': named(
+            'Of each pin or slider that closes a dyad, the side on which it lies.',
+            _choice('the side', ('left', 'right', 'ahead', 'behind')),
+        ),
+        'sliders': named('Points that stay on lines of other links, by name.', _slider()),
+        'joints': {
+            **named('What is published, in this order, by name.', _joint()),
+            'minProperties': 1,
+        },
+        'traced': {
+            'description': 'Points whose paths are drawn.',
+            'type': 'array',
+            'items': _text('a point'),
+        },
+        'pose': _pose(),
+        'masses': named('What the links weigh, by their names.', _mass()),
+    }
+
+
+def _shorthands() -> dict[str, Schema]:
+    lengths = {
+        key: _number(f'{link} [m]', above=0.0, most=FARTHEST)
+        for key, link in zip('abcd', ('crank', 'coupler', 'rocker', 'ground'), strict=True)
+    }
+    left, ahead = ('left', 'right'), ('ahead', 'behind')
+    return {
+        'four_bar': mapping(
+            'A four-bar by the lengths of its links; stands for a file written out.',
+            {
+                **lengths,
+                'assembly': _choice('side of A→O4 on which B lies', left, left[0]),
+                **_limits_of('coupler_joint', 'rocker_joint'),
+            },
+            required=tuple(lengths),
+        ),
+        'inverted_slider_crank': mapping(
+            'A crank whose rod slides through a swivel; stands for a file written out.',
+            {
+                'a': _number('crank [m]', above=0.0, most=FARTHEST),
+                'swivel': _point("the swivel from the crank's pivot: [x, y] [m]", FARTHEST),
+                'assembly': _choice('side of B on which the swivel lies', ahead, ahead[0]),
+                **_limits_of('rod_joint', 'rod_slide'),
+            },
+            required=('a', 'swivel'),
+        ),
+    }
+
+
+def _input() -> Schema:
+    """Return the schema of one input, or a list of them."""
+    one = {
+        **mapping(
+            'The driven joint; several in a list.',
+            {
+                'joint': _text('its name in crank messages'),
+                'parent': _text('the link that carries the motor'),
+                'child': _text('the link that is turned'),
+                'slider': _text('the slider that is driven, in the place of parent and child'),
+                **_limits(),
+            },
+            required=('joint',),
+        ),
+        **_either_slider,
+    }
+    return {
+        'description': one['description'],
+        'if': {'type': 'array'},
+        'then': {'minItems': 1, 'items': one},
+        'else': one,
+    }
+
+
+def _joint() -> Schema:
+    return {
+        **mapping(
+            "The child's angle less the parent's [rad], or the slide of a slider [m].",
+            {
+                'parent': _text('the link from which the angle is measured'),
+                'child': _text('the link whose angle it is'),
+                'slider': _text('the slider, in the place of parent and child'),
+                **_limits(),
+            },
+        ),
+        **_either_slider,
+    }
+
+
+def _limits() -> dict[str, Schema]:
+    """Return the schemas of what a joint of the machine can do."""
+    return {
+        'limits': {
+            'description': 'between which the joint stays: [low, high] [rad or m]; '
+            '-.inf or .inf for no limit on a side',
+            'type': 'array',
+            'minItems': 2,
+            'maxItems': 2,
+            # The lower one may be -.inf, the upper one .inf: JSON Schema knows them as numbers.
+            'items': {'type': 'number'},
+        },
+        'velocity': _number('its greatest rate [rad/s or m/s]', above=0.0, most=FARTHEST),
+        'effort': _number('its greatest torque or force [N·m or N]', above=0.0, most=STRONGEST),
+    }
+
+
+def _limits_of(*joints: str) -> dict[str, Schema]:
+    """Return the schemas by which a shorthand gives its joints limits."""
+    return {
+        'input': mapping('What the driven joint can do.', _limits()),
+        'joints': mapping(
+            'What the published joints can do, by their names.',
+            {name: mapping('What the joint can do.', _limits()) for name in joints},
+        ),
+    }
+
+
+_either_slider: Schema = {
+    'if': {'required': ['slider']},
+    'then': {'properties': {'parent': False, 'child': False}},
+    'else': {'required': ['parent', 'child']},
+}
+
+
+def _slider() -> Schema:
+    return {
+        **mapping(
+            'A point that stays on a line of the link `along`.',
+            {
+                'point': _text('the point; no point of `along`'),
+                'along': _text('the link that carries the line'),
+                'through': _text('point of `along` on the line; the slide is measured from it'),
+                'direction': _point('of the line, in the frame of `along`: [x, y]', FARTHEST),
+                'block': {
+                    **_text('the link that slides without turning', f'^{CHARACTER}*$'),
+                    'default': '',
+                },
+                'angle': {
+                    **_number(
+                        'angle of the block less that of `along` [rad]',
+                        least=-FARTHEST,
+                        most=FARTHEST,
+                    ),
+                    'default': 0,
+                },
+            },
+            required=('point', 'along', 'through', 'direction'),
+        ),
+        'if': {'required': ['block']},
+        'else': {'properties': {'angle': False}},
+    }
+
+
+def _pose() -> Schema:
+    return mapping(
+        'Where the linkage starts; with points, where the iteration of links does that no dyad '
+        'covers.',
+        {
+            'inputs': {
+                'description': 'a value for each input [rad or m]',
+                'type': 'array',
+                'items': _number('a value', least=-FARTHEST, most=FARTHEST),
+            },
+            'points': named(
+                'points of iterated links in the frame of the ground, roughly',
+                _point('[x, y] [m]', FARTHEST),
+            ),
+        },
+        required=('inputs',),
+    )
+
+
+def _mass() -> Schema:
+    return mapping(
+        'What a link weighs.',
+        {
+            'mass': _number('mass [kg]', above=0.0, most=HEAVIEST),
+            'center': _point("centre of mass in the link's frame: [x, y] [m]", FARTHEST),
+            'inertia': _number(
+                'moment of inertia about the centre of mass [kg·m²]', least=0.0, most=HEAVIEST
+            ),
+        },
+        required=('mass', 'center', 'inertia'),
+    )
+
+
+def _choice(description: str, words: tuple[str, ...], default: str = '') -> Schema:
+    schema: Schema = {'description': description, 'enum': list(words)}
+    return {**schema, 'default': default} if default else schema

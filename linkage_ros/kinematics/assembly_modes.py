@@ -1,0 +1,144 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The other assemblies of links that are iterated: what else closes at the inputs of the pose.
+
+How many there are is not known beforehand (of a platform on three arms six at most; K. H. Hunt, J.
+Mech. Transm. Autom. Des. 105, 1983). They are searched for from starts that are drawn: random
+angles, and the places that then miss the constraints least. What is found are assemblies; that
+there are no others is not said.
+"""
+
+from __future__ import annotations
+
+from cmath import rect
+from math import tau
+from typing import NamedTuple, TYPE_CHECKING
+
+from linkage_ros.kinematics.newton_group import Iteration
+from linkage_ros.kinematics.structure import Iterated
+import numpy as np
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure
+    from linkage_ros.kinematics.equations import Array
+
+STARTS = 400
+_SEED = 1
+_SAME = 1e-6
+"""What angles [rad] and places [lengths] differ by at most and are one assembly."""
+
+
+class Assembly(NamedTuple):
+    """
+    An assembly at the inputs of the pose.
+
+    Attributes
+    ----------
+    points
+        Where the points lie that the pose names, in the frame of the ground, in [m].
+    turns
+        After how many whole turns of the input the pose's own branch comes to it; 0 where it does
+        not.
+
+    """
+
+    points: dict[str, complex]
+    turns: int
+
+
+def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
+    """
+    Return assemblies of an iterated group, at the inputs of the pose, other than that of the pose.
+
+    Parameters
+    ----------
+    closure
+        A linkage with a pose.
+    number
+        Of the group. What comes before it stays as it is.
+
+    """
+    group = closure.structure.groups[number]
+    assert isinstance(group, Iterated)
+    (step,) = (
+        step
+        for step, owner in zip(closure.steps, closure.step_groups, strict=True)
+        if owner == number and isinstance(step, Iteration)
+    )
+    found = _search(step)
+    if not found:
+        return []
+    own, *others = found
+    return [
+        Assembly(_places(closure, group, unknowns), _turns(closure, group, step, unknowns))
+        for unknowns in others
+        if not _same(unknowns, own)
+    ]
+
+
+def _search(step: Iteration) -> list[Array]:
+    """Return the solutions at the pose's inputs, the pose's own first."""
+    own = step.solution()
+    if own is None:
+        return []
+    found = [own]
+    rng = np.random.default_rng(_SEED)
+    for _ in range(STARTS):
+        angles = rng.uniform(-np.pi, np.pi, len(own) // 3)
+        solution = step.solution_from(angles)
+        if solution is not None and not any(_same(solution, one) for one in found):
+            found.append(solution)
+    return found
+
+
+def _same(one: Array, other: Array) -> bool:
+    away = one - other
+    away[0::3] -= tau * np.round(away[0::3] / tau)
+    return bool(np.abs(away).max() < _SAME)
+
+
+def _places(closure: Closure, group: Iterated, unknowns: Array) -> dict[str, complex]:
+    """Return where the points lie that the pose names on links of the group."""
+    pose = closure.linkage.pose
+    assert pose is not None
+    found = {}
+    for name in pose.points:
+        for body, link in enumerate(group.links):
+            points = closure.structure.links[link]
+            if name in points:
+                angle, x, y = unknowns.reshape(-1, 3)[body].tolist()
+                arm = complex(*points[name]) - complex(*next(iter(points.values())))
+                found[name] = complex(x, y) * closure.scale + arm * rect(1.0, angle)
+                break
+    return found
+
+
+def _turns(closure: Closure, group: Iterated, step: Iteration, unknowns: Array) -> int:
+    """Return after how many turns the branch of the pose comes to a solution, 0 for never."""
+    if len(step.inputs) > 1 or closure.linkage.inputs[0].slider:
+        return 0
+    branch = step.branch()
+    if branch is None:
+        return 0
+    low, high, _, turns = branch.interval
+    (x,) = step.inputs
+    last = turns - 1 if turns else int((high - x) // tau)
+    first = 0 if turns else -int((x - low) // tau)
+    for k in range(first, last + 1):
+        solution = step.solution_at(x + k * tau)
+        if k and solution is not None and _same(unknowns, solution):
+            return k
+    return 0

@@ -1,0 +1,154 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A linkage as C99 that also compiles as C++."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from linkage_ros.kinematics.compiling.source import (
+    GIVEN,
+    Language,
+    RETURNED,
+    STATUSES,
+    Subject,
+)
+from linkage_ros.kinematics.compiling.tape import Operation
+
+_NOTES = (
+    '',
+    'Values are written where the status has values; else the arrays stay as they were. Nothing',
+    'is allocated, and nothing is remembered: calls from several threads are safe. The digits are',
+    'those of linkage_ros where the compiler keeps to IEEE 754: -ffp-contract=off, and never',
+    '-ffast-math, which takes the checks out. It needs doubles of 64 bits and libm (-lm).',
+)
+
+_CHECK = ('#include <float.h>', '#include <math.h>', '', '#if DBL_MANT_DIG < 53',
+          '#error "double has fewer than 64 bits here"', '#endif')  # fmt: skip
+
+# Compilers make a product of a square, and other last digits than those of linkage_ros, which
+# calls pow().
+_TWO = 'two'
+_DECLARED_TWO = (
+    f'    const volatile double {_TWO} = 2.0;  /* pow() is called, as linkage_ros does */'
+)
+
+
+class C(Language):
+    """
+    The C language.
+
+    Parameters
+    ----------
+    name
+        What the names of the source begin with.
+    header
+        Whether the source is a header that is included, or a file that is compiled.
+
+    """
+
+    functions: ClassVar[dict[str, str]] = {'abs': 'fabs', '**': 'pow'}
+    infinity = 'INFINITY'
+
+    def __init__(self, name: str, *, header: bool) -> None:
+        self._name = name
+        self._header = header
+
+    def function(self, derivatives: int) -> str:
+        """Return the name of the function that gives so many derivatives."""
+        return f'{self._name}_{super().function(derivatives)}'
+
+    def call(self, operation: Operation, parts: list[str]) -> str:
+        """Write the call of a function."""
+        if operation.name == '**' and parts[1] == '2.0':
+            return f'pow({parts[0]}, {_TWO})'
+        return super().call(operation, parts)
+
+    def assigned(self, name: str, text: str, truth: bool = False) -> str:
+        """Write a line that gives a name to a number, or to a truth."""
+        return f'const {"int" if truth else "double"} {name} = {text};'
+
+    def commented(self, line: str, text: str) -> str:
+        """Write a comment behind a line."""
+        return f'{line}  /* {text} */'
+
+    def finite(self, name: str) -> str:
+        """Write that a number is finite."""
+        return f'isfinite({name})'
+
+    def rounded(self, text: str) -> str:
+        """Write the nearest whole number."""
+        return f'rint({text})'
+
+    def status(self, name: str) -> str:
+        """Write a status."""
+        return f'{self._name.upper()}_{name}'
+
+    def left(self, status: str) -> str:
+        """Write a line that returns a status, and no values."""
+        return f'return {status};'
+
+    def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
+        """Write lines that return a status and values."""
+        lines = [
+            f'{array}[{number}] = {text};'
+            for array, group in zip(RETURNED, groups, strict=False)
+            for number, text in enumerate(group)
+        ]
+        return [*lines, f'return {status};']
+
+    def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+        """Write the source."""
+        name, function = self._name, self.function(subject.derivatives)
+        driven, joints = len(subject.closure.linkage.inputs), len(subject.joints)
+        kind = f'enum {name}_status'
+        parameters = [
+            *(f'const double {array}[{driven}]' for array in GIVEN[: 1 + subject.derivatives]),
+            *(f'double {array}[{joints}]' for array in RETURNED[: 1 + subject.derivatives]),
+        ]
+        last = len(parameters) - 1
+        signature = [
+            f'{kind} {function}(',
+            *(f'    {each}{")" if i == last else ","}' for i, each in enumerate(parameters)),
+        ]
+        statuses = [f'    {self.status(status)} = {i},' for i, status in enumerate(STATUSES)]
+        statuses[-1] = statuses[-1].removesuffix(',')
+        listed = [f'{kind} {{', *statuses, '};']
+        two = [_DECLARED_TWO] if any(f'{_TWO})' in line for line in body) else []
+        definition = [*signature, '{', *two, *body, '}']
+        comment = ['/*', *(f' * {_harmless(line)}'.rstrip() for line in (*head, *_NOTES)), ' */']
+        if self._header:
+            guard, once = f'{function.upper()}_H', f'{name.upper()}_STATUS'
+            definition[0] = f'static inline {definition[0]}'
+            # Headers of one linkage with other derivatives have the statuses in common.
+            listed = [f'#ifndef {once}', f'#define {once}', *listed, f'#endif  /* {once} */']
+            lines = [
+                f'#ifndef {guard}', f'#define {guard}', '', *_CHECK, '', *listed, '', *definition,
+                '', f'#endif  /* {guard} */',
+            ]  # fmt: skip
+        else:
+            declared = ['#ifdef __cplusplus', 'extern "C" {', '#endif', *listed, *signature[:-1]]
+            declared += [f'{signature[-1]};', '#ifdef __cplusplus', '}', '#endif']
+            told = '/* What a caller declares: */'
+            lines = [*_CHECK, '', told, *declared, '', *definition]
+        return '\n'.join([*comment, '', *lines, ''])
+
+
+def _harmless(text: str) -> str:
+    """Return a text that neither ends a comment nor is a trigraph, whatever names are in it."""
+    for odd in ('*/', '/*', '??'):
+        text = text.replace(odd, ' '.join(odd))
+    return text.replace('\\', '/')

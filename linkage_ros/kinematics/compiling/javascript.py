@@ -1,0 +1,97 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A linkage as a module of JavaScript."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from linkage_ros.kinematics.compiling.source import (
+    GIVEN,
+    Language,
+    RETURNED,
+    STATUSES,
+    Subject,
+)
+
+_NOTES = (
+    '',
+    'It returns {status, joints, ...}: arrays, which are empty where the status has no values.',
+)
+
+_COPYSIGN = """
+function copysign(size, sign) {
+    const negative = sign < 0.0 || Object.is(sign, -0.0);
+    return negative ? -Math.abs(size) : Math.abs(size);
+}
+"""
+
+
+class JavaScript(Language):
+    """JavaScript as a module of ECMAScript 2015."""
+
+    functions: ClassVar[dict[str, str]] = {
+        '**': 'Math.pow',
+        **{name: f'Math.{name}' for name in ('abs', 'sin', 'cos', 'sqrt', 'atan2', 'hypot')},
+    }
+    infinity = 'Infinity'
+
+    def assigned(self, name: str, text: str, truth: bool = False) -> str:
+        """Write a line that gives a name to a number, or to a truth."""
+        return f'const {name} = {text};'
+
+    def commented(self, line: str, text: str) -> str:
+        """Write a comment behind a line."""
+        return f'{line}  // {text}'
+
+    def finite(self, name: str) -> str:
+        """Write that a number is finite."""
+        return f'Number.isFinite({name})'
+
+    def rounded(self, text: str) -> str:
+        """Write the nearest whole number."""
+        return f'Math.round({text})'
+
+    def status(self, name: str) -> str:
+        """Write a status."""
+        return f'Status.{name}'
+
+    def left(self, status: str) -> str:
+        """Write a line that returns a status, and no values."""
+        return f'return nothing({status});'
+
+    def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
+        """Write lines that return a status and values."""
+        arrays = (
+            f', {name}: [{", ".join(group)}]'
+            for name, group in zip(RETURNED, groups, strict=False)
+        )
+        return [f'return {{status: {status}{"".join(arrays)}}};']
+
+    def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+        """Write the source."""
+        given, returned = (names[: 1 + subject.derivatives] for names in (GIVEN, RETURNED))
+        empty = ', '.join(f'{name}: []' for name in returned)
+        comment = (f' * {line.replace("*/", "* /")}'.rstrip() for line in (*head, *_NOTES))
+        statuses = (f'    {status}: {number},' for number, status in enumerate(STATUSES))
+        name = self.function(subject.derivatives)
+        lines = [
+            '/*', *comment, ' */', '', 'export const Status = Object.freeze({', *statuses, '});',
+            '', 'function nothing(status) {', f'    return {{status, {empty}}};', '}',
+            *(_COPYSIGN.splitlines() if any('copysign(' in line for line in body) else ()), '',
+            f'export function {name}({", ".join(given)}) {{', *body, '}',
+        ]  # fmt: skip
+        return '\n'.join([*lines, ''])

@@ -1,0 +1,212 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A linkage, compiled for what is asked of it: a function that finds that and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice, product
+from math import inf, pi, tau
+from typing import NamedTuple, TYPE_CHECKING
+
+from linkage_ros.kinematics.compiling.python import Body, python_body, python_function, Values
+from linkage_ros.kinematics.compiling.trace import joints, moved, Path, traced, Wanted
+from linkage_ros.kinematics.ranges import iterated
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure
+
+_MOST_PATHS = 8
+"""So many a linkage has at most; where none holds, the plain steps answer."""
+
+_TRIED = 64
+"""At so many states paths are looked for."""
+
+_TRIED_ITERATED = 2
+"""And of an iterated linkage, of which one state may take a tenth of a second."""
+
+
+class Answer(NamedTuple):
+    """
+    What a compiled linkage says of a state.
+
+    Attributes
+    ----------
+    status, gap
+        As of a `Position`.
+    values
+        What was asked for, in groups; empty groups of what there is not.
+
+    """
+
+    status: Status
+    gap: float
+    values: Values
+
+
+class Compiled:
+    """
+    A linkage that is asked for certain numbers.
+
+    It answers to the last bit as the plain steps do: it is their arithmetic in a straight line.
+    Where that does not hold, at toggles, change points and where a loop is open, the plain steps
+    answer.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    derivatives
+        What it is asked for: positions (0), velocities too (1), and accelerations (2).
+    wanted
+        Which numbers of these; all published joints if not given.
+    within_limits
+        Whether a state with a joint beyond its limits is limited.
+
+    Attributes
+    ----------
+    driven
+        How many inputs it has.
+    derivatives, wanted
+        As given.
+    paths
+        The ways that the steps take where the linkage is closed. There is more than one where they
+        take different forms in different regions.
+    fast
+        Takes the inputs, their rates and their accelerations, one after the other; returns the
+        values, or None where the plain steps must answer.
+
+    """
+
+    def __init__(
+        self,
+        closure: Closure,
+        derivatives: int = 0,
+        wanted: Wanted = joints,
+        within_limits: bool = True,
+    ) -> None:
+        self._closure = closure
+        self._within_limits = within_limits
+        self.driven = len(closure.linkage.inputs)
+        self.derivatives = derivatives
+        self.wanted = wanted
+        self.paths: list[Path] = []
+        self._functions: list[Callable[..., Values | None]] = []
+        self._bodies: dict[str, Body] = {}
+        for inputs in _states(closure):
+            self._follow(inputs)
+        if not self.paths and (self.driven > 1 or closure.input_ranges):
+            # A search of its own, which takes longer.
+            self._follow(usual_inputs(closure))
+        self.fast: Callable[..., Values | None] = _first_of(self._functions)
+
+    def _follow(self, inputs: tuple[float, ...]) -> None:
+        """Add the path that the steps take at a state, if it is closed and they take a new one."""
+        more = (1.25,) * self.driven * self.derivatives
+        if len(self.paths) == _MOST_PATHS or any(
+            function(*inputs, *more) is not None for function in self._functions
+        ):
+            return
+        close = self._closure.position if self._within_limits else self._closure.posed
+        if close(*inputs).status is Status.CLOSED:
+            path = traced(
+                self._closure, inputs, self.derivatives, self.wanted, self._within_limits
+            )
+            if path.outputs:
+                self.paths.append(path)
+                self._functions.append(python_function(path))
+
+    def body(self, leave: str) -> Body:
+        """
+        Return its first path as lines of Python; they are written once.
+
+        Parameters
+        ----------
+        leave
+            The statement that leaves the lines where the path does not hold.
+
+        """
+        if leave not in self._bodies:
+            self._bodies[leave] = python_body(self.paths[0], leave)
+        return self._bodies[leave]
+
+    def __call__(self, *numbers: float) -> Answer:
+        """
+        Return the answer at a state.
+
+        Parameters
+        ----------
+        *numbers
+            The inputs, in [rad] or [m], then their rates and their accelerations.
+
+        Raises
+        ------
+        ValueError
+            Where a rate or an acceleration is not finite.
+
+        """
+        values = self.fast(*numbers)
+        if values is not None:
+            return Answer(Status.CLOSED, 0.0, values)
+        return self.plain(*numbers)
+
+    def plain(self, *numbers: float) -> Answer:
+        """Return the answer of the plain steps."""
+        given = list(zip(*[iter(numbers)] * self.driven, strict=True))
+        motion = moved(self._closure, given, self._within_limits)
+        status, gap = motion.position.status, motion.position.gap
+        found = tuple(tuple(group) for group in self.wanted(motion))
+        groups = len(self.paths[0].outputs) if self.paths else 1 + self.derivatives
+        return Answer(status, gap, (*found, *((),) * (groups - len(found))))
+
+
+def _first_of(
+    functions: Sequence[Callable[..., Values | None]],
+) -> Callable[..., Values | None]:
+    """Return what tries functions in turn, until one has an answer."""
+    if len(functions) == 1:
+        return functions[0]
+
+    def first(*numbers: float) -> Values | None:
+        for function in functions:
+            values = function(*numbers)
+            if values is not None:
+                return values
+        return None
+
+    return first
+
+
+def _states(closure: Closure) -> Iterator[tuple[float, ...]]:
+    """Yield inputs at which a linkage may be closed: its pose's, and others over its ranges."""
+    linkage = closure.linkage
+    if linkage.pose is not None:
+        yield linkage.pose.inputs
+    count = _TRIED_ITERATED if iterated(closure) else _TRIED
+    each = max(2, round(count ** (1.0 / len(linkage.inputs))))
+    ways = []
+    for given in linkage.inputs:
+        low, high = given.limits.low, given.limits.high
+        if given.slider:
+            far = 4.0 * closure.scale
+            low, high = max(low, -far), min(high, far)
+        else:
+            low = low if low > -inf else (high - tau if high < inf else 0.0)
+            high = high if high < inf else low + tau
+        # Not in a middle or at an end, where links may lie in one line.
+        ways.append([low + (high - low) * (i + 1.0 / pi) / each for i in range(each)])
+    yield from islice(product(*ways), count)

@@ -1,0 +1,359 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A path in the form in which arrays pass through it fastest.
+
+Each operation is a pass over an array. So constants are drawn together and signs taken in, sine
+and cosine of an angle come of one tangent, and a condition that the bounds of its numbers settle
+is not asked. Results may differ from those of the path in their last digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import inf, nan, tan
+import operator
+from typing import Any, Final, NamedTuple
+
+from linkage_ros.kinematics.compiling.tape import Kind, Operation
+from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
+import numpy as np
+
+Number = Any
+"""An operation, or a constant: a number, or whether a condition holds."""
+
+
+class Bounds(NamedTuple):
+    """Between which a number lies, but for its rounding."""
+
+    low: float = -inf
+    high: float = inf
+
+
+_ANY = Bounds()
+
+_COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
+    '<': operator.lt,
+    '<=': operator.le,
+    '>': operator.gt,
+    '>=': operator.ge,
+    '==': operator.eq,
+    '!=': operator.ne,
+}
+
+_TRUTHS: Final = frozenset((*_COMPARED, 'and', 'or', 'not'))
+
+_CLEAR: Final = 1e-9
+"""Numbers this far apart, as a part of themselves, are so however they are rounded."""
+
+
+def _tangent_is_close() -> bool:
+    """
+    Return whether numpy's tangent is right to its last digit, here.
+
+    Of the vectorised ones some are 3 ulp off; sine and cosine, which take longer, never are.
+    """
+    angles = np.linspace(-1.5, 1.5, 1000)
+    return all(
+        abs(found - exact) <= 2.5 * UNIT_ROUNDOFF * abs(exact)
+        for found, exact in zip(np.tan(angles).tolist(), map(tan, angles.tolist()), strict=True)
+    )
+
+
+_BY_TANGENT = _tangent_is_close()
+
+
+class ArrayForm:
+    """
+    Writes operations anew.
+
+    Parameters
+    ----------
+    given
+        Rates and accelerations by name that are 0 or 1.
+
+    """
+
+    def __init__(self, given: Mapping[str, int]) -> None:
+        self._given = given
+        self._known: dict[tuple[Any, ...], Operation] = {}
+        self._bounds: dict[Operation, Bounds] = {}
+        self._written: dict[Operation, Number] = {}
+
+    def number(self, root: Number) -> Number:
+        """Return an operation of a path in its new form, or a constant that it has become."""
+        if not isinstance(root, Operation):
+            return root
+        waiting = [root]
+        while waiting:
+            operation = waiting[-1]
+            needed = [one for one in operation.operands() if one not in self._written]
+            if needed:
+                waiting += needed
+                continue
+            waiting.pop()
+            if operation not in self._written:
+                self._written[operation] = self._write(operation)
+        return self._written[root]
+
+    def opposite(self, condition: Number) -> Number:
+        """Return the condition that one does not hold."""
+        return (not condition) if _constant(condition) else self._new('not', condition)
+
+    def both(self, one: Number, other: Number) -> Number:
+        """Return the condition that two hold."""
+        for first, second in ((one, other), (other, one)):
+            if _constant(first):
+                return second if first else False
+        return self._new('and', one, other)
+
+    def either(self, one: Number, other: Number) -> Number:
+        """Return the condition that one of two holds."""
+        for first, second in ((one, other), (other, one)):
+            if _constant(first):
+                return True if first else second
+        return self._new('or', one, other)
+
+    def where(self, condition: Number, one: Number, other: Number) -> Number:
+        """Return the one number where a condition holds, the other where not."""
+        if _constant(condition):
+            return one if condition else other
+        if one is other:
+            return one
+        greater = condition.name in ('>', '>=')
+        if greater or condition.name in ('<', '<='):
+            if condition.arguments == (one, other):
+                return self._new('maximum' if greater else 'minimum', one, other)
+            if condition.arguments == (other, one):
+                return self._new('minimum' if greater else 'maximum', one, other)
+        (low, high), (other_low, other_high) = self._between(one), self._between(other)
+        return self._new(
+            'where', condition, one, other,
+            bounds=Bounds(min(low, other_low), max(high, other_high)),
+        )  # fmt: skip
+
+    def _write(self, operation: Operation) -> Number:
+        name = operation.name
+        if operation.is_input:
+            known = self._given.get(name)
+            return self._new(name) if known is None else known
+        given = [self._written[a] if isinstance(a, Operation) else a for a in operation.arguments]
+        match name:
+            case '+':
+                return self._add(*given)
+            case '-':
+                return self._subtract(*given)
+            case '*':
+                return self._multiply(*given)
+            case '/':
+                return self._divide(*given)
+            case '**':
+                return self._power(*given)
+            case 'negative':
+                return self._negative(*given)
+            case 'sin' | 'cos':
+                return self._sine_cosine(*given)[name == 'cos']
+            case 'where':
+                return self.where(*given)
+            case 'abs':
+                return self._absolute(*given)
+            case 'sqrt':
+                return self._root(*given)
+        if name in _COMPARED:
+            return self._compare(name, *given)
+        return self._new(name, *given)
+
+    def _add(self, one: Number, other: Number) -> Number:
+        if _constant(one) and _constant(other):
+            return one + other
+        for first, second in ((one, other), (other, one)):
+            if _constant(first) and first == 0.0:
+                return second
+            if (positive := _negated(second)) is not None:
+                return self._subtract(first, positive)
+        (low, high), (other_low, other_high) = self._between(one), self._between(other)
+        return self._new(
+            '+', *_ordered(one, other), bounds=Bounds(low + other_low, high + other_high)
+        )
+
+    def _subtract(self, one: Number, other: Number) -> Number:
+        if _constant(one) and _constant(other):
+            return one - other
+        if _constant(other) and other == 0.0:
+            return one
+        if _constant(one) and one == 0.0:
+            return self._negative(other)
+        if (positive := _negated(other)) is not None:
+            return self._add(one, positive)
+        if (positive := _negated(one)) is not None:
+            return self._negative(self._add(positive, other))
+        (low, high), (other_low, other_high) = self._between(one), self._between(other)
+        return self._new('-', one, other, bounds=Bounds(low - other_high, high - other_low))
+
+    def _negative(self, one: Number) -> Number:
+        if _constant(one):
+            return -one
+        if one.name == '-':
+            return self._subtract(*reversed(one.arguments))
+        return self._multiply(-1.0, one)
+
+    def _multiply(self, one: Number, other: Number) -> Number:
+        (factor, one), (more, other) = _split(one), _split(other)
+        if _nothing(factor) or _nothing(more):
+            return 0
+        return self._scaled(factor * more, self._product(one, other))
+
+    def _product(self, one: Number, other: Number) -> Number:
+        if one is None or other is None:
+            return one if other is None else other
+        bounds = _ANY
+        ends = [p * q for p in self._between(one) for q in self._between(other)]
+        if all(abs(end) < inf for end in ends):
+            bounds = Bounds(min(ends), max(ends))
+        if one is other:
+            bounds = bounds._replace(low=0.0)
+            if bounds.high < inf and self._between(one).low > 0.0:
+                bounds = bounds._replace(low=self._between(one).low ** 2)
+        return self._new('*', *_ordered(one, other), bounds=bounds)
+
+    def _divide(self, one: Number, other: Number) -> Number:
+        (factor, one), (divisor, other) = _split(one), _split(other)
+        if _nothing(factor):
+            return 0
+        if divisor == 0.0:
+            # Off the way that the steps take.
+            return nan
+        factor /= divisor
+        if other is None:
+            return self._scaled(factor, one)
+        if one is None:
+            return self._new('/', factor, other)
+        return self._scaled(factor, self._new('/', one, other))
+
+    def _scaled(self, factor: float, one: Number) -> Number:
+        """Return a factor times what has none."""
+        if one is None or factor == 1.0:
+            return factor if one is None else one
+        if factor == -1.0 and one.name == '-':
+            return self._subtract(*reversed(one.arguments))
+        if one.name == '/' and _constant(one.arguments[0]):
+            return self._new('/', factor * one.arguments[0], one.arguments[1])
+        ends = [factor * end for end in self._between(one)]
+        return self._new('*', factor, one, bounds=Bounds(min(ends), max(ends)))
+
+    def _power(self, one: Number, power: int) -> Number:
+        """Return a whole power, as products."""
+        if power == 1:
+            return one
+        half = self._power(one, power // 2)
+        square = self._multiply(half, half)
+        return self._multiply(square, one) if power % 2 else square
+
+    def _sine_cosine(self, angle: Number) -> tuple[Number, Number]:
+        """
+        Return the sine and the cosine of an angle.
+
+        The cosine is right to the last digit of 1, not of itself. numpy's tangent is vectorised
+        where its sine and cosine are not: it takes a tenth of them both.
+        """
+        if not _BY_TANGENT:
+            unit = Bounds(-1.0, 1.0)
+            return self._new('sin', angle, bounds=unit), self._new('cos', angle, bounds=unit)
+        # With t = tan(angle/2): 2t/(1 + t²) and (1 − t²)/(1 + t²).
+        tangent = self._new('tan', self._multiply(0.5, angle))
+        square = self._multiply(tangent, tangent)
+        more = self._add(1.0, square)
+        half_sine = self._new('/', tangent, more, bounds=Bounds(-0.5, 0.5))
+        cosine = self._new('/', self._subtract(1.0, square), more, bounds=Bounds(-1.0, 1.0))
+        return self._multiply(2.0, half_sine), cosine
+
+    def _absolute(self, one: Number) -> Number:
+        if _constant(one):
+            return abs(one)
+        low, high = self._between(one)
+        if low >= 0.0:
+            return one
+        if high <= 0.0:
+            return self._negative(one)
+        return self._new('abs', one, bounds=Bounds(0.0, max(-low, high)))
+
+    def _root(self, one: Number) -> Number:
+        if not _constant(one) and one.name == '*' and one.arguments[0] is one.arguments[1]:
+            return self._absolute(one.arguments[0])
+        low, high = self._between(one)
+        return self._new('sqrt', one, bounds=Bounds(max(low, 0.0) ** 0.5, max(high, 0.0) ** 0.5))
+
+    def _compare(self, name: str, one: Number, other: Number) -> Number:
+        if _constant(one) and _constant(other):
+            return _COMPARED[name](one, other)
+        (low, high), (other_low, other_high) = self._between(one), self._between(other)
+        if _clear(high, other_low):
+            return _COMPARED[name](0.0, 1.0)
+        if _clear(other_high, low):
+            return _COMPARED[name](1.0, 0.0)
+        return self._new(name, one, other)
+
+    def _between(self, number: Number) -> Bounds:
+        if _constant(number):
+            return Bounds(number, number)
+        return self._bounds[number]
+
+    def _new(self, name: str, *arguments: Number, bounds: Bounds = _ANY) -> Operation:
+        key = (name, *(a.number if isinstance(a, Operation) else repr(a) for a in arguments))
+        found = self._known.get(key)
+        if found is None:
+            kind: Kind = 'truth' if name in _TRUTHS else 'real'
+            found = Operation(name, arguments, kind, len(self._known), None)
+            self._known[key] = found
+            self._bounds[found] = bounds
+        return found
+
+
+def _constant(number: Number) -> bool:
+    return not isinstance(number, Operation)
+
+
+def _nothing(number: Number) -> bool:
+    """Return whether a number is the 0 of what is given, whose sign does not matter."""
+    return isinstance(number, int) and number == 0
+
+
+def _split(number: Number) -> tuple[float, Number]:
+    """Return the constant factor of a number, and the rest, None where there is none."""
+    if _constant(number):
+        return number, None
+    if number.name == '*' and _constant(number.arguments[0]):
+        factor, rest = number.arguments
+        return factor, rest
+    return 1.0, number
+
+
+def _negated(number: Number) -> Number:
+    """Return what a number is the negative of, if it is one."""
+    if not _constant(number) and number.name == '*' and number.arguments[0] == -1.0:
+        return number.arguments[1]
+    return None
+
+
+def _ordered(one: Operation, other: Operation) -> tuple[Number, Number]:
+    """Return two terms or factors in the one order in which they are written."""
+    if _constant(one) or _constant(other):
+        return (one, other) if _constant(one) else (other, one)
+    return (one, other) if one.number <= other.number else (other, one)
+
+
+def _clear(less: float, more: float) -> bool:
+    """Return whether one number is less than another however both are rounded."""
+    return more - less > _CLEAR * max(abs(less), abs(more)) and less < inf and more > -inf

@@ -1,0 +1,161 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A path as a Python function: a straight line of arithmetic."""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Callable
+import math
+from typing import Any, NamedTuple
+
+from linkage_ros.generated_code import written
+from linkage_ros.kinematics.compiling.tape import Operation
+from linkage_ros.kinematics.compiling.trace import Path
+from linkage_ros.kinematics.compiling.writer import Writer
+
+Values = tuple[tuple[float, ...], ...]
+
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    'sin': math.sin,
+    'cos': math.cos,
+    'sqrt': math.sqrt,
+    'atan2': math.atan2,
+    'copysign': math.copysign,
+    'remainder': math.remainder,
+    'phase': cmath.phase,
+    'rect': cmath.rect,
+    'abs': abs,
+    'complex': complex,
+    # The root that abs() of a complex number gives; that of math.hypot() has other last digits.
+    'hypot': lambda x, y: abs(complex(x, y)),
+}
+_ATTRIBUTES = frozenset(('real', 'imag'))
+
+
+class Body(NamedTuple):
+    """
+    A path as lines of Python.
+
+    Attributes
+    ----------
+    lines
+        They start from the inputs, by the names that these have in the path.
+    outputs
+        The expressions of the outputs, in groups; they come after the lines.
+    bound
+        What the lines and expressions name.
+
+    """
+
+    lines: list[str]
+    outputs: list[list[str]]
+    bound: dict[str, Any]
+
+
+def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]:
+    """
+    Return a path as the source of a Python function, and what it names.
+
+    The function takes the inputs and returns the outputs, in groups; None where the path does not
+    hold.
+    """
+    lines, outputs, bound = python_body(path, 'return None')
+    groups = [f'({", ".join(group)},)' if group else '()' for group in outputs]
+    parameters = ', '.join(given.name for given in path.inputs)
+    text = [f'def {name}({parameters}):', *(f'    {line}' for line in lines)]
+    returned = f'{", ".join(groups)},' if groups else '()'
+    return '\n'.join([*text, f'    return {returned}', '']), bound
+
+
+def python_body(path: Path, leave: str) -> Body:
+    """
+    Return a path as lines of Python.
+
+    Parameters
+    ----------
+    path
+        The path.
+    leave
+        The statement that leaves the lines where the path does not hold.
+
+    """
+    constants: dict[str, Any] = {}
+    conditions = [decision.condition for decision in path.decisions]
+    outputs = [number for group in path.outputs for number in group]
+
+    def constant(value: Any) -> str:
+        if isinstance(value, int | float) and math.isfinite(value):
+            return repr(value)
+        known = f'k{len(constants)}'
+        constants[known] = value
+        return known
+
+    def call(operation: Operation, parts: list[str]) -> str:
+        if operation.name in _ATTRIBUTES:
+            return f'{_atom(parts[0])}.{operation.name}'
+        if operation.name == 'conjugate':
+            return f'{_atom(parts[0])}.conjugate()'
+        if operation.name == 'facing':
+            return f'rect(1.0, {parts[0]})'
+        if operation.name == 'vector':
+            return f'complex({parts[0]}, {parts[1]})'
+        if operation.name == '**':
+            return f'({parts[0]}) ** {parts[1]}'
+        if operation.name == 'item':
+            return f'{_atom(parts[0])}[{parts[1]}]'
+        if operation.name == 'finite':
+            return '(' + ' and '.join(f'{_atom(p)} - {_atom(p)} == 0.0' for p in parts) + ')'
+        if operation.name == 'found':
+            return f'({parts[0]} is not None)'
+        if operation.name == 'call':
+            return f'{parts[0]}({", ".join(parts[1:])})'
+        return f'{operation.name}({", ".join(parts)})'
+
+    writer = Writer(
+        [*conditions, *outputs],
+        constant,
+        call,
+        lambda condition, one, other: f'{one} if {condition} else {other}',
+        lambda known, text, _: f'{known} = {text}',
+    )
+    for given in path.inputs:
+        writer.name(given, given.name)
+    if any(map(_of_inputs, conditions)):
+        # 0 of finite numbers, and NaN of all others; where the sum is too great, it is in doubt.
+        total = ' + '.join(given.name for given in path.inputs)
+        writer.lines += [f'total = {total}', 'if total - total != 0.0:', f'    {leave}']
+    for condition, held in path.decisions:
+        if not _of_inputs(condition):
+            text = writer.write(condition)
+            writer.lines += [f'if not ({text}):' if held else f'if {text}:', f'    {leave}']
+    groups = [[writer.write(number) for number in group] for group in path.outputs]
+    return Body(writer.lines, groups, {**_FUNCTIONS, **constants})
+
+
+def python_function(path: Path) -> Callable[..., Values | None]:
+    """Return a path as a function of its inputs that returns its outputs; None as above."""
+    source, bound = python_source(path)
+    solve: Callable[..., Values | None] = written(source, 'solve', bound)
+    return solve
+
+
+def _of_inputs(condition: Operation) -> bool:
+    """Return whether a condition is that inputs are finite numbers."""
+    return condition.name == 'finite' and all(one.is_input for one in condition.operands())
+
+
+def _atom(text: str) -> str:
+    return text if text.isidentifier() else f'({text})'

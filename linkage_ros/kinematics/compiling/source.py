@@ -1,0 +1,403 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A linkage as source that stands alone: what is alike in C, JavaScript and Python.
+
+The source is a head that explains it, and one function: it takes the inputs, and their rates and
+accelerations as far as these are asked for, and returns a status and the joints.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from math import hypot, inf, isfinite, tau
+import textwrap
+from typing import Any, ClassVar, NamedTuple
+
+from linkage_ros import __version__
+from linkage_ros.errors import clean
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiling.tape import Operation
+from linkage_ros.kinematics.compiling.trace import Motion
+from linkage_ros.kinematics.compiling.tree import Branch, Program, program, Solved, Tree
+from linkage_ros.kinematics.compiling.writer import uses, Writer
+from linkage_ros.kinematics.limits import Bound
+from linkage_ros.kinematics.linkage import RevoluteJoint
+from linkage_ros.kinematics.rounding import ROUNDING, SMALLEST
+from linkage_ros.kinematics.status import Status
+
+WIDTH = 99
+"""Of the lines of a source."""
+
+FUNCTIONS = ('position', 'velocity', 'motion')
+"""What the function is called, by how many derivatives it gives."""
+
+GIVEN = ('inputs', 'rates', 'accelerations')
+RETURNED = ('joints', 'joint_rates', 'joint_accelerations')
+
+UNDECIDED = 'UNDECIDED'
+
+STATUSES = {
+    Status.CLOSED.name: 'Every loop closes; the values are valid.',
+    Status.CHANGE_POINT.name: 'All links of a loop lie in one line; the values are valid: those '
+    'of the motion that passes through.',
+    Status.LIMITED.name: 'A joint is beyond its limits; the values are valid.',
+    Status.TOGGLE.name: 'Two links are stretched or folded, and have no rates. No values. Whether '
+    'loops behind them are open is not told.',
+    Status.OPEN.name: 'Links do not reach each other. No values.',
+    Status.INDETERMINATE.name: 'A number that was given is not finite, or two pins coincide, so '
+    'that no direction can be told. No values.',
+    UNDECIDED: 'This code cannot tell, only linkage_ros itself can. No values.',
+}
+"""The statuses of a source, in the order of their numbers, and what they say."""
+
+_PLAIN = frozenset((0.0, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, inf))
+"""Constants that need no name."""
+
+_THRESHOLDS = {SMALLEST: 'smallest', ROUNDING: 'rounding'}
+"""What is smaller counts as 0, and the rounding error of a sum relative to its terms."""
+
+
+class Subject(NamedTuple):
+    """
+    What is compiled.
+
+    Attributes
+    ----------
+    closure
+        The linkage.
+    name
+        Of the linkage; of a C source an identifier.
+    file
+        From which the linkage was read.
+    derivatives
+        What is worked out: positions (0), velocities too (1), and accelerations (2).
+    joints
+        The published joints that are asked for.
+
+    """
+
+    closure: Closure
+    name: str
+    file: str
+    derivatives: int
+    joints: tuple[str, ...]
+
+
+class Language(ABC):
+    """How the parts of a source are written."""
+
+    functions: ClassVar[dict[str, str]] = {}
+    """Functions that have another name than on the tape."""
+    infinity: ClassVar[str]
+    conjunction: ClassVar[str] = '&&'
+    disjunction: ClassVar[str] = '||'
+
+    def constant(self, value: Any) -> str:
+        """Write a number."""
+        if not isfinite(value):
+            return self.infinity if value > 0.0 else f'-{self.infinity}'
+        return repr(float(value))
+
+    def call(self, operation: Operation, parts: list[str]) -> str:
+        """Write the call of a function."""
+        return f'{self.functions.get(operation.name, operation.name)}({", ".join(parts)})'
+
+    def choice(self, condition: str, one: str, other: str) -> str:
+        """Write a choice between two expressions."""
+        return f'{condition} ? {one} : {other}'
+
+    def negated(self, condition: str) -> str:
+        """Write that a condition does not hold, which is also so of numbers that are none."""
+        return f'!{condition}' if condition.isidentifier() else f'!({condition})'
+
+    def block(self, condition: str, lines: Sequence[str]) -> list[str]:
+        """Write lines that are run where a condition holds."""
+        return [f'if ({condition}) {{', *(f'    {line}' for line in lines), '}']
+
+    def wrapped(self, line: str) -> list[str]:
+        """Break a line of code that is too long."""
+        code = line.lstrip()
+        indent = ' ' * (len(line) - len(code))
+        return textwrap.wrap(
+            code, WIDTH, initial_indent=indent, subsequent_indent=f'{indent}    ',
+            break_long_words=False, break_on_hyphens=False,
+        )  # fmt: skip
+
+    def function(self, derivatives: int) -> str:
+        """Return the name of the function that gives so many derivatives."""
+        return FUNCTIONS[derivatives]
+
+    @abstractmethod
+    def assigned(self, name: str, text: str, truth: bool = False) -> str:
+        """Write a line that gives a name to a number, or to a truth."""
+
+    @abstractmethod
+    def commented(self, line: str, text: str) -> str:
+        """Write a comment behind a line."""
+
+    @abstractmethod
+    def finite(self, name: str) -> str:
+        """Write that a number is finite."""
+
+    @abstractmethod
+    def rounded(self, text: str) -> str:
+        """Write the nearest whole number."""
+
+    @abstractmethod
+    def status(self, name: str) -> str:
+        """Write a status."""
+
+    @abstractmethod
+    def left(self, status: str) -> str:
+        """Write a line that returns a status, and no values."""
+
+    @abstractmethod
+    def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
+        """Write lines that return a status and values."""
+
+    @abstractmethod
+    def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
+        """Write the source: its head is text, the body is that of the function."""
+
+
+def source(subject: Subject, language: Language) -> str:
+    """
+    Return a linkage as the source of a program.
+
+    Parameters
+    ----------
+    subject
+        What is compiled.
+    language
+        The language.
+
+    Raises
+    ------
+    DefinitionError
+        Where the linkage cannot be compiled.
+
+    """
+    closure = subject.closure
+    names = list(closure.linkage.joints)
+    asked = [names.index(name) for name in subject.joints]
+    bounded = [bound.number for bound in closure.bounds.joints]
+
+    def wanted(motion: Motion) -> list[list[float]]:
+        groups = [[part.joints[i] for i in asked] for part in motion if part is not None]
+        return [*groups, [motion.position.joints[i] for i in bounded]]
+
+    found = program(closure, subject.derivatives, wanted)
+    body = _Body(subject, language, found)
+    head = _head(subject, language.function(subject.derivatives))
+    return language.whole(subject, list(head), body.lines())
+
+
+class _Body:
+    """Writes the lines of the function."""
+
+    def __init__(self, subject: Subject, language: Language, found: Program) -> None:
+        self._language = language
+        self._subject = subject
+        self._program = found
+        roots = list(_roots(found.tree))
+        self._lengths = _lengths(subject.closure)
+        self._often = Counter(_constants(roots))
+        self._named: dict[float, str] = {}
+        self._writer = Writer(
+            roots,
+            self._constant,
+            language.call,
+            language.choice,
+            lambda name, text, operation: language.assigned(name, text, operation.kind == 'truth'),
+        )
+
+    def lines(self) -> list[str]:
+        """Return all lines, indented."""
+        language = self._language
+        inputs = self._program.inputs
+        count = len(self._subject.closure.linkage.inputs)
+        given = []
+        for number, operation in enumerate(inputs):
+            array, index = divmod(number, count)
+            given.append(language.assigned(operation.name, f'{GIVEN[array]}[{index}]'))
+            self._writer.name(operation, operation.name)
+        finite = f' {language.conjunction} '.join(language.finite(o.name) for o in inputs)
+        leave = language.left(language.status(Status.INDETERMINATE.name))
+        given += language.block(language.negated(finite), [leave])
+        self._follow(self._program.tree)
+        constants = []
+        for value, name in self._named.items():
+            line = language.assigned(name, language.constant(value))
+            if value in self._lengths:
+                length = value * self._subject.closure.scale
+                line = language.commented(line, f'{length:.9g} m')
+            constants.append(line)
+        code = (f'    {line}' for line in (*given, *self._writer.lines))
+        wrapped = (part for line in code for part in language.wrapped(line))
+        return [*(f'    {line}' for line in constants), *wrapped]
+
+    def _follow(self, tree: Tree) -> None:
+        """Write a tree: what is usual goes straight on, all else is a block that returns."""
+        language, writer = self._language, self._writer
+        while isinstance(tree, Branch):
+            condition = writer.write(tree.condition)
+            usual, other = tree.held, tree.failed
+            if tree.usual:
+                condition = language.negated(condition)
+            else:
+                usual, other = other, usual
+            with writer.block() as lines:
+                self._follow(other)
+            writer.lines += language.block(condition, lines)
+            tree = usual
+        if isinstance(tree, Solved):
+            self._solved(tree)
+        else:
+            status = UNDECIDED if tree is None else tree.name
+            writer.lines.append(language.left(language.status(status)))
+
+    def _solved(self, leaf: Solved) -> None:
+        language, writer = self._language, self._writer
+        *groups, bounded = leaf.outputs
+        bounds = self._subject.closure.bounds
+        beyond = [self._beyond(bound, f'q{bound.number}') for bound in bounds.inputs]
+        for number, (bound, value) in enumerate(zip(bounds.joints, bounded, strict=True)):
+            name = f'limited{number}'
+            writer.lines.append(language.assigned(name, writer.write(value)))
+            if isinstance(value, Operation):
+                writer.name(value, name)
+            beyond.append(self._beyond(bound, name))
+        texts = [[writer.write(number) for number in group] for group in groups]
+        status = language.status(leaf.status.name)
+        if beyond:
+            condition = f' {language.disjunction} '.join(beyond)
+            status = language.choice(condition, language.status(Status.LIMITED.name), status)
+        writer.lines += language.solved(status, texts)
+
+    def _beyond(self, bound: Bound, name: str) -> str:
+        """Write that a value is beyond its limits, as `Bound.beyond` finds it."""
+        language = self._language
+
+        def compared(value: str) -> str:
+            low, high = language.constant(bound.low), language.constant(bound.high)
+            return f'({value} < {low} {language.disjunction} {value} > {high})'
+
+        if bound.middle is None:
+            return compared(name)
+        middle, turn = language.constant(bound.middle), language.constant(tau)
+        turns = language.rounded(f'({name} - {middle}) / {turn}')
+        turned = f'{name}_turned'
+        self._writer.lines.append(language.assigned(turned, f'{name} - {turn} * {turns}'))
+        return f'({compared(name)} {language.conjunction} {compared(turned)})'
+
+    def _constant(self, value: float) -> str:
+        text = self._language.constant(value)
+        name = self._lengths.get(value) or _THRESHOLDS.get(value)
+        if abs(value) in _PLAIN or (self._often[value] < 2 and not name):
+            return text
+        if value not in self._named:
+            self._named[value] = name or f'k{len(self._named)}'
+        return self._named[value]
+
+
+def _roots(tree: Tree) -> Iterator[Any]:
+    """Yield all conditions and outputs of a tree."""
+    if isinstance(tree, Branch):
+        yield tree.condition
+        yield from _roots(tree.held)
+        yield from _roots(tree.failed)
+    elif isinstance(tree, Solved):
+        for group in tree.outputs:
+            yield from group
+
+
+def _constants(roots: Sequence[Any]) -> Iterator[float]:
+    """Yield the constants of what the roots need, as often as they are written."""
+    for operation in uses(roots):
+        for argument in operation.arguments:
+            if not isinstance(argument, Operation):
+                yield argument
+
+
+def _lengths(closure: Closure) -> dict[float, str]:
+    """Return names of the lengths of links, by their values in the unit of the steps."""
+    found: dict[float, set[str]] = defaultdict(set)
+    for link, points in closure.linkage.links.items():
+        for (one, (x, y)), (other, (u, v)) in combinations(points.items(), 2):
+            found[hypot(u - x, v - y) / closure.scale].add(f'{link}_{one}_{other}')
+        for point, place in points.items():
+            for axis, value in zip('xy', place, strict=True):
+                found[value / closure.scale].add(f'{link}_{point}_{axis}')
+    # What several have in common is named after none.
+    names = {value: names.pop() for value, names in found.items() if len(names) == 1}
+    often = Counter(names.values())
+    return {
+        value: f'length_{name}'
+        for value, name in names.items()
+        if name.isascii() and name.isidentifier() and often[name] == 1
+    }
+
+
+def _head(subject: Subject, function: str) -> Iterator[str]:
+    """Yield the lines of the head."""
+    closure = subject.closure
+    linkage = closure.linkage
+    yield f'{clean(subject.name)}: a planar linkage, written by linkage_ros {__version__}'
+    yield f'from {clean(subject.file)}. Change that file, and compile it again.'
+    yield ''
+    yield f'The function {function} takes:'
+    for number, given in enumerate(linkage.inputs):
+        unit = 'm' if given.slider else 'rad'
+        yield f'  {GIVEN[0]}[{number}]  {clean(given.joint)} [{unit}]'
+    yield from _derived(subject, GIVEN)
+    yield 'and gives:'
+    for number, name in enumerate(subject.joints):
+        unit = 'rad' if isinstance(linkage.joints[name], RevoluteJoint) else 'm'
+        yield f'  {RETURNED[0]}[{number}]  {clean(name)} [{unit}]'
+    yield from _derived(subject, RETURNED)
+    yield ''
+    yield 'Angles are not wrapped to one turn. The function returns a status:'
+    for number, (name, text) in enumerate(STATUSES.items()):
+        yield from textwrap.wrap(
+            text, WIDTH - 4, initial_indent=f'  {number} {name}: ', subsequent_indent='      '
+        )
+    yield ''
+    if closure.bounds:
+        yield 'Limits that are checked, in [rad] or [m]:'
+        for name, limits in linkage.limits.items():
+            if limits.bounded:
+                yield f'  {clean(name)} {limits}'
+    else:
+        yield 'The linkage file names no limits of joints.'
+    yield ''
+    yield 'The links have these points, in their own frames, in [m]:'
+    for link, points in linkage.links.items():
+        text = ', '.join(f'{clean(p)} ({x:.9g}, {y:.9g})' for p, (x, y) in points.items())
+        yield from textwrap.wrap(
+            f'  {clean(link)}: {text}', WIDTH - 4, subsequent_indent='      ',
+            break_on_hyphens=False,
+        )  # fmt: skip
+    yield f'Lengths in the code are in units of {closure.scale:.9g} m. The constants k0, k1 and so'
+    yield 'on are what the solution makes of them.'
+
+
+def _derived(subject: Subject, names: Sequence[str]) -> Iterator[str]:
+    per = ('', 'per second', 'per second squared')
+    for order in range(1, 1 + subject.derivatives):
+        yield f'  {names[order]}[]  of the same, {per[order]}'

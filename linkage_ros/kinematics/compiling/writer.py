@@ -1,0 +1,166 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Operations in the order in which a program does them, and how an expression is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from linkage_ros.kinematics.compiling.tape import Operation
+
+_DEEPEST = 12
+"""How deep an expression is nested at most: compilers have limits, and readers, too."""
+
+_PRECEDENCE = {'+': 4, '-': 4, '*': 5, '/': 5, 'negative': 6, '**': 7}
+_COMPARISONS = frozenset(('<', '<=', '>', '>=', '==', '!='))
+
+
+def uses(roots: Iterable[Any]) -> dict[Operation, int]:
+    """Return how often each operation is used by others that the roots need, or as a root."""
+    found: dict[Operation, int] = {}
+    waiting = [root for root in roots if isinstance(root, Operation)]
+    for root in waiting:
+        found[root] = found.get(root, 0) + 1
+    seen = set()
+    while waiting:
+        operation = waiting.pop()
+        if operation not in seen:
+            seen.add(operation)
+            for operand in operation.operands():
+                found[operand] = found.get(operand, 0) + 1
+                waiting.append(operand)
+    return found
+
+
+class Text(NamedTuple):
+    """An expression: its text, how tightly it binds, and how deep it is nested."""
+
+    text: str
+    precedence: int
+    depth: int
+
+    def within(self, precedence: int) -> str:
+        """Return it as a part of an expression that binds so tightly."""
+        return self.text if self.precedence >= precedence else f'({self.text})'
+
+
+_ATOM = 9
+
+
+class Writer:
+    """
+    Writes operations as lines of a language that has C's operators.
+
+    What is used once stands where it is used; what is used more often has a name.
+
+    Parameters
+    ----------
+    roots
+        All that the program needs: its conditions and its outputs.
+    constant
+        Writes a constant.
+    call
+        Writes the call of a function, given its name and its arguments.
+    choice
+        Writes a choice between two expressions, given a condition.
+    assign
+        Writes a line that gives a name to an expression of an operation.
+
+    """
+
+    def __init__(
+        self,
+        roots: Sequence[Any],
+        constant: Callable[[Any], str],
+        call: Callable[[Operation, list[str]], str],
+        choice: Callable[[str, str, str], str],
+        assign: Callable[[str, str, Operation], str],
+    ) -> None:
+        self._uses = uses(roots)
+        self._constant = constant
+        self._call = call
+        self._choice = choice
+        self._assign = assign
+        self._texts: dict[Operation, Text] = {}
+        self.lines: list[str] = []
+
+    def name(self, operation: Operation, text: str) -> None:
+        """Let an operation, such as an input, be known by a name."""
+        self._texts[operation] = Text(text, _ATOM, 0)
+
+    @contextmanager
+    def block(self) -> Iterator[list[str]]:
+        """Collect the lines of a block; the names that it gives are not known behind it."""
+        texts, lines = self._texts, self.lines
+        self._texts, self.lines = dict(texts), []
+        yield self.lines
+        self._texts, self.lines = texts, lines
+
+    def write(self, root: Any) -> str:
+        """Return the text of a number, after the lines that it needs."""
+        return self.text(root).text
+
+    def text(self, root: Any) -> Text:
+        """Return a number as an expression, after the lines that it needs."""
+        if not isinstance(root, Operation):
+            return Text(self._constant(root), _ATOM if not str(root).startswith('-') else 6, 0)
+        for operation in self._needed(root):
+            self._texts[operation] = self._placed(operation)
+        return self._texts[root]
+
+    def _needed(self, root: Operation) -> Iterator[Operation]:
+        """Yield what has no text yet, each after its operands."""
+        waiting: list[tuple[Operation, bool]] = [(root, False)]
+        while waiting:
+            operation, ready = waiting.pop()
+            if operation in self._texts:
+                continue
+            if ready:
+                yield operation
+                continue
+            waiting.append((operation, True))
+            waiting += [(operand, False) for operand in reversed(operation.operands())]
+
+    def _placed(self, operation: Operation) -> Text:
+        text = self._expression(operation)
+        if self._uses[operation] < 2 and text.depth < _DEEPEST and operation.name != 'call':
+            return text
+        name = f't{operation.number}'
+        self.lines.append(self._assign(name, text.text, operation))
+        return Text(name, _ATOM, 0)
+
+    def _expression(self, operation: Operation) -> Text:
+        parts = [self.text(argument) for argument in operation.arguments]
+        depth = 1 + max((part.depth for part in parts), default=0)
+        name = operation.name
+        if name in _PRECEDENCE and name not in ('negative', '**'):
+            own = _PRECEDENCE[name]
+            one, other = parts
+            # Sums and products are done from the left: what stands right is done before.
+            return Text(f'{one.within(own)} {name} {other.within(own + 1)}', own, depth)
+        if name == 'negative':
+            own = _PRECEDENCE[name]
+            return Text(f'-{parts[0].within(own + 1)}', own, depth)
+        if name in _COMPARISONS:
+            one, other = parts
+            return Text(f'{one.within(4)} {name} {other.within(4)}', 2, depth)
+        if name == 'where':
+            condition, one, other = parts
+            return Text(
+                self._choice(condition.within(2), one.within(2), other.within(2)), 0, depth
+            )
+        return Text(self._call(operation, [part.text for part in parts]), _ATOM, depth)

@@ -1,0 +1,430 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""From the groups of a linkage to the steps that solve it, in numbers."""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from dataclasses import replace
+from math import inf
+from typing import NamedTuple
+
+from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.kinematics.diagonal import AnyDiagonal
+from linkage_ros.kinematics.diagonals import CrankDiagonal, UnsignedDiagonal
+from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
+from linkage_ros.kinematics.dyads.driven_rrr import Carry, DrivenRRRDyad, Side
+from linkage_ros.kinematics.dyads.folding_rrr import FoldingRRRDyad
+from linkage_ros.kinematics.dyads.prp import PRPDyad
+from linkage_ros.kinematics.dyads.rpp import RPPDyad
+from linkage_ros.kinematics.dyads.rpr import RPRDyad, swivel_diagonal
+from linkage_ros.kinematics.dyads.rrp import RRPDyad
+from linkage_ros.kinematics.dyads.rrr import crank_diagonal, RRRDyad
+from linkage_ros.kinematics.free_diagonal import FreeDiagonal
+from linkage_ros.kinematics.known_links import KnownLinks
+from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
+from linkage_ros.kinematics.linkage import Input, Linkage
+from linkage_ros.kinematics.plane import cross, resolved
+from linkage_ros.kinematics.point_steps import Turned
+from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
+from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
+from linkage_ros.kinematics.structure import Driven, Dyad, Iterated, Structure
+
+_SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
+_SIDES['RPR'] = _SIDES['RRP']
+
+
+_LEVEL = Angle(0, 0.0, 1 + 0j)
+"""What a direction in the frame of the ground is measured from."""
+
+
+class _Hinge(NamedTuple):
+    """
+    The pins A and D of a dyad on two links that are pinned together at O.
+
+    Attributes
+    ----------
+    a, d
+        OA and OD, in the unit of the lengths.
+    arms, offset
+        Coordinates of the two links, and what the angle from OD to OA is beyond their difference.
+    base
+        What a direction that a `CrankDiagonal` gives is measured from.
+    crank_first
+        Whether the link of A is the crank: of the two the one that is known later.
+
+    """
+
+    a: float
+    d: float
+    arms: tuple[int, int]
+    offset: float
+    base: Angle
+    crank_first: bool
+
+    def side_at_change_point(self, diagonal: CrankDiagonal, sign: int) -> int:
+        """
+        Return the sign of a dyad whose side holds for a crank between 0 and π from the ground.
+
+        A dyad that folds has the sign of the half angle from OD to OA. Where OD is the crank and
+        OA the ground, that is negative there.
+        """
+        folds = diagonal.fold_margin == 0.0 and not isinstance(diagonal, UnsignedDiagonal)
+        return -sign if folds and not self.crank_first else sign
+
+
+class Planner(KnownLinks):
+    """
+    Makes the steps of a linkage, group after group.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    structure
+        Its groups.
+
+    """
+
+    def __init__(self, linkage: Linkage, structure: Structure) -> None:
+        super().__init__(linkage, structure)
+        self._structure = structure
+        self._assembly = dict(linkage.assembly)
+        self._keys: list[str] = []
+        for self.group, group in enumerate(structure.groups):
+            if isinstance(group, Driven):
+                self._drive(group)
+            elif isinstance(group, Dyad):
+                self._close(group)
+            else:
+                self._iterate(group)
+        for name in self._assembly:
+            raise DefinitionError(
+                f'assembly.{name}',
+                f'{quoted(name)} does not close a dyad that has two assemblies',
+                f'name {listed(map(repr, self._keys))}' if self._keys else 'leave it out',
+            )
+
+    def _drive(self, driven: Driven) -> None:
+        joint, index = driven.joint, 1 + driven.index
+        angle = self.angles[joint.to]
+        if joint.kind == 'R':
+            sign = 1.0 if self._linkage.inputs[driven.index].child == joint.link else -1.0
+            coordinate = index
+            if angle.coordinate or sign < 0.0:
+                self.add(Turned(angle.coordinate, index, sign))
+                coordinate = self.new_coordinates(1)
+                before = self.turns_with.get(angle.coordinate)
+                if before is not None:
+                    with_input = self.turns_with[index]
+                    self.turns_with[coordinate] = tuple(
+                        one + sign * other for one, other in zip(before, with_input, strict=True)
+                    )
+            self.angles[joint.link] = Angle(coordinate, angle.constant, angle.unit)
+            self.held[joint.link] = Held(
+                self.points[joint.link][joint.name],
+                joint.to,
+                self.points[joint.to][joint.name],
+            )
+            return
+        point = self.point_of(joint.name, joint.link)
+        line = self.line(joint.name, joint.to, point)
+        self.ride(joint.link, point, joint.to, line, Slide(index, line.sign))
+        self.slides[joint.name] = Slide(index, 1.0)
+
+    def _close(self, dyad: Dyad) -> None:
+        if len(dyad.bodies[0]) > 1 or len(dyad.bodies[1]) > 1:
+            self._driven_rrr(dyad)
+            return
+        {
+            'RRR': self._rrr,
+            'RRP': self._rrp,
+            'RPR': self._rpr,
+            'PRP': self._prp,
+            'RPP': self._rpp,
+        }[dyad.kind](dyad)
+
+    def _rrr(self, dyad: Dyad) -> None:
+        (one,), (other,) = dyad.bodies
+        first, second = dyad.outer
+        closing = dyad.inner.name
+        sign = self._sign(dyad.kind, closing, f'the side of {first.name}→{second.name}')
+        one_arm = self.arm(one, first.name, closing)
+        other_arm = self.arm(other, second.name, closing)
+        b, c = abs(one_arm), abs(other_arm)
+        diagonal: AnyDiagonal
+        hinge = self._hinge(first.name, second.name)
+        if hinge is None:
+            ends = self.place_pin(first.name), self.place_pin(second.name)
+            diagonal, base = FreeDiagonal(ends, (abs(b - c), b + c, 4.0 * b * c)), _LEVEL
+        else:
+            diagonal, base = (
+                crank_diagonal(
+                    hinge.a, b, c, hinge.d, hinge.arms, hinge.offset, self._driven_only(hinge.arms)
+                ),
+                hinge.base,
+            )
+            sign = hinge.side_at_change_point(diagonal, sign)
+        kind: type[RRRDyad] = RRRDyad
+        if FoldingRRRDyad.fits(diagonal):
+            kind = FoldingRRRDyad
+        self.add(kind(diagonal, b, c, sign))
+        k = self.new_coordinates(2)
+        self.angles[one] = _facing(k, base, one_arm)
+        self.angles[other] = _facing(k + 1, base, other_arm)
+        self.pin_to(one, first)
+        self.pin_to(other, second)
+
+    def _rpr(self, dyad: Dyad) -> None:
+        (rail,), (block,) = dyad.bodies
+        first, second = dyad.outer
+        name = dyad.inner.name
+        sign = self._sign(dyad.kind, name, f'where {second.name} lies from {first.name}')
+        start = self.points[rail][first.name]
+        line = self.line(name, rail, self.points[block][second.name])
+        foot = (line.start - start) * line.direction.conjugate()
+        offset = foot.imag
+        if abs(offset) <= 4.0 * UNIT_ROUNDOFF * (abs(line.start) + abs(start)):
+            offset = 0.0
+        diagonal: AnyDiagonal
+        hinge = self._hinge(first.name, second.name)
+        if hinge is None:
+            ends = self.place_pin(first.name), self.place_pin(second.name)
+            diagonal, base = FreeDiagonal(ends, (abs(offset), inf, inf)), _LEVEL
+        else:
+            diagonal, base = (
+                swivel_diagonal(
+                    hinge.a,
+                    hinge.d,
+                    offset,
+                    hinge.arms,
+                    hinge.offset,
+                    self._driven_only(hinge.arms),
+                ),
+                hinge.base,
+            )
+            sign = hinge.side_at_change_point(diagonal, sign)
+        self.add(RPRDyad(diagonal, offset, sign))
+        k = self.new_coordinates(2)
+        self.angles[rail] = _facing(k, base, line.direction)
+        self.angles[block] = self.angles[rail].plus(line.angle)
+        self.slides[name] = Slide(k + 1, 1.0, -foot.real)
+        self.pin_to(rail, first)
+        self.pin_to(block, second)
+
+    def _rrp(self, dyad: Dyad) -> None:
+        (link,), (block,) = dyad.bodies
+        first, second = dyad.outer
+        closing, name = dyad.inner.name, second.name
+        sign = self._sign(dyad.kind, name, f'where {closing} lies from {first.name}')
+        arm = self.arm(link, first.name, closing)
+        point = self.points[block][closing]
+        line = self.line(name, second.to, point)
+        base = self.angles[second.to].along(line.direction)
+        self.add(RRPDyad(self._rail(first.name, second.to, line, abs(arm)), sign))
+        k = self.new_coordinates(2)
+        self.angles[link] = _facing(k, base, arm)
+        self.pin_to(link, first)
+        self.ride(block, point, second.to, line, Slide(k + 1, 1.0))
+        self.slides[name] = Slide(k + 1, line.sign)
+
+    def _prp(self, dyad: Dyad) -> None:
+        one, other = (outer.to for outer in dyad.outer)
+        pivot = self.common(one, other, ())
+        if pivot is not None:
+            self._crank_prp(dyad, pivot)
+            return
+        starts, arms, units = [], [], []
+        k = self.coordinate_count
+        for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
+            point = self.points[body][dyad.inner.name]
+            line = self.line(outer.name, outer.to, point)
+            starts.append(self.place(outer.to, line.start))
+            arms.append(self.angles[outer.to].coordinate)
+            units.append(self.angles[outer.to].unit * line.direction)
+            self.ride(body, point, outer.to, line, Slide(k + i, 1.0))
+            self.slides[outer.name] = Slide(k + i, line.sign)
+        self.add(PRPDyad((starts[0], starts[1]), (arms[0], arms[1]), (units[0], units[1])))
+        self.new_coordinates(2)
+
+    def _crank_prp(self, dyad: Dyad, pivot: str) -> None:
+        offsets, angles, size = [], [], 0.0
+        k = self.coordinate_count
+        for i, ((body,), outer) in enumerate(zip(dyad.bodies, dyad.outer, strict=True)):
+            point, center = self.points[body][dyad.inner.name], self.points[outer.to][pivot]
+            line = self.line(outer.name, outer.to, point)
+            way, offset = resolved(line.start - center, line.direction)
+            offsets.append(offset)
+            angles.append(self.angles[outer.to].along(line.direction))
+            size += abs(line.start - center)
+            foot = replace(line, start=center + 1j * offset * line.direction)
+            self.ride(body, point, outer.to, foot, Slide(k + i, 1.0))
+            self.slides[outer.name] = Slide(k + i, line.sign, -line.sign * way)
+        first, second = angles
+        arms = first.coordinate, second.coordinate
+        across = second.unit * first.unit.conjugate()
+        self.add(CrankPRPDyad((offsets[0], offsets[1]), size, arms, across))
+        self.new_coordinates(2)
+
+    def _rpp(self, dyad: Dyad) -> None:
+        (link,), (carrier,) = dyad.bodies
+        first, second = dyad.outer
+        point = self.point_of(second.name, carrier)
+        outer = self.line(second.name, second.to, point)
+        inner = self.line(dyad.inner.name, carrier, self.points[link][first.name])
+        turn = rect(1.0, outer.angle)
+        direction = turn * inner.direction
+        if abs((direction * outer.direction.conjugate()).imag) <= ROUNDING:
+            raise DefinitionError(
+                f'sliders.{dyad.inner.name}.direction',
+                f'is parallel to that of {second.name!r}',
+                'give the two sliders different directions',
+            )
+        constant = (inner.start - point) * turn
+        level = Line(outer.start, 1 + 0j, 0.0, 1.0)
+        rail = self._rail(first.name, second.to, level, inf)
+        offsets = cross(constant, outer.direction), cross(inner.start - point, inner.direction)
+        self.add(RPPDyad(rail, direction, outer.direction, offsets))
+        k = self.new_coordinates(2)
+        self.ride(carrier, point, second.to, outer, Slide(k + 1, 1.0))
+        self.slides[second.name] = Slide(k + 1, outer.sign)
+        self.slides[dyad.inner.name] = Slide(k, inner.sign)
+        self.angles[link] = self.angles[carrier].plus(inner.angle)
+        self.pin_to(link, first)
+
+    def _driven_rrr(self, dyad: Dyad) -> None:
+        closing = dyad.inner.name
+        first, second = dyad.outer
+        sign = self._sign(dyad.kind, closing, f'the side of {first.name}→{second.name}')
+        sides = [
+            Side(
+                self.points[outer.link][outer.name],
+                self.points[end][closing],
+                self._carries(end, outer.link),
+            )
+            for outer, end in zip(dyad.outer, (dyad.inner.link, dyad.inner.to), strict=True)
+        ]
+        ends = self.place_pin(first.name), self.place_pin(second.name)
+        self.add(DrivenRRRDyad(ends, (sides[0], sides[1]), sign))
+        k = self.new_coordinates(2)
+        for i, outer in enumerate(dyad.outer):
+            self.angles[outer.link] = Angle(k + i, 0.0, 1 + 0j)
+            self.pin_to(outer.link, outer)
+
+    def _iterate(self, group: Iterated) -> None:
+        from linkage_ros.kinematics.constraints import Constraints  # local import: it loads numpy
+
+        joints = self._structure.joints_of(group)
+        constraints = Constraints(self._linkage, joints, group.links, self)
+        slides = constraints.slides
+        self.add(constraints.iteration(tuple(self.steps)))
+        k = self.new_coordinates(len(group.links) + len(slides))
+        for i, link in enumerate(group.links):
+            self.angles[link] = Angle(k + i, 0.0, 1 + 0j)
+            point = next(iter(self.points[link].values()))
+            self.held[link] = Held(point, link, pin=self.pin_count + i)
+        self.pin_count += len(group.links)
+        for i, name in enumerate(slides):
+            self.slides[name] = Slide(k + len(group.links) + i, 1.0)
+
+    def _carries(self, start: str, end: str) -> tuple[Carry, ...]:
+        """Return the way from one link of a body to another, through its driven joints."""
+        ways: dict[str, tuple[Carry, ...]] = {start: ()}
+        while end not in ways:
+            for i, given in enumerate(self._linkage.inputs):
+                for one, other in self._ends(i):
+                    if one in ways and other not in ways:
+                        ways[other] = (*ways[one], self._carry(1 + i, given, one, other))
+        return ways[end]
+
+    def _ends(self, index: int) -> tuple[tuple[str, str], tuple[str, str]]:
+        given = self._linkage.inputs[index]
+        one, other = given.parent, given.child
+        if given.slider:
+            one, other = self._linkage.sliders[given.slider].along, self.blocks[given.slider]
+        return (one, other), (other, one)
+
+    def _carry(self, index: int, given: Input, inner: str, outer: str) -> Carry:
+        if given.slider:
+            point = self.point_of(given.slider, inner)
+            line = self.line(given.slider, outer, point)
+            self.slides[given.slider] = Slide(index, 1.0)
+            return Carry(line.start, point, line.angle, -1, index, line.sign, line.direction)
+        (pin,) = set(self.points[inner]) & set(self.points[outer])
+        sign = 1.0 if given.child == inner else -1.0
+        return Carry(self.points[outer][pin], self.points[inner][pin], 0.0, index, -1, sign, 0j)
+
+    def _hinge(self, first: str, second: str) -> _Hinge | None:
+        """Return how two pins lie on links that share a pin O, if any two do."""
+        known = list(self.angles)
+        for other in self.carriers(second):
+            for one in self.carriers(first):
+                pivot = self.common(one, other, (first, second))
+                if pivot:
+                    a, d = self.arm(one, pivot, first), self.arm(other, pivot, second)
+                    angle, base = self.angles[one].along(a), self.angles[other].along(d)
+                    offset = phase(angle.unit * base.unit.conjugate())
+                    arms = angle.coordinate, base.coordinate
+                    later = known.index(one) > known.index(other)
+                    return _Hinge(abs(a), abs(d), arms, offset, base, later)
+        return None
+
+    def _rail(self, pin: str, on: str, line: Line, length: float) -> Rail:
+        """Return a line on a known link as it sees a known pin."""
+        base = self.angles[on].along(line.direction)
+        for link in self.carriers(pin):
+            pivot = self.common(link, on, (pin,))
+            if pivot:
+                angle = self.angles[link]
+                arm = self.arm(link, pivot, pin) * angle.unit * base.unit.conjugate()
+                place = (self.points[on][pivot] - line.start) * line.direction.conjugate()
+                arms = angle.coordinate, base.coordinate
+                rail = CrankRail(arm, place, length, arms)
+                # As a parallelogram: both roots change their sign with a whole turn.
+                turns_matter = len(rail.singular_angles) < 2
+                if turns_matter and not self._driven_only(arms):
+                    return UnsignedRail(arm, place, length, arms)
+                return rail
+        ends = self.place(on, line.start), self.place_pin(pin)
+        return FreeRail(ends, length, base.coordinate, base.unit)
+
+    def _driven_only(self, arms: tuple[int, int]) -> bool:
+        """Return whether two coordinates are sums of inputs, and so known with their turns."""
+        return set(arms) <= set(self.turns_with)
+
+    def _sign(self, kind: str, closing: str, meaning: str) -> int:
+        """Return the sign of the assembly of the pin or slider that closes a dyad."""
+        self._keys.append(closing)
+        sides = _SIDES[kind]
+        choices = ' or '.join(sides)
+        side = self._assembly.pop(closing, None)
+        if side is None:
+            raise DefinitionError(
+                'assembly', f'{closing!r} is missing', f'write {closing}: {choices} ({meaning})'
+            )
+        if side not in sides:
+            raise DefinitionError(
+                f'assembly.{closing}',
+                f'{quoted(side)} is no side',
+                f'write {choices} ({meaning})',
+            )
+        return sides[side]
+
+
+def _facing(coordinate: int, base: Angle, vector: complex) -> Angle:
+    """Return the angle of a link of which a vector stands at a coordinate, from a base."""
+    unit = base.unit * (vector / abs(vector)).conjugate()
+    return Angle(coordinate, base.constant - phase(vector), unit)

@@ -1,0 +1,218 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""How near trouble a linkage is: transmission angle, conditioning, distance to a toggle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache, partial
+from math import atan, inf, pi, remainder, sin, sqrt, tau
+from operator import attrgetter
+from typing import Any, NamedTuple, TYPE_CHECKING
+
+from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
+from linkage_ros.kinematics.dyads.prp import PRPDyad
+from linkage_ros.kinematics.dyads.rpp import RPPDyad
+from linkage_ros.kinematics.dyads.rpr import RPRDyad
+from linkage_ros.kinematics.status import Status
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.closure import Closure, Position
+
+
+_SAME = 1e-9
+"""Singular inputs that are nearer to each other are one, in [rad] or [m]."""
+
+_BESIDE = 1e-6
+"""How far beside a singular input a dyad's side is looked at, in [rad] or [m]."""
+
+
+_STATES = 4096
+"""How many states are kept while a linkage is searched for singular inputs."""
+
+
+class SingularInput(NamedTuple):
+    """
+    An input at which the linkage is singular.
+
+    Attributes
+    ----------
+    value
+        In [rad] or [m].
+    status
+        ``TOGGLE`` where the linkage ends or turns back, ``CHANGE_POINT`` where it goes on, and
+        ``INDETERMINATE`` where it has no pose that could be told: two pins meet, or two lines are
+        parallel.
+
+    """
+
+    value: float
+    status: Status
+
+
+class Nearness(NamedTuple):
+    """
+    How near trouble a position is; the smaller, the nearer.
+
+    Attributes
+    ----------
+    transmission_angle
+        The smallest of all dyads, folded into [0, π/2], in [rad]; π/2 where there is none.
+    conditioning
+        The smallest singular value of a loop's Jacobian, of rows of length 1: for a dyad of
+        transmission angle μ it is √2·sin(μ/2), from 0 at a toggle to 1. For an iterated group it
+        is the smallest singular value divided by the largest.
+    toggle_distance
+        How far the input is from the next singular one, in [rad] or [m]; infinite where there is
+        none, and where there are several inputs.
+    group
+        Number of the group whose conditioning that is; −1 where there is no dyad and none that is
+        iterated.
+
+    """
+
+    transmission_angle: float
+    conditioning: float
+    toggle_distance: float
+    group: int = -1
+
+
+def nearness(closure: Closure, position: Position) -> Nearness:
+    """Return how near trouble a closed position is."""
+    angle, conditioning, weakest = 0.5 * pi, 1.0, -1
+    groups = closure.step_groups
+    for step, pose, group in zip(closure.steps, position.poses, groups, strict=True):
+        if hasattr(step, 'transmission_angle'):
+            angle = min(angle, of_dyad := step.transmission_angle(pose))
+            found = sqrt(2.0) * sin(0.5 * of_dyad)
+        elif hasattr(step, 'conditioning'):
+            found = step.conditioning(pose)
+        else:
+            continue
+        if weakest < 0 or found < conditioning:
+            conditioning, weakest = min(found, 1.0), group
+    distance = inf
+    if len(closure.linkage.inputs) == 1:
+        sliding = bool(closure.linkage.inputs[0].slider)
+        unit = closure.scale if sliding else 1.0
+        value = _within(closure, position.state.coordinates[1] * unit)
+        for singular in closure.singular_inputs:
+            distance = min(distance, abs(away(closure, value, singular.value)))
+    return Nearness(angle, conditioning, distance, weakest)
+
+
+def away(closure: Closure, value: float, place: float) -> float:
+    """
+    Return how far a value of the single input is from a place, in [rad] or [m].
+
+    Whole turns do not count, but from an end of a range where each turn has poses of its own.
+    """
+    if closure.linkage.inputs[0].slider:
+        return value - place
+    for interval in closure.input_ranges:
+        if not interval.whole and place in interval[:2]:
+            period = interval.turns * tau
+            return remainder(value - place, period) if period else value - place
+    return remainder(value - place, tau)
+
+
+def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
+    """
+    Return where a single input meets toggles and change points, in ascending order.
+
+    Toggles end the ranges of the input. Where the links of a dyad's two outer pins turn with the
+    input, its constants tell at which angles its links lie in one line, or its lines are parallel.
+    Of all other dyads the transmission angle is searched over the ranges for where it is 0, and of
+    a straight rod in a swivel, whose angle never is, the distance of the two pins.
+    """
+    from linkage_ros.kinematics.sweep_analysis import zeros  # local import: it needs the closure
+
+    given = closure.linkage.inputs
+    if len(given) > 1:
+        return ()
+    ends = [end for interval in closure.closing_ranges for end in interval.toggles]
+    found = [SingularInput(end, Status.TOGGLE) for end in ends]
+    # All dyads are looked at in the same states.
+    posed = lru_cache(_STATES)(closure.posed)
+    for number, step in enumerate(closure.steps):
+        if not hasattr(step, 'transmission_angle') or isinstance(step, RPPDyad):
+            continue
+        places = _turned_by_input(closure, step)
+        if places is None:
+            places = zeros(partial(_room, step, number, posed), closure.closing_ranges)
+        for place in places:
+            status = _met(closure, number, place)
+            distances = (abs(away(closure, place, one.value)) for one in found)
+            if status is not None and all(apart > _SAME for apart in distances):
+                found.append(SingularInput(place, status))
+    return tuple(sorted(found, key=attrgetter('value')))
+
+
+def _within(closure: Closure, value: float) -> float:
+    """Return the input of the same pose within the ranges: of a cylinder its other length."""
+    zero = closure.zero_length
+    ranges = closure.closing_ranges
+    if zero is None or any(one.lowest <= value <= one.highest for one in ranges):
+        return value
+    return 2.0 * zero - value
+
+
+def _turned_by_input(closure: Closure, step: Any) -> list[float] | None:
+    """Return the singular angles of a dyad as inputs, if the input turns its outer pins' links."""
+    part = getattr(step, 'diagonal', None) or getattr(step, 'rail', step)
+    if not hasattr(part, 'singular_angles'):
+        return None
+    first, second = part.arms[:2]
+    turns = closure.turns_with
+    if first not in turns or second not in turns:
+        return None
+    factor = turns[first][0] - turns[second][0]
+    return [remainder(angle / factor, tau) for angle in part.singular_angles] if factor else []
+
+
+def _met(closure: Closure, number: int, place: float) -> Status | None:
+    """Return what a dyad meets where it is singular; nothing where no loops close next to it."""
+    status = closure.posed(place).status
+    beside = [closure.posed(place + step) for step in (-_BESIDE, _BESIDE)]
+    if not any(position.status.has_pose for position in beside):
+        return None
+    if not status.has_pose or _never_toggles(closure.steps[number]):
+        # The float next to where lines are parallel, or pins meet, may have a pose.
+        return Status.INDETERMINATE
+    if status is Status.CLOSED and all(position.status.has_pose for position in beside):
+        # The floats next to it, of a dyad that follows others: does it come out on its other side?
+        step: Any = closure.steps[number]
+        before, after = (step.side_of(position.poses[number]) for position in beside)
+        return Status.CHANGE_POINT if before * after < 0.0 else Status.TOGGLE
+    return status if status is Status.CHANGE_POINT else Status.TOGGLE
+
+
+def _never_toggles(step: Any) -> bool:
+    """Return whether a dyad is singular only where its lines are parallel or its pins meet."""
+    return isinstance(step, PRPDyad | CrankPRPDyad) or (
+        isinstance(step, RPRDyad) and not step.offset
+    )
+
+
+def _room(step: Any, number: int, posed: Callable[[float], Position], value: float) -> float:
+    """Return how far a dyad is from being singular at an input, in [rad]; 0 without a pose."""
+    position = posed(value)
+    if len(position.poses) <= number or not position.status.has_pose:
+        return 0.0
+    pose: Any = position.poses[number]
+    if isinstance(step, RPRDyad) and not step.offset:
+        return atan(abs(pose.slide))
+    return float(step.transmission_angle(pose))

@@ -1,0 +1,267 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A bag's topics and the graph: how a bag describes a topic, and a bag's topics published."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
+from importlib import import_module
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from linkage_ros.bag.topic import INFINITE, QosProfile, Topic
+from linkage_ros.errors import LinkageError, quoted, RecordingError
+from linkage_ros.resources import share_folders
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+_FIELD = re.compile(r'^\s*(?P<type>[A-Za-z]\w*(?:/\w+)*)(?:<=\d+)?(?:\[[^\]]*\])?\s+[a-z]\w*')
+_PRIMITIVES = frozenset(
+    [
+        'bool',
+        'byte',
+        'char',
+        'float32',
+        'float64',
+        'int8',
+        'uint8',
+        'int16',
+        'uint16',
+        'int32',
+        'uint32',
+        'int64',
+        'uint64',
+        'string',
+        'wstring',
+    ]
+)
+_SEPARATOR = f'\n{"=" * 80}\n'
+
+
+def message_type(name: str, key: str) -> Any:
+    """
+    Return the class of a message; it is imported here, so that only what is called for is.
+
+    Parameters
+    ----------
+    name
+        package/msg/Type.
+    key
+        Of the scene, that calls for it.
+
+    Raises
+    ------
+    LinkageError
+        Where its package is not installed.
+
+    """
+    package, _, kind = name.split('/')
+    try:
+        return getattr(import_module(f'{package}.msg'), kind)
+    except ImportError:
+        raise LinkageError(
+            key,
+            f'the ROS package {package} is not installed',
+            'install it, or leave it out',
+        ) from None
+
+
+def bag_topic(name: str, message_type: Any, qos: QoSProfile) -> Topic:
+    """
+    Describe a topic for a bag.
+
+    Parameters
+    ----------
+    name
+        Resolved name.
+    message_type
+        The message's class.
+    qos
+        What is offered on the topic.
+
+    Raises
+    ------
+    RecordingError
+        Where the message's definition is not installed.
+
+    """
+    package, _, kind = message_type.__module__.split('.')[0], None, message_type.__name__
+    texts: dict[str, str] = {}
+    _collect(package, kind, texts)
+    first, *others = texts
+    definition = texts[first] + ''.join(
+        f'{_SEPARATOR}MSG: {other}\n{texts[other]}' for other in others
+    )
+    return Topic(name, f'{package}/msg/{kind}', definition, _type_hash(package, kind), _qos(qos))
+
+
+def _collect(package: str, kind: str, texts: dict[str, str]) -> None:
+    """Collect the text of a type and, behind it, of all that it needs."""
+    if f'{package}/{kind}' in texts:
+        return
+    text = texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
+    # In the order of their full names, as rosbag2 has them.
+    for needed in sorted(name if '/' in name else f'{package}/{name}' for name in _types(text)):
+        needed_package, _, needed_kind = needed.rpartition('/')
+        _collect(needed_package, needed_kind, texts)
+
+
+def _types(text: str) -> Iterator[str]:
+    for line in text.splitlines():
+        field = _FIELD.match(line.split('#')[0])
+        if field and field['type'] not in _PRIMITIVES:
+            yield field['type']
+
+
+def _type_hash(package: str, kind: str) -> str:
+    described = json.loads(_share(package, f'{kind}.json').read_text('utf-8'))
+    hashes = {entry['type_name']: entry['hash_string'] for entry in described['type_hashes']}
+    return str(hashes[f'{package}/msg/{kind}'])
+
+
+def _share(package: str, file: str) -> Path:
+    for folder in share_folders(package):
+        if (folder / 'msg' / file).is_file():
+            return folder / 'msg' / file
+    raise RecordingError(
+        f'{package}/msg/{file}', 'is not installed', f'install the ROS package {package}'
+    )
+
+
+def _qos(profile: QoSProfile) -> QosProfile:
+    return QosProfile(
+        history=profile.history.name.lower(),
+        depth=profile.depth,
+        reliability=profile.reliability.name.lower(),
+        durability=profile.durability.name.lower(),
+        # Of rclpy's own profiles these are 0, which stands for no limit and for automatic.
+        deadline=profile.deadline.nanoseconds or INFINITE,
+        lifespan=profile.lifespan.nanoseconds or INFINITE,
+        liveliness=profile.liveliness.name.lower() if profile.liveliness else 'automatic',
+        liveliness_lease_duration=profile.liveliness_lease_duration.nanoseconds or INFINITE,
+        avoid_ros_namespace_conventions=bool(profile.avoid_ros_namespace_conventions),
+    )
+
+
+_TYPE = re.compile(r'([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)')
+_MOST_DEPTH = 2**31 - 1  # as DDS counts it
+
+
+def offer(
+    node: Node, topics: Collection[Topic], left_out: Callable[[LinkageError], None]
+) -> dict[str, Publisher]:
+    """
+    Offer a bag's topics on the graph.
+
+    Parameters
+    ----------
+    node
+        The node.
+    topics
+        The topics.
+    left_out
+        Takes why a topic cannot be offered.
+
+    Returns
+    -------
+    publishers : dict of str to Publisher
+        By the names in the bag.
+
+    """
+    publishers = {}
+    for topic in topics:
+        try:
+            publishers[topic.name] = _publisher(node, topic)
+        except LinkageError as error:  # noqa: PERF203 (a bag has a few topics)
+            left_out(error)
+    return publishers
+
+
+def offered(qos: QosProfile) -> QoSProfile:
+    """
+    Return what is offered where this was recorded.
+
+    Deadline, lifespan and liveliness are promises about the recorded publisher's life, which
+    playing at another rate would break.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_ALL if qos.history == 'keep_all' else HistoryPolicy.KEEP_LAST,
+        depth=min(max(1, qos.depth), _MOST_DEPTH),
+        reliability=(
+            ReliabilityPolicy.BEST_EFFORT
+            if qos.reliability == 'best_effort'
+            else ReliabilityPolicy.RELIABLE
+        ),
+        durability=(
+            DurabilityPolicy.TRANSIENT_LOCAL
+            if qos.durability == 'transient_local'
+            else DurabilityPolicy.VOLATILE
+        ),
+    )
+
+
+def _publisher(node: Node, topic: Topic) -> Publisher:
+    """Return what publishes a topic; raises LinkageError where that cannot be."""
+    kind = _class_of(topic)
+    unfit = LinkageError(
+        quoted(topic.name)[1:-1] or "''", 'is no name of a ROS 2 topic', 'convert the bag'
+    )
+    if '\0' in topic.name:  # rclpy would publish on what stands before it
+        raise unfit
+    try:
+        return node.create_publisher(kind, topic.name, offered(topic.qos))
+    except Exception:  # noqa: BLE001 (a space, a {word}, a name too long: each has its own)
+        raise unfit from None
+
+
+def _class_of(topic: Topic) -> Any:
+    """
+    Return the class of a topic's messages.
+
+    Raises
+    ------
+    LinkageError
+        There is none, or it is not what was recorded.
+
+    """
+    matched = _TYPE.fullmatch(topic.type)
+    if matched is None:
+        raise LinkageError(
+            topic.name,
+            f'its type {quoted(topic.type)} is none of a ROS 2 message',
+            'convert the bag',
+        )
+    package, kind = matched.groups()
+    # A bag comes from anywhere: nothing is imported by a name in it that is no message package.
+    if not any((folder / 'msg' / f'{kind}.idl').is_file() for folder in share_folders(package)):
+        raise LinkageError(
+            topic.name, f'{topic.type} is not installed', f'install the ROS package {package}'
+        )
+    found = message_type(topic.type, topic.name)
+    installed = ''
+    with suppress(LinkageError):
+        installed = bag_topic(topic.name, found, QoSProfile(depth=1)).type_hash
+    if topic.type_hash and installed and topic.type_hash != installed:
+        raise LinkageError(
+            topic.name,
+            f'{topic.type} was another when it was recorded',
+            f'install the ROS package {package} of that time',
+        )
+    return found

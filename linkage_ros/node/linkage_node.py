@@ -1,0 +1,44 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""``ros2 run linkage_ros linkage_node``: the node, until a signal."""
+
+from __future__ import annotations
+
+from importlib import import_module
+import sys
+
+from linkage_ros.errors import LinkageError, missing_packages_reported
+from linkage_ros.signals import stop_on_signals, StoppedError
+
+
+def main() -> int:
+    """Run the node and return the exit code."""
+    # First of all, and before the second that rclpy takes to load: a signal at any moment is
+    # heeded.
+    stop = stop_on_signals()
+    try:
+        with missing_packages_reported():
+            run = import_module('linkage_ros.node.run')
+            return int(run.run_linkage_node(stop, sys.argv[1:]))
+    except LinkageError as error:
+        print(f'linkage_node: {error}', file=sys.stderr)
+        return 2
+    except StoppedError:
+        return 0  # as a signal ends a node at any other moment
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,460 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The node: crank samples in, joint states of the dependent joints out.
+
+A lifecycle node. The tick has a thread of its own (`tick_loop`); what is here runs on the
+executor: transitions, services, parameters, diagnostics, and all that is logged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial, wraps
+from math import inf
+from sys import maxsize
+import time
+from typing import Any, TYPE_CHECKING
+
+from diagnostic_msgs.msg import DiagnosticArray
+from linkage_ros.bag.topic import Topic
+from linkage_ros.errors import LinkageError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.node import pacing
+from linkage_ros.node.bag_topics import bag_topic
+from linkage_ros.node.diagnostics import CLOCK_PATIENCE, Health, no_clock, Snapshot
+from linkage_ros.node.late_answers import LateAnswers
+from linkage_ros.node.parameters import declare_parameters, nearness_limits
+from linkage_ros.node.real_time import RealTime
+from linkage_ros.node.run_recording import RunRecording
+from linkage_ros.node.scene_topics import never_called, OUTPUT_QOS, SceneTopics, TakenByTick
+from linkage_ros.node.simulated_time import ClockGuard
+from linkage_ros.node.tick_loop import Pace, TickLoop
+from linkage_ros.node.transports import standstill
+from linkage_ros.node.warnings import Warnings
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.replay import own_joint_states
+from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.scene import Scene
+from rcl_interfaces.msg import SetParametersResult
+from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
+from rclpy.clock import Clock, ClockType
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock as ClockMessage
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool, Trigger
+
+if TYPE_CHECKING:
+    pass
+
+_CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+_DIAGNOSTICS_QOS = QoSProfile(depth=1)
+_WATCH_PERIOD = 0.25
+_NOT_YET_KNOWN = '_NODE_NAME_UNKNOWN_'
+
+Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
+
+
+def _reporting(transition: Transition) -> Transition:
+    """Log what a transition raises: rclpy would swallow it."""
+
+    @wraps(transition)
+    def reported(node: LinkageNode, state: LifecycleState) -> TransitionCallbackReturn:
+        try:
+            return transition(node, state)
+        except Exception as error:  # noqa: BLE001 (whatever it is, rclpy would hide it)
+            node.get_logger().error(f'{transition.__name__}: {type(error).__name__}: {error}')
+            return TransitionCallbackReturn.ERROR
+
+    return reported
+
+
+class LinkageNode(LifecycleNode):
+    """Solves a linkage for a crank; the README lists topics, parameters and services."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('linkage_node', **options)
+        declare_parameters(self)
+        self.failure: LinkageError | None = None
+        """Why the node could not be configured."""
+        self.recording = RunRecording(self.get_logger())
+        self.scene: Scene | None = None
+        self._closures: list[Closure] = []
+        self.loop: TickLoop | None = None
+        """The tick of this run, or of the last; nothing before the first."""
+
+        overridable = QoSOverridingOptions.with_default_policies()
+        self._joint_states = self.create_publisher(
+            JointState, 'joint_states', OUTPUT_QOS, qos_overriding_options=overridable
+        )
+        self._scene_topics = SceneTopics(self, self._on_inject)
+        self._diagnostics = self.create_publisher(
+            DiagnosticArray, '/diagnostics', _DIAGNOSTICS_QOS
+        )
+        self._simulation = self.create_subscription(
+            ClockMessage, '/clock', never_called, _CLOCK_QOS, callback_group=TakenByTick()
+        )
+        self.create_service(Trigger, '~/reset', self._on_reset)
+        self.create_service(Trigger, '~/start_recording', self._on_start_recording)
+        self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
+        self._snapshot_answers = LateAnswers(
+            self.create_service(Trigger, '~/snapshot', self._on_snapshot)
+        )
+        self._snapshot_written = self.create_guard_condition(self.recording.collect)
+        # Not by the node's clock, which stands still where the simulation does.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_WATCH_PERIOD, self._watch, clock=steady)
+        change = self._service_change_state
+        change.callback = partial(self._on_change_state, change.callback)
+        self._clock_guard = ClockGuard(self._time_source)
+        self._activated = 0
+        self.add_on_set_parameters_callback(self._on_parameters)
+        self._warnings = Warnings(self.get_logger())
+        self._before = Snapshot()
+        self._real_time = RealTime(
+            self.get_parameter('thread_priority').value,
+            self.get_parameter_or('cpu_affinity').value or (),
+            self.get_parameter('lock_memory').value,
+        )
+        why = standstill()
+        self._middleware = {'Middleware': why} if why else {}
+
+    @property
+    def crank_topic(self) -> str:
+        """Return the resolved name of the topic that the drives listen to; '' for none."""
+        return self._scene_topics.crank_topic
+
+    # Transitions.
+
+    @_reporting
+    def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Load the scene and prove that it can be built."""
+        file = self.get_parameter('scene').value
+        try:
+            if not file:
+                raise LinkageError(
+                    'parameter scene', "'' names no file", 'start with --ros-args -p scene:=FILE'
+                )
+            scene = load_scene(file)
+            pipeline = Pipeline(scene)  # what it calls for is proven now, not at the first tick
+            self._scene_topics.connect(pipeline)
+            for closure in pipeline.closures:
+                # Found before the first tick, which would wait for it: iterated links are followed
+                # there.
+                _ = closure.singular_inputs
+            if scene.robot_description:
+                self._scene_topics.describe(scene, pipeline)
+        except LinkageError as error:
+            self._scene_topics.disconnect()
+            self.failure = error
+            self.get_logger().error(str(error))
+            return TransitionCallbackReturn.FAILURE
+        for line in pipeline.lines:
+            if line.choice is not None:
+                name = f'{line.member.name}: ' if line.member.name else ''
+                accuracy = f'accuracy {line.member.accuracy:g}'
+                self.get_logger().info(f'{name}{accuracy}: {line.choice.why}')
+        self.failure, self.scene, self._closures = None, scene, pipeline.closures
+        return TransitionCallbackReturn.SUCCESS
+
+    @_reporting
+    def on_activate(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Start to tick, and to record where the scene says so."""
+        assert self.scene is not None
+        self.loop = self._build_loop(self.scene)
+        self._warnings = Warnings(self.get_logger())  # as new as the counts that it compares
+        while (take := self._scene_topics.take) is not None and take() is not None:
+            pass  # what came before this moment is not of this run
+        self._activated = time.monotonic_ns()
+        self._before = Snapshot.of(self.loop.counts, self._activated)
+        if self.scene.record is not None:
+            self._start_recording()
+        self._real_time.lock_memory()
+        self.loop.start(self._real_time.paced(self._pace(self.scene.rate)))
+        for line in self._middleware.values():
+            self.get_logger().info(line)
+        rate = f'at {self.scene.rate:g} Hz' if self.scene.rate else 'once for every crank sample'
+        cranks = ', '.join(joint for member in self.scene.members for joint in member.inputs)
+        drives = ' and '.join(dict.fromkeys(member.drive[0] for member in self.scene.members))
+        source = f'from {self.crank_topic}' if self.crank_topic else f'driven by {drives}'
+        to = [each.topic_name for each in (self._joint_states, *self._scene_topics.extras)]
+        self.get_logger().info(
+            f'{self.scene.name}: ticking {rate}; crank {cranks} {source}; '
+            f'{", ".join(self.scene.joints)} to {" and ".join(to)}'
+        )
+        return TransitionCallbackReturn.SUCCESS
+
+    @_reporting
+    def on_deactivate(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Stop ticking and close the bag."""
+        self.end()
+        return TransitionCallbackReturn.SUCCESS
+
+    @_reporting
+    def on_cleanup(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Forget the scene."""
+        self.scene = None
+        self._scene_topics.disconnect()
+        return TransitionCallbackReturn.SUCCESS
+
+    @_reporting
+    def on_shutdown(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """End, from any state."""
+        self.end()
+        return TransitionCallbackReturn.SUCCESS
+
+    @_reporting
+    def on_error(self, _: LifecycleState) -> TransitionCallbackReturn:
+        """Return to unconfigured."""
+        self.get_logger().error('a transition failed; the node is unconfigured now')
+        self.end()
+        self._scene_topics.disconnect()
+        return TransitionCallbackReturn.SUCCESS
+
+    def _build_loop(self, scene: Scene) -> TickLoop:
+        shared = self.crank_topic == self._joint_states.topic_name
+        pipeline = Pipeline(scene, self._closures)
+        closures, injection = pipeline.closures, pipeline.injection
+        crank = self._scene_topics.crank
+        return TickLoop(
+            partial(Pipeline, scene, closures, injection),
+            self._scene_topics.take,
+            self._joint_states.handle.publish_raw,
+            own_joint_states(scene) if shared else None,
+            [extra.handle.publish_raw for extra in self._scene_topics.extras],
+            self._scene_topics.publish_change,
+            # A queue without bounds is taken from for as long as a tick may.
+            depth=(crank.qos_profile.depth if crank is not None else 0) or maxsize,
+        )
+
+    def _pace(self, rate: float) -> Pace:
+        simulated = self.get_parameter('use_sim_time').value
+        if rate and simulated:
+            return pacing.on_clock(self.context, self._simulation, rate)
+        if rate:
+            return pacing.steady(rate)
+        assert self._scene_topics.crank is not None  # without samples a scene has a rate
+        clock = self.get_clock()
+        now = (lambda: int(clock.now().nanoseconds)) if simulated else time.time_ns
+        return pacing.on_samples(self.context, self._scene_topics.crank, now)
+
+    def end(self) -> None:
+        """Stop ticking and close the bag; where nothing runs, do nothing."""
+        if self.loop is not None and self.loop.running:
+            self.loop.stop()
+            self._diagnose()
+            if self.crank_topic:
+                self.get_logger().info(f'{self.crank_topic}: {self.loop.samples}')
+            self.recording.stop(self.loop)
+
+    def _start_recording(self) -> str:
+        assert self.scene is not None
+        assert self.loop is not None
+        directory = self.get_parameter('runs_directory').value
+        return self.recording.start(
+            self.scene, self.loop, directory, self._bag_topics, self._scene_topics.description
+        )
+
+    def _bag_topics(self) -> list[tuple[str, Topic]]:
+        """Describe what is recorded, in the order of the handles."""
+        assert self.loop is not None
+        handles, states = self.loop.topics, self._joint_states
+        joint_states = bag_topic(states.topic_name, JointState, states.qos_profile)
+        diagnostics = bag_topic('/diagnostics', DiagnosticArray, _DIAGNOSTICS_QOS)
+        topics = {
+            handles.joint_states: ('joint_states_topic', joint_states),
+            handles.diagnostics: ('diagnostics_topic', diagnostics),
+            **self._scene_topics.described(handles),
+        }
+        return [topics[handle] for handle in sorted(topics)]
+
+    # Services.
+
+    def _on_change_state(
+        self, change: Callable[[Any, Any], Any], request: Any, response: Any
+    ) -> Any:
+        """Answer where rclpy raises: to a transition that the state does not have."""
+        try:
+            return change(request, response)
+        except RCLError as error:
+            self.get_logger().error(f'change_state: {str(error).splitlines()[0]}')
+            response.success = False
+            return response
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self.loop is None or not self.loop.running:
+            return _answer(response, False, 'not active: nothing to reset')
+        self.loop.reset_requested = True
+        return _answer(response, True, 'crank and turns are forgotten before the next tick')
+
+    def _on_inject(
+        self, name: str, request: SetBool.Request, response: SetBool.Response
+    ) -> SetBool.Response:
+        if self.loop is None or not self.loop.running or self.loop.injection is None:
+            return _answer(response, False, 'not active: nothing to inject into')
+        self.loop.injection.ask(name, bool(request.data))
+        what = 'begins' if request.data else 'ends'
+        return _answer(response, True, f'{name} {what} at the next tick')
+
+    def _on_start_recording(
+        self, _: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        if self.loop is None or not self.loop.running:
+            return _answer(response, False, 'not active: nothing to record')
+        if self.recording.has_ended(self.loop):
+            self.recording.stop(self.loop)
+        if self.loop.recorder is not None:
+            return _answer(response, False, f'already {self.recording.describe(self.loop)}')
+        line = self._start_recording()
+        return _answer(response, self.loop.recorder is not None, line)
+
+    def _on_stop_recording(
+        self, _: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        if self.loop is None or self.loop.recorder is None:
+            return _answer(response, False, 'not recording')
+        return _answer(response, *self.recording.stop(self.loop))
+
+    def _on_snapshot(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self.loop is None or not self.loop.running:
+            return _answer(response, False, 'not active: nothing is kept in memory')
+        refusal = self.recording.snapshot(self._snapshot_answers.answer, self._wake)
+        if refusal:
+            return _answer(response, False, refusal)
+        return self._snapshot_answers.defer(response)
+
+    def _wake(self) -> None:
+        """Have the executor collect a snapshot; from the thread that has written it."""
+        with suppress(InvalidHandle):  # a disk may answer when the node is gone
+            self._snapshot_written.trigger()
+
+    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
+        simulated = self.get_parameter('use_sim_time').value
+        running = self.loop is not None and self.loop.running
+        for parameter in parameters:
+            if parameter.name == 'use_sim_time' and parameter.value != simulated and running:
+                return SetParametersResult(
+                    successful=False,
+                    reason='use_sim_time cannot change while the node is active; deactivate it '
+                    'first',
+                )
+        return SetParametersResult(successful=True)
+
+    def report(self, failure: str) -> None:
+        """Warn of a call that failed, once in a while."""
+        self._warnings.say('failure', failure, self.get_parameter('warning_period').value)
+
+    # Watching.
+
+    def _watch(self) -> None:
+        """Log what the tick has counted, and publish the diagnostics when they are due."""
+        loop = self.loop
+        if loop is None or not loop.running:
+            return
+        period = self.get_parameter('warning_period').value
+        self._warnings.look(loop.counts, loop.pipeline.closures, self.crank_topic, period)
+        silence = self._clock_silence()
+        if min(silence, (time.monotonic_ns() - self._activated) / NANOSECONDS) > CLOCK_PATIENCE:
+            remedy = 'start the simulation, or set use_sim_time: false'
+            self._warnings.say('clock', f'{no_clock(silence)}: {remedy}', period)
+        while self._real_time.refused:
+            self.get_logger().warning(self._real_time.refused.pop(0))
+        listening = [line.member for line in loop.pipeline.lines if line.topic]
+        # Where /clock does not come, no message has been looked for.
+        assert self.scene is not None
+        if listening and (loop.counts.ticks or not self.scene.rate):
+            inputs = [name for member in listening for name in member.inputs]
+            self._warnings.wait(loop.counts, self.crank_topic, inputs, period)
+        if loop.failure:
+            self._warnings.say('tick', f'the tick has stopped: {loop.failure}', period)
+        news = self.recording.look(loop)
+        due = self._before.time + self.get_parameter('diagnostics_period').value * NANOSECONDS
+        if news or time.monotonic_ns() >= due - 0.5 * _WATCH_PERIOD * NANOSECONDS:
+            self._diagnose()
+
+    def _diagnose(self) -> None:
+        assert self.scene is not None
+        assert self.loop is not None
+        publishers = self._crank_publishers()
+        several = len(publishers) > 1
+        self.loop.several_publishers |= several
+        # Where messages come without the crank, others share the topic, and no one can tell.
+        shared = self.crank_topic == self._joint_states.topic_name or self.loop.counts.ignored
+        if several and not shared:
+            self._warnings.say(
+                'publishers',
+                f'{self.crank_topic}: several publishers, {" and ".join(publishers)}; '
+                'stop all but one',
+                self.get_parameter('warning_period').value,
+            )
+        simulated = self.get_parameter('use_sim_time').value
+        clock = self.get_clock().now()
+        now = Snapshot.of(self.loop.counts, time.monotonic_ns())
+        health = Health(
+            node=self.get_fully_qualified_name(),
+            scene=self.scene.name,
+            rate=0.0 if simulated else self.scene.rate,
+            clock=clock.nanoseconds,
+            clock_silence=self._clock_silence(),
+            clock_refused=self._clock_guard.refused,
+            crank_topic=self.crank_topic,
+            publishers=publishers,
+            crank_shared=bool(shared),
+            loop=self.loop,
+            before=self._before,
+            now=now,
+            recording_failure=self.recording.failure,
+            snapshots=self.recording.snapshots,
+            limits=nearness_limits(self),
+            system=self._real_time.in_force | self._middleware,
+        )
+        self._before = now
+        message = DiagnosticArray(status=health.statuses())
+        message.header.stamp = clock.to_msg()
+        data = serialize_message(message)
+        self._diagnostics.publish(data)
+        if self.loop.recorder is not None:
+            self.loop.recorder.offer(
+                self.loop.topics.diagnostics, clock.nanoseconds, clock.nanoseconds, data
+            )
+
+    def _crank_publishers(self) -> list[str]:
+        """Return who else publishes on the drives' topic."""
+        names = [
+            f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+            for info in self._scene_topics.crank_publishers
+            if info.node_name != _NOT_YET_KNOWN
+        ]
+        return [name for name in names if name != self.get_fully_qualified_name()]
+
+    def _clock_silence(self) -> float:
+        """Return for how long ``/clock`` has been silent, in [s]; 0 where it does not count."""
+        if not self.get_parameter('use_sim_time').value:
+            return 0.0
+        heard = self._clock_guard.heard
+        return (time.monotonic_ns() - heard) / NANOSECONDS if heard else inf
+
+
+def _answer(response: Any, success: bool, message: str) -> Any:
+    response.success = success
+    response.message = message
+    return response

@@ -1,0 +1,157 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a tick loop waits for: the time, a crank sample, or the simulation's clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from threading import Event
+from time import monotonic_ns, sleep, time_ns
+
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.node.simulated_time import nanoseconds_of
+from linkage_ros.node.tick_loop import Pace, TickLoop
+from rclpy.context import Context
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.subscription import Subscription
+from rosgraph_msgs.msg import Clock as ClockMessage
+
+CATCH_UP = 20_000_000
+"""How far ticks may lag, in [ns], and all still be made up for; beyond it they are lost."""
+
+_FINE = 20_000_000
+"""The last part of a wait, in [ns], that is slept through whole; before it a stop is heeded."""
+
+_LONGEST_WAIT = 100_000_000
+"""How long a wait for a message may last, in [ns], before a stop is heeded."""
+
+
+def steady(rate: float) -> Pace:
+    """
+    Tick at a rate, in [Hz], on the steady clock, stamped with the system's time.
+
+    Ticks are due at whole multiples of the period from the start, so that a late one does not
+    shift those that follow.
+    """
+    period = NANOSECONDS / rate
+
+    def pace(loop: TickLoop, stopping: Event) -> None:
+        counts = loop.counts
+        add, tick_at = counts.lateness.add, loop.tick_at
+        begin = monotonic_ns()
+        number = 0
+        while not stopping.is_set():
+            number += 1
+            due = begin + round(number * period)
+            wait = due - monotonic_ns()
+            if wait > _FINE and stopping.wait((wait - _FINE) * 1e-9):
+                return
+            wait = due - monotonic_ns()
+            if wait > 0:
+                sleep(wait * 1e-9)
+            lateness = monotonic_ns() - due
+            add(lateness)
+            if lateness > period:
+                counts.late += 1
+                if lateness > CATCH_UP:
+                    lost = int(lateness // period)
+                    counts.lost += lost
+                    number += lost
+            tick_at(time_ns(), time_ns)
+
+    return pace
+
+
+def on_samples(context: Context, subscription: Subscription, now: Callable[[], int]) -> Pace:
+    """
+    Tick once for every crank sample, stamped as the sample is.
+
+    Parameters
+    ----------
+    context
+        The node's context.
+    subscription
+        The crank's.
+    now
+        Returns the time by which stamps are judged, in [ns].
+
+    """
+
+    def pace(loop: TickLoop, stopping: Event) -> None:
+        wait = _waiter(context, subscription)
+        while not stopping.is_set():
+            if wait():
+                loop.tick_samples(now(), now)
+
+    return pace
+
+
+def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
+    """
+    Tick at a rate, in [Hz], of the simulation's time, at most once for every ``/clock`` message.
+
+    Parameters
+    ----------
+    context
+        The node's context.
+    clock
+        Subscription to ``/clock``.
+    rate
+        Ticks a second of simulated time.
+
+    """
+    period = round(NANOSECONDS / rate)
+
+    def pace(loop: TickLoop, stopping: Event) -> None:
+        wait = _waiter(context, clock)
+        due = 0
+        last = newest = -1
+
+        def read() -> int:
+            nonlocal newest
+            # The queue is one message deep, so that what is taken is the newest.
+            taken = clock.handle.take_message(ClockMessage, False)
+            now = None if taken is None else nanoseconds_of(taken[0])
+            newest = newest if now is None else now
+            return newest
+
+        while not stopping.is_set():
+            now = read()
+            if now == last:
+                wait()
+                continue
+            if now < last:
+                due = now
+            last = now
+            if now >= due:
+                loop.tick_at(now, read)
+                due = now - now % period + period
+
+    return pace
+
+
+def _waiter(context: Context, subscription: Subscription) -> Callable[[], bool]:
+    """Return a function that waits for a message and tells whether one has come."""
+    # As rclpy.wait_for_message does it; an executor would cost more than the tick.
+    wait_set = _rclpy.WaitSet(1, 0, 0, 0, 0, 0, context.handle)
+
+    def wait() -> bool:
+        wait_set.clear_entities()
+        wait_set.add_subscription(subscription.handle)
+        wait_set.wait(_LONGEST_WAIT)
+        return bool(wait_set.get_ready_entities('subscription'))
+
+    return wait

@@ -1,0 +1,201 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A bag on the graph: a node that plays it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+import sys
+from threading import Event
+from time import monotonic
+
+from linkage_ros.bag.order import LogTimeOrder
+from linkage_ros.errors import LinkageError
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.messages.single_values import TIME_END, time_message
+from linkage_ros.node.playback import cues, Part, Playback, read_ahead, SteadyClock, Ticks
+from linkage_ros.node.transports import leave_out_shared_memory
+from linkage_ros.signals import bounded_end
+import rclpy
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
+
+CLOCK = '/clock'
+
+_SWITCH_INTERVAL = 1e-4
+_LOOK = 0.05
+_ACQUAINTANCE = 0.3
+"""How long who listens may take to know of a publisher that knows of it already, in [s]."""
+
+_DELIVERY = 1.0
+"""How long at the end is waited for those that have not confirmed the last messages, in [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """
+    How a bag shall be played.
+
+    Parameters
+    ----------
+    rate
+        Seconds of the bag a second.
+    clock
+        How often a second ``/clock`` is published; 0 for never.
+    wait
+        How long is waited for somebody who listens to one of the topics, in [s].
+
+    """
+
+    rate: float = 1.0
+    clock: float = 0.0
+    wait: float = 0.0
+
+
+@contextmanager
+def player_node(arguments: Sequence[str]) -> Iterator[Node]:
+    """
+    Have a node to play with.
+
+    Parameters
+    ----------
+    arguments
+        Command line with ``--ros-args``, without the program's name.
+
+    Raises
+    ------
+    LinkageError
+        There is no ROS, or it does not understand the arguments.
+
+    """
+    # As for the tick: a message would wait for the thread that reads ahead.
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    leave_out_shared_memory()
+    try:
+        rclpy.init(
+            args=['linkage_player', *arguments], signal_handler_options=SignalHandlerOptions.NO
+        )
+        node = Node('linkage_player', start_parameter_services=False)
+    except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
+        rclpy.try_shutdown()
+        reason = ' '.join(str(error).strip().splitlines()[:1]) or type(error).__name__
+        raise LinkageError('--ros-args', reason, 'see the README') from None
+    try:
+        yield node
+    finally:
+        with bounded_end():
+            node.destroy_node()
+            rclpy.try_shutdown()
+
+
+def play(
+    node: Node,
+    publishers: Mapping[str, Publisher],
+    order: LogTimeOrder,
+    part: Part,
+    wishes: Wishes,
+    stop: Event,
+    told: Callable[[int], None],
+) -> tuple[Playback, LinkageError | None]:
+    """
+    Publish messages until their end, or the event.
+
+    Parameters
+    ----------
+    node
+        The node.
+    publishers
+        Of each topic that is played.
+    order
+        The bag's messages.
+    part
+        Which of them.
+    wishes
+        How.
+    stop
+        Ends it.
+    told
+        Takes the log time, in [ns], now and then.
+
+    Returns
+    -------
+    playback : Playback
+        What was played.
+    error : LinkageError or None
+        What ended it early; where the bag is damaged, for example.
+
+    Raises
+    ------
+    LinkageError
+        ``/clock`` cannot tell the bag's times.
+
+    """
+    ticks = None
+    if wishes.clock:
+        _clock_message(part.first)  # whether it can be told is found before anything is sent
+        publish = node.create_publisher(Clock, CLOCK, 10).publish
+        ticks = Ticks(NANOSECONDS / wishes.clock, lambda time: publish(_clock_message(time)))
+    if wishes.wait:
+        _wait_for_listener(publishers.values(), stop, wishes.wait)
+    playback = Playback(
+        part.first,
+        wishes.rate,
+        {name: publisher.publish for name, publisher in publishers.items()},
+        SteadyClock(stop),
+        ticks,
+        told,
+    )
+    error = None
+    try:
+        with closing(read_ahead(cues(order, part), stop)) as messages:
+            playback.run(messages)
+    except LinkageError as raised:
+        error = raised
+    if not stop.is_set():
+        _see_delivered(publishers.values())
+    return playback, error
+
+
+def _clock_message(time: int) -> bytes:
+    """Return a ``rosgraph_msgs/msg/Clock``, whose one field is a time."""
+    if not 0 <= time < TIME_END:
+        raise LinkageError(
+            '--clock', f'{time} ns is beyond the times of messages', 'play it without --clock'
+        )
+    return time_message(time)
+
+
+def _wait_for_listener(publishers: Collection[Publisher], stop: Event, seconds: float) -> None:
+    """Wait until somebody listens to one of these, for so many seconds at most."""
+    deadline = monotonic() + seconds
+    while monotonic() < deadline and not stop.is_set():
+        if any(publisher.get_subscription_count() for publisher in publishers):
+            stop.wait(_ACQUAINTANCE)
+            return
+        stop.wait(_LOOK)
+
+
+def _see_delivered(publishers: Collection[Publisher]) -> None:
+    """Give the last reliable messages the time to come to those who listen."""
+    deadline = monotonic() + _DELIVERY
+    for publisher in publishers:
+        left = max(0.0, deadline - monotonic())
+        publisher.wait_for_all_acked(Duration(nanoseconds=round(left * NANOSECONDS)))

@@ -1,0 +1,216 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Run nodes in this process until a signal ends them: ROS up, spin, ROS down, exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+import gc
+from math import inf
+import sys
+from threading import Event, Thread
+from time import monotonic
+from typing import Protocol
+
+from linkage_ros.node.node import LinkageNode
+from linkage_ros.node.transports import leave_out_shared_memory
+from linkage_ros.signals import bounded_end, raising, StoppedError
+import rclpy
+from rclpy.executors import (
+    ExternalShutdownException,
+    ShutdownException,
+    SingleThreadedExecutor,
+)
+from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+
+EXIT_OK, EXIT_INCOMPLETE, EXIT_CONFIGURATION = 0, 1, 2
+
+_SWITCH_INTERVAL = 1e-4
+_LOOK = 0.1
+_AFTER_FAILURE = 0.01
+"""How long the executor rests, in [s], lest it does nothing but fail."""
+
+
+class View(Protocol):
+    """Shows a run as it goes."""
+
+    def show(self, node: LinkageNode) -> None:
+        """Show the node as it is now; called ten times a second, beside its executor."""
+
+    def close(self) -> None:
+        """Leave the screen to others; called before the node ends its run."""
+
+
+def run_linkage_node(
+    stop: Event,
+    arguments: Sequence[str],
+    overrides: Mapping[str, str] | None = None,
+    *,
+    seconds: float = inf,
+    view: View | None = None,
+    at_end: Callable[[LinkageNode], None] | None = None,
+) -> int:
+    """
+    Run the linkage node until the event, or for a time.
+
+    Parameters
+    ----------
+    stop
+        Ends the run; `linkage_ros.signals` sets it on signals.
+    arguments
+        Command line with ``--ros-args``, without the program's name.
+    overrides
+        Parameters of the node, beside those of the command line.
+    seconds
+        How long the run lasts, in [s].
+    view
+        What shows it.
+    at_end
+        Called when the run has ended and its bag is closed.
+
+    Returns
+    -------
+    code : int
+        0; 1 where the recording failed or the tick ended early; 2 for a configuration that is
+        wrong.
+
+    Raises
+    ------
+    StoppedError
+        A signal came before the node was configured.
+
+    """
+    # The tick shares the interpreter with executor and recorder: at the default of 5 ms it would
+    # wait for them that long.
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    leave_out_shared_memory()
+    try:
+        rclpy.init(
+            args=['linkage_node', *arguments], signal_handler_options=SignalHandlerOptions.NO
+        )
+        given = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
+        node = LinkageNode(parameter_overrides=given)
+    except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
+        print(f'linkage_node: {_first_line(error)}; see the README', file=sys.stderr)
+        rclpy.try_shutdown()
+        return EXIT_CONFIGURATION
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        code = _spin(node, executor, stop, monotonic() + seconds, view)
+        if code == EXIT_OK and at_end is not None:
+            at_end(node)
+        if node.recording.failure or (node.loop is not None and node.loop.failure):
+            code = code or EXIT_INCOMPLETE
+        return code
+    finally:
+        node.end()
+        with bounded_end():
+            executor.shutdown()
+            node.destroy_node()
+            rclpy.try_shutdown()
+
+
+def _spin(
+    node: LinkageNode,
+    executor: SingleThreadedExecutor,
+    stop: Event,
+    deadline: float,
+    view: View | None,
+) -> int:
+    """Start the node unless it is told not to, and see it through."""
+    autostart = node.get_parameter('autostart').value
+    if autostart:
+        with raising():
+            if stop.is_set():  # by a signal that came before
+                raise StoppedError
+            node.trigger_configure()
+        if node.failure is not None:
+            return EXIT_CONFIGURATION
+    with _no_garbage_in_ticks():
+        if autostart and node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
+            return EXIT_INCOMPLETE
+        gc.freeze()  # what was built for the ticks, too
+        return _attend(node, executor, stop, deadline, view)
+
+
+@contextmanager
+def _no_garbage_in_ticks() -> Iterator[None]:
+    """
+    Leave Python's search for cycles of objects to who calls `gc.collect`.
+
+    A tick makes no cycles, but with a hundred linkages so many objects that they would be searched
+    in every tick. What is there before the first is left out for good: that search takes 10 ms.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+        gc.unfreeze()
+
+
+def _attend(
+    node: LinkageNode,
+    executor: SingleThreadedExecutor,
+    stop: Event,
+    deadline: float,
+    view: View | None,
+) -> int:
+    """Spin until the end, and end the node's run."""
+    # The executor waits without a timeout, which no signal would end. So it has a thread of its
+    # own, and polls for nothing: each of its rounds costs as much as five ticks.
+    ended = Event()
+    serving = Thread(target=_serve, args=(node, executor, ended), name='executor', daemon=True)
+    serving.start()
+    while not stop.wait(_LOOK) and monotonic() < deadline and serving.is_alive():
+        gc.collect()
+        if view is not None:
+            view.show(node)
+        if node.loop is not None and node.loop.failure:
+            break
+    served = serving.is_alive()
+    # To shut the executor down while it waits is a race that it can lose, and then waits for ever.
+    # The node's watch wakes it, several times a second.
+    ended.set()
+    serving.join()
+    if view is not None:
+        view.close()
+    node.end()
+    return EXIT_OK if served else EXIT_INCOMPLETE
+
+
+def _serve(node: LinkageNode, executor: SingleThreadedExecutor, ended: Event) -> None:
+    # rclpy raises here what a service raises, as its own do for a parameter of no known type: what
+    # somebody asks for must not end the node, nor show a traceback.
+    while not ended.is_set():
+        try:
+            executor.spin_once()
+        except (ExternalShutdownException, ShutdownException) as error:  # noqa: PERF203
+            node.get_logger().error(f'the executor has stopped: {type(error).__name__}: {error}')
+            return
+        except Exception as error:  # noqa: BLE001 (see above)
+            node.report(f'a call failed: {type(error).__name__}: {_first_line(error)}')
+            ended.wait(_AFTER_FAILURE)
+
+
+def _first_line(error: Exception) -> str:
+    return ' '.join((str(error).strip() or type(error).__name__).splitlines()[:1])

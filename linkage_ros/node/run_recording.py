@@ -1,0 +1,294 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The bags of a run: where they go, what they say of themselves, and how they went."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
+import json
+from os.path import lexists
+from pathlib import Path
+import platform
+from typing import cast
+
+from linkage_ros import __version__
+from linkage_ros.bag.bag_file import compression_type
+from linkage_ros.bag.reader import RUN_FILE
+from linkage_ros.bag.recorder import Recorder, RecordingSummary
+from linkage_ros.bag.run_events import (
+    BEGUN,
+    CHOSEN,
+    MID_RUN,
+    OWN_EFFECTS,
+    SEED,
+    WITH_THE_RUN,
+)
+from linkage_ros.bag.snapshot import SnapshotMemory
+from linkage_ros.bag.storage import Storage
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.errors import RecordingError
+from linkage_ros.node.run_snapshots import (
+    Answer,
+    counts_text,
+    losses_text,
+    MemorySummary,
+    RunSnapshots,
+)
+from linkage_ros.node.tick_loop import TickLoop
+from linkage_ros.pipeline.pipeline import Line
+from linkage_ros.replay.replay import own_effects_here
+from linkage_ros.scene.scene import RecordParameters, Scene
+from rclpy.impl.rcutils_logger import RcutilsLogger
+
+_DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
+"""How a run is recorded that a service asks for where the scene says nothing."""
+
+
+EXTRA = 'extra'
+"""The key of a topic of which there may be several."""
+
+DESCRIPTION = 'description_topic'
+"""The key of the topic of the robot model."""
+
+
+class RunRecording:
+    """
+    Starts and stops the bags of a node, or its memory of the last seconds, and keeps account.
+
+    Parameters
+    ----------
+    logger
+        Where it says what it does.
+
+    """
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        self._logger = logger
+        self.ended: list[RecordingSummary] = []
+        """The recordings that have ended, and the snapshots."""
+        self.memories: list[MemorySummary] = []
+        """The memories that have ended."""
+        self.failure = ''
+        """Why a recording is not whole, or could not be started; '' while all are."""
+        self._seen: tuple[RecordingError, bool] | None = None
+        self.snapshots: RunSnapshots | None = None
+        """The memory; nothing where a bag is written as the run goes."""
+
+    def start(
+        self,
+        scene: Scene,
+        loop: TickLoop,
+        directory: str,
+        topics: Callable[[], Sequence[tuple[str, Topic]]],
+        description: bytes = b'',
+    ) -> str:
+        """
+        Start a bag that explains itself, or a memory; return what came of it, as one line.
+
+        Parameters
+        ----------
+        scene
+            What is run; its files go into the bag.
+        loop
+            The tick, which from here on hands over what it takes and publishes.
+        directory
+            Where the bag's folder is made; '' for where the scene says.
+        topics
+            Returns what will be recorded, in the order of their handles, each with the
+            key under which the bag's account of the run names it; that of several names a list.
+        description
+            The message of the topic `DESCRIPTION`, with which each file begins; empty for none.
+
+        """
+        record = scene.record or _DEFAULT
+        storage = record.storage
+        # What a running tick remembers is not in the bag: a replay has to know.
+        with_the_run = not loop.running
+
+        def new_bag(whole: bool) -> BagWriter:
+            begun = WITH_THE_RUN if whole and with_the_run else MID_RUN
+            folder = _folder(runs, record.name, scene.name)
+            files = _attachments(scene, described, begun, loop.pipeline.lines)
+            opening = [
+                (number, description)
+                for number, (key, _) in enumerate(described)
+                if key == DESCRIPTION
+            ]
+            return BagWriter(folder, [t for _, t in described], files, storage, opening)
+
+        try:
+            # Who calls a service does not know in which folder this process runs.
+            runs = Path(directory or record.directory).absolute()
+            described = topics()
+            if storage.snapshot_seconds:
+                compression_type(storage.compression, runs)  # not found out at the first snapshot
+                return self._remember(loop, storage, [t for _, t in described], new_bag)
+            writer = new_bag(True)
+        except (RecordingError, FileNotFoundError) as error:  # the folder we run in may be gone
+            self.failure = f'not recording: {error}'
+            self._logger.error(self.failure)
+            return self.failure
+        loop.recorder = Recorder(writer, capacity=record.queue, flush_period=storage.flush_period)
+        line = f'recording to {writer.folder}'
+        if record.name and writer.folder.name != record.name:
+            line += f': {record.name} exists already'
+        self._logger.info(line)
+        return line
+
+    def describe(self, loop: TickLoop) -> str:
+        """Return what is being done, in words; '' for nothing."""
+        if self.snapshots is not None:
+            return str(self.snapshots)
+        if loop.recorder is None:
+            return ''
+        waits = '' if loop.recorder.recording else f'; {loop.recorder.failure}'
+        return f'recording to {loop.recorder.folder}{waits}'
+
+    def has_ended(self, loop: TickLoop) -> bool:
+        """Return whether a bag has failed for good and is still there to be accounted for."""
+        return self.snapshots is None and loop.recorder is not None and loop.recorder.ended
+
+    def snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
+        """Begin to write what is in memory; as `RunSnapshots.begin`."""
+        if self.snapshots is None:
+            return (
+                'nothing is kept in memory; write record.snapshot_seconds in the scene, or call '
+                '~/start_recording'
+            )
+        return self.snapshots.begin(answer, wake)
+
+    def collect(self) -> None:
+        """Account and answer for a snapshot that has been written, if there is one."""
+        outcome = self.snapshots.collect() if self.snapshots is not None else None
+        if outcome is None:
+            return
+        if outcome.bag is not None:
+            self.ended.append(outcome.bag)
+        if outcome.failure:
+            self.failure = outcome.line
+            self._logger.error(outcome.line)
+        else:
+            self._logger.info(outcome.line)
+
+    def look(self, loop: TickLoop) -> bool:
+        """Say that the recording has failed, or goes on again; return whether there was news."""
+        recorder = loop.recorder
+        if recorder is None or recorder.failure is None:
+            return False
+        if self.snapshots is not None:
+            self.stop(loop)
+            return True
+        state = recorder.failure, recorder.recording
+        if state == self._seen:
+            return False
+        self._seen, self.failure = state, str(recorder.failure)
+        if recorder.recording:
+            line = f'recording to {recorder.folder} again, in a new file'
+            self._logger.info(line)
+        else:
+            self._logger.error(self.failure)
+        return True
+
+    def stop(self, loop: TickLoop) -> tuple[bool, str]:
+        """Close the bag or end the memory; return whether all went well, and a line."""
+        if loop.recorder is None:
+            return False, 'not recording'
+        recorder, loop.recorder = loop.recorder, None
+        if self.snapshots is not None:
+            return self._forget(self.snapshots)
+        summary = recorder.stop()
+        self.ended.append(summary)
+        failure = summary.failure or losses_text(summary.folder, summary.topics)
+        if failure:
+            self.failure = failure
+            line = f'{failure}: {counts_text(summary)}'
+            self._logger.error(line)
+        else:
+            line = f'recorded {summary.folder}: {counts_text(summary)}'
+            self._logger.info(line)
+        return not failure, line
+
+    def _remember(
+        self,
+        loop: TickLoop,
+        storage: Storage,
+        topics: Sequence[Topic],
+        new_bag: Callable[[bool], BagWriter],
+    ) -> str:
+        memory = SnapshotMemory(topics, storage.snapshot_seconds, storage.snapshot_bytes)
+        self.snapshots = RunSnapshots(memory, new_bag)
+        # To a tick it is a recorder: it offers, and looks at nothing else.
+        loop.recorder = cast('Recorder', memory)
+        line = str(self.snapshots)
+        self._logger.info(line)
+        return line
+
+    def _forget(self, snapshots: RunSnapshots) -> tuple[bool, str]:
+        snapshots.wait()
+        self.collect()
+        self.snapshots, summary = None, snapshots.end()
+        self.memories.append(summary)
+        if summary.failure:
+            self.failure = summary.failure
+            self._logger.error(str(summary))
+        else:
+            self._logger.info(str(summary))
+        return not summary.failure, str(summary)
+
+
+def _attachments(
+    scene: Scene, topics: Sequence[tuple[str, Topic]], begun: str, lines: Sequence[Line]
+) -> dict[str, tuple[str, bytes]]:
+    named = {key: topic.name for key, topic in topics if key != EXTRA}
+    run = {
+        'scene': scene.name,
+        'scene_folder': str(Path(scene.folder).resolve()),
+        **named,
+        'extra_topics': [topic.name for key, topic in topics if key == EXTRA],
+        BEGUN: begun,
+        SEED: scene.seed,
+        # A replay must not choose again.
+        **({CHOSEN: chosen} if (chosen := _chosen(lines)) else {}),
+        **({OWN_EFFECTS: own} if (own := own_effects_here(scene)) else {}),
+        'linkage_ros': __version__,
+        'python': platform.python_version(),
+        'machine': platform.machine(),
+    }
+    return {
+        **{name: ('application/yaml', data) for name, data in scene.files.items()},
+        RUN_FILE: ('application/json', json.dumps(run).encode()),
+    }
+
+
+def _chosen(lines: Sequence[Line]) -> dict[str, dict[str, Mapping[str, float]]]:
+    """Return by the name of each linkage the solver that was chosen, where one was."""
+    return {
+        line.member.name: {line.choice.solver: line.choice.parameters}
+        for line in lines
+        if line.choice is not None
+    }
+
+
+def _folder(directory: Path, name: str, scene: str) -> Path:
+    """Return where a bag goes: one that exists keeps its name, and this one gets a number."""
+    name = name or f'{scene}_{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}'
+    folder, number = directory / name, 1
+    while lexists(folder):
+        number += 1
+        folder = directory / f'{name}_{number}'
+    return folder

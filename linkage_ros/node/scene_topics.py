@@ -1,0 +1,232 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a scene has on the graph beside its joint states: the topics and services it calls for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TYPE_CHECKING
+
+from linkage_ros.bag.topic import Topic
+from linkage_ros.messages.single_values import text_message
+from linkage_ros.node.bag_topics import bag_topic, message_type
+from linkage_ros.node.recorded_topics import RecordedTopics
+from linkage_ros.node.run_recording import DESCRIPTION, EXTRA
+from linkage_ros.node.tick_loop import Take
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.replay import change_text
+from linkage_ros.scene.scene import Scene
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool
+
+if TYPE_CHECKING:
+    from linkage_ros.faults.injection import Change
+
+CRANK_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Sensor data, but deeper: at a slow tick every sample still gets into the bag."""
+
+OUTPUT_QOS = QoSProfile(depth=10)
+"""Reliable, volatile, as robot_state_publisher and RViz take it."""
+
+_DESCRIPTION_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""As robot_state_publisher and RViz take a robot model, at whatever time they start."""
+
+_CHANGES_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""One who joins later has to know which faults are on."""
+
+Inject = Callable[[str, SetBool.Request, SetBool.Response], SetBool.Response]
+
+
+class SceneTopics:
+    """
+    Made when a scene is configured, and gone when it is cleaned up.
+
+    Parameters
+    ----------
+    node
+        Whose they are.
+    on_inject
+        Serves a fault's service, given its name.
+
+    """
+
+    def __init__(self, node: Node, on_inject: Inject) -> None:
+        self._node = node
+        self._on_inject = on_inject
+        self._kinds: dict[str, str] = {}
+        self._changes: Publisher | None = None
+        self._description: Publisher | None = None
+        self.description = b''
+        """The message with the robot model, serialized; empty where the scene asks for none."""
+        self._injectors: list[Any] = []
+        self.extras: list[Publisher] = []
+        """Publishers of the pipeline's extras."""
+        self._crank_name = ''
+        self.crank: Subscription | None = None
+        """To the topic that the drives listen to; nothing where they listen to none."""
+
+    def connect(self, pipeline: Pipeline) -> None:
+        """
+        Have what a scene calls for, and nothing else.
+
+        Raises
+        ------
+        LinkageError
+            Where the package of a message is not installed.
+
+        """
+        self.disconnect()
+        node, overridable = self._node, QoSOverridingOptions.with_default_policies()
+        for extra in pipeline.extras:
+            self.extras.append(
+                node.create_publisher(
+                    message_type(extra.message, f'effects.{extra.effect}'),
+                    extra.topic,
+                    OUTPUT_QOS,
+                    qos_overriding_options=overridable,
+                )
+            )
+        self._crank_name = pipeline.topic
+        if pipeline.topic:
+            self.crank = node.create_subscription(
+                JointState,
+                pipeline.topic,
+                never_called,
+                CRANK_QOS,
+                callback_group=TakenByTick(),
+                qos_overriding_options=overridable,
+            )
+        if pipeline.injection is not None:
+            self._changes = node.create_publisher(
+                message_type('std_msgs/msg/String', 'faults'), '~/faults', _CHANGES_QOS
+            )
+            for name, fault in pipeline.injection.faults.items():
+                self._kinds[name] = fault.kind
+                serve = partial(self._on_inject, name)
+                self._injectors.append(node.create_service(SetBool, f'~/inject/{name}', serve))
+
+    def describe(self, scene: Scene, pipeline: Pipeline) -> None:
+        """
+        Publish the linkages as a robot model, once and for whoever comes later.
+
+        Raises
+        ------
+        LinkageError
+            Where the published joints do not tell where all links are.
+
+        """
+        from linkage_ros.robot_models.urdf import urdf  # local import: few scenes ask for it
+        from linkage_ros.scene.robot_model import scene_model  # local import: as above
+
+        text_type = message_type('std_msgs/msg/String', 'robot_description')
+        model = scene_model(scene, pipeline.closures, urdf).decode()
+        self._description = self._node.create_publisher(
+            text_type, 'robot_description', _DESCRIPTION_QOS
+        )
+        self.description = text_message(model)
+        self._description.publish(self.description)
+
+    def disconnect(self) -> None:
+        """Have nothing."""
+        for publisher in (*self.extras, self._changes, self._description):
+            if publisher is not None:
+                self._node.destroy_publisher(publisher)
+        for service in self._injectors:
+            self._node.destroy_service(service)
+        if self.crank is not None:
+            self._node.destroy_subscription(self.crank)
+        self.extras, self._injectors, self._kinds = [], [], {}
+        self._changes = self._description = self.crank = None
+        self.description = b''
+
+    @property
+    def crank_topic(self) -> str:
+        """Return the resolved name of the topic that the drives listen to; '' for none."""
+        return '' if self.crank is None else str(self.crank.topic_name)
+
+    @property
+    def crank_publishers(self) -> list[TopicEndpointInfo]:
+        """Return who publishes on that topic."""
+        # By the name before remapping: rclpy remaps what it is asked for, a second time too.
+        if self.crank is None:
+            return []
+        return self._node.get_publishers_info_by_topic(self._crank_name)
+
+    @property
+    def take(self) -> Take | None:
+        """Return what takes the next message for the drives, if they listen to a topic."""
+        if self.crank is None:
+            return None
+        return partial(self.crank.handle.take_message, JointState, True)
+
+    def publish_change(self, change: Change) -> bytes:
+        """Publish that a fault has begun or ended; return the message, serialized."""
+        assert self._changes is not None
+        message = text_message(change_text(change, self._kinds[change.name]))
+        self._changes.handle.publish_raw(message)
+        return message
+
+    def described(self, handles: RecordedTopics) -> dict[int, tuple[str, Topic]]:
+        """Describe the topics for a bag, by their handles."""
+        node, topics = self._node, {}
+        if handles.crank is not None:
+            publishers = self.crank_publishers
+            qos = publishers[0].qos_profile if publishers else CRANK_QOS
+            topics[handles.crank] = 'crank_topic', bag_topic(self.crank_topic, JointState, qos)
+        if handles.faults is not None and (changes := self._changes) is not None:
+            described = bag_topic(changes.topic_name, changes.msg_type, _CHANGES_QOS)
+            topics[handles.faults] = 'faults_topic', described
+        # For the replay alone: on the graph there is nothing to say of these.
+        time_type = message_type('builtin_interfaces/msg/Time', 'record')
+        withheld, resets = (
+            bag_topic(f'{node.get_fully_qualified_name()}/{name}', time_type, OUTPUT_QOS)
+            for name in ('withheld', 'resets')
+        )
+        if handles.withheld is not None:
+            topics[handles.withheld] = 'withheld_topic', withheld
+        for handle, extra in zip(handles.extras, self.extras, strict=True):
+            described = bag_topic(extra.topic_name, extra.msg_type, extra.qos_profile)
+            topics[handle] = EXTRA, described
+        topics[handles.resets] = 'resets_topic', resets
+        if (model := self._description) is not None:
+            described = bag_topic(model.topic_name, model.msg_type, _DESCRIPTION_QOS)
+            topics[handles.description] = DESCRIPTION, described
+        return topics
+
+
+class TakenByTick(CallbackGroup):
+    """A group whose entities no executor waits for: the tick takes from them itself."""
+
+    def can_execute(self, _: Any) -> bool:
+        return False
+
+    def beginning_execution(self, _: Any) -> bool:
+        return False
+
+    def ending_execution(self, _: Any) -> None:
+        pass
+
+
+def never_called(_: Any) -> None:
+    """Be the callback that a subscription must have."""

@@ -1,0 +1,783 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The tick of a scene, from top to bottom: crank, closure, mechanism, sensors, message.
+
+Building puts in only what the scene names; a tick asks no scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from importlib import import_module
+from itertools import chain
+from operator import add
+from typing import Any, NamedTuple, TYPE_CHECKING
+
+from linkage_ros.drives.drive import Context, CrankState, Drive, DRIVES
+from linkage_ros.effects.angle_unwrap import all_wrapped, beginnings, Continuous
+from linkage_ros.effects.stage import (
+    Effect,
+    effect_of,
+    in_order,
+    LOADED,
+    module_of,
+    Motion,
+    needs,
+    PUBLISHED_WITH,
+    Reading,
+    SensorStage,
+    WriterStage,
+)
+from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.kinematics.arithmetic import all_finite
+from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import JointStateWriter, Rejection
+from linkage_ros.pipeline.sample_router import Routes
+from linkage_ros.pipeline.straight_tick import (
+    Numbers,
+    Seen,
+    Straight,
+    straight,
+    straight_look,
+    straight_share,
+    straight_tick,
+)
+from linkage_ros.scene.scene import Member, Scene
+from linkage_ros.solvers.registry import SOLVERS
+
+if TYPE_CHECKING:
+    from linkage_ros.faults.injection import Injection
+    from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
+    from linkage_ros.solvers.solver import Choice
+
+_WITHHOLDING = {'rate_limit', 'dropout', 'delay', 'jitter'}
+"""Effects that may leave a tick without a message."""
+
+_GOING_ON = {'backlash'}
+"""Effects that go on where a linkage is open."""
+
+_KINEMATIC = ('velocity', 'acceleration')
+"""Stages of the mechanism that a compiled linkage does itself, by its derivatives."""
+
+_OF_FORCES = {'pin_forces'}
+"""Effects whose messages are made of the forces in the joints alone."""
+
+
+class Look(NamedTuple):
+    """
+    What a linkage comes to at a tick, step by step.
+
+    Attributes
+    ----------
+    crank
+        The crank; nothing where there is none.
+    position
+        The loop; nothing where there is no crank.
+    motion
+        What the mechanism does; nothing where the loop has no pose.
+    reading
+        What is published of it; nothing where nothing is. A delay may have one where the linkage
+        has no pose.
+
+    """
+
+    crank: CrankState | None
+    position: Position | None
+    motion: Motion | None
+    reading: Reading | None
+
+
+class Tick(NamedTuple):
+    """
+    What a tick came to.
+
+    Attributes
+    ----------
+    message
+        The JointState, serialized; empty where nothing is published.
+    extras
+        For each of the pipeline's further topics its message, serialized; empty where nothing is
+        published on it. Empty as a whole where nothing is on any.
+    seen
+        What each linkage came to, as far as it was worked out.
+    lines
+        The linkages.
+
+    """
+
+    message: bytes
+    extras: tuple[bytes, ...]
+    seen: Sequence[Look | Seen | Numbers]
+    lines: Sequence[Line]
+
+    @property
+    def looks(self) -> tuple[Look, ...]:
+        """All that each linkage came to; what no message needed is worked out here."""
+        return tuple(line.looked(seen) for line, seen in zip(self.lines, self.seen, strict=True))
+
+
+class Extra(NamedTuple):
+    """
+    A message beside the joint states.
+
+    Attributes
+    ----------
+    effect
+        What calls for it.
+    topic, message
+        Its topic and its type: package/msg/Type.
+    writer
+        Writes it.
+
+    """
+
+    effect: str
+    topic: str
+    message: str
+    writer: WriterStage
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """
+    Picks out of a motion the numbers that a scene asks of a compiled linkage.
+
+    Attributes
+    ----------
+    of
+        What it follows from: of two that are equal in it the numbers are the same.
+    pick
+        Picks them.
+
+    """
+
+    of: list[Any]
+    pick: Callable[[CompiledMotion], Sequence[Sequence[float]]] = field(compare=False)
+
+    def __call__(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
+        """Return the numbers, in groups."""
+        return self.pick(motion)
+
+
+class Line:
+    """
+    A linkage at work. To reset it, build it again.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    member
+        Its linkage, drive and effects.
+    closure
+        The linkage, where it has been solved before: it remembers nothing, and serves every reset.
+    injection
+        The faults of the scene, if it has any.
+
+    Raises
+    ------
+    FileError
+        Where something does not go together; where the linkage does not close.
+
+    """
+
+    def __init__(
+        self, scene: Scene, member: Member, closure: Closure | None, injection: Injection | None
+    ) -> None:
+        self.member = member
+        try:
+            self._build(scene, closure, injection)
+        except DefinitionError as error:
+            of_linkage = error.where.startswith('masses')
+            content = member.linkage_content if of_linkage else member.content
+            raise content.error(error.where, error.reason, error.remedy) from None
+
+    def _build(self, scene: Scene, closure: Closure | None, injection: Injection | None) -> None:
+        member = self.member
+        _refuse_not_imported(member)
+        drive, drive_parameters = member.drive
+        drive_module = import_module(DRIVES[drive])
+        named = set(member.effects)
+        named |= {also for effect in named for also in PUBLISHED_WITH.get(effect, ())}
+        moves_by_rates = getattr(drive_parameters, 'carry_forward', True)
+        starting = named - _between_readings(member, named, moves_by_rates)
+        computed = named | {need for effect in starting for need in needs(effect)}
+        effects = [effect_of(name) for name in in_order(computed)]
+        self.stages = tuple(effect.name for effect in effects)
+        """Names of the effects that are computed, in physical order."""
+        forced = drive == 'torque' or not computed.isdisjoint(LOADED)
+        _refuse_idle(member, forced)
+        _refuse_solver(member, forced)
+
+        seed = f'{scene.seed}/{member.name}'
+        given = {
+            effect.name: member.effects.get(effect.name) or effect.parameters()
+            for effect in effects
+        }
+        self.closure = closure or _closure(member, effects, given, seed, forced)
+        self.context = context = Context(
+            closure=self.closure,
+            rate=scene.rate,
+            needs_rate='velocity' in computed,
+            seed=seed,
+            loads=member.loads,
+            friction=given['friction'].friction if 'friction' in given else None,
+            prefix=member.prefix,
+            dependent=scene.dependent_joints,
+            effects=frozenset(member.effects),
+            moves_by_rates=moves_by_rates,
+        )
+
+        # Crank.
+        self.topic: str = getattr(drive_module, 'TOPIC', '')
+        """Topic that the drive listens to; '' for none."""
+        self.drive: Drive = drive_module.build(drive_parameters, context)
+        self._read_message = drive_module.reader(context) if self.topic else None
+        self._spoil = injection.build('message') if injection is not None else []
+        if self._spoil and not self.topic:
+            raise DefinitionError(
+                'faults', f'not_a_number spoils messages, and {drive} has none', 'leave it out'
+            )
+        self._drive_stages = [
+            effect.drive_stage(given[effect.name], context)
+            for effect in effects
+            if effect.drive_stage is not None
+        ]
+        # Closure and mechanism.
+        self._close = self.closure.position
+        if member.silent_beyond_limits and self.closure.bounds:
+            self._close = _silent_beyond(self._close, self.closure)
+        self._faults = injection.build('mechanism', context) if injection is not None else []
+        self._stages = [
+            effect.stage(given[effect.name], context)
+            for effect in effects
+            if effect.stage is not None
+        ]
+        self._read_off = named & computed
+        # Sensors.
+        sensors: dict[str, Any] = {
+            effect.name: effect.sensor(given[effect.name], context)
+            for effect in effects
+            if effect.sensor is not None
+        }
+        if {'encoder', 'rate_limit'} <= set(sensors):
+            sensors['rate_limit'].read_by(sensors['encoder'])
+        broken = injection.build('sensor', member.joints) if injection is not None else []
+        angles = Continuous(self.closure.turning, beginnings(self.closure))
+        behind = [*sensors.values(), *broken]
+        running = [angles] if behind or not scene.wrapped else []
+        if behind and 'velocity' in computed - named:
+            # It serves between readings, and is not published.
+            self._read_off |= {'velocity'}
+            behind.append(_without_rates)
+        if scene.wrapped:
+            behind.append(all_wrapped(self.closure.turning))
+        self._sensors = [SensorStage.of(sensor) for sensor in (*running, *behind)]
+        # Messages.
+        self.extras = [
+            _extra(effect, effect.writer(given[effect.name], context), member.name)
+            for effect in effects
+            if effect.writer is not None and effect.name in named
+        ]
+        """The topics beside the joint states."""
+
+        self._read_behind = partial(self._read, first=len(running)) if behind else None
+        self._straight: Straight | None = None
+        moved = {effect.name for effect in effects if effect.stage is not None}
+        if self.closure.by_steps and moved <= {*_KINEMATIC, *LOADED} and not self._faults:
+            wanted = None
+            if 'acceleration' in moved:
+                of = [given[name] for name in self.stages if name in moved]
+                of += [self._read_off, context.loads, context.friction]
+                wanted = _Wanted(of, self._ideal)
+            compiled = self.closure.compiled(len(moved.intersection(_KINEMATIC)), wanted)
+            # Where forces have no solution a path has less.
+            if len({tuple(map(len, path.outputs)) for path in compiled.paths}) == 1:
+                running_on = angles if running else None
+                self._straight = straight(self.drive, self._drive_stages, compiled, running_on)
+
+    @property
+    def whole(self) -> Straight | None:
+        """Return the usual tick up to what is published, if all of it is written as text."""
+        of_seen = all(
+            extra.writer.of_reading or extra.effect in _OF_FORCES for extra in self.extras
+        )
+        return self._straight if self._read_behind is None and of_seen else None
+
+    @cached_property
+    def see(self) -> Callable[[int], Look | Seen]:
+        """Return a function of the time, in [ns]: what the linkage comes to."""
+        if self._straight is None:
+            return self._see
+        return straight_look(self._straight, self._read_behind, self.look)
+
+    def _see(self, now: int) -> Look:
+        """Return what the linkage comes to at a time, in [ns], step by step."""
+        crank = self.drive.state(now)
+        if crank is not None:
+            for stage in self._drive_stages:
+                crank = stage(crank)
+        return self.look(now, crank)
+
+    def look(self, now: int, crank: CrankState | None) -> Look:
+        """Return what the linkage comes to, from the crank on."""
+        if crank is None:
+            return Look(None, None, None, self._read_gap(now))
+        position = self._close(*crank.angles)
+        for fault in self._faults:
+            position = fault(position)
+        if not position.joints:
+            return Look(crank, position, None, self._read_gap(now))
+        motion = self._moved(crank, position)
+        return Look(crank, position, motion, self._read(now, self._observed(now, motion)))
+
+    def _ideal(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
+        """Return what an ideal sensor reads of a motion on symbols, and the forces in joints."""
+        acceleration = motion.acceleration
+        if acceleration is None or not all_finite(acceleration.joints):
+            return []
+        moved = Motion(CrankState((), (), (), 0), *motion, (), (), ())
+        _velocity, _acceleration, *stages = self._stages
+        for stage in stages:
+            moved = stage(moved)
+        reactions = [] if _OF_FORCES.isdisjoint(self._read_off) else [*chain(*moved.reactions)]
+        return [*self._observed(0, moved)[1:], reactions]
+
+    def _moved(self, crank: CrankState, position: Position) -> Motion:
+        """Return what the mechanism does in a pose."""
+        motion = Motion(crank, position, None, None, (), (), ())
+        for stage in self._stages:
+            motion = stage(motion)
+        return motion
+
+    def _observed(self, now: int, motion: Motion) -> Reading:
+        """Return what an ideal sensor reads of a motion: what is named, and no more."""
+        position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
+        efforts: tuple[float, ...] = ()
+        if 'effort' in self._read_off and motion.efforts:
+            # Of the inputs, which are published first; 0 for the others.
+            efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
+        return Reading(
+            now,
+            tuple(map(add, position.joints, motion.shift)) if motion.shift else position.joints,
+            velocity.joints if velocity and 'velocity' in self._read_off else (),
+            acceleration.joints if acceleration and 'acceleration' in self._read_off else (),
+            efforts,
+        )
+
+    def _read(self, now: int, ideal: Reading, first: int = 0) -> Reading | None:
+        """Return what the sensors, from a number on, make of what an ideal one reads."""
+        reading: Reading | None = ideal
+        gap = False
+        for sensor in self._sensors[first:]:
+            if reading is not None:
+                reading = sensor.read(now, reading)
+                gap = sensor.gap is not None
+            elif sensor.silence is not None:
+                reading = sensor.silence(now, gap)
+        return reading
+
+    def _read_gap(self, now: int) -> Reading | None:
+        """Return what the sensors read where the linkage has no pose."""
+        reading: Reading | None = None
+        for sensor in self._sensors:
+            if reading is not None:
+                reading = sensor.read(now, reading)
+            elif sensor.gap is not None:
+                reading = sensor.gap(now)
+        return reading
+
+    def looked(self, seen: Look | Seen | Numbers) -> Look:
+        """Return all that a linkage came to: of a straight tick it is worked out here."""
+        if isinstance(seen, Look):
+            return seen
+        crank_numbers, numbers, _ = seen
+        crank = CrankState(*crank_numbers)
+        position = self._close(*crank.angles)
+        reading = None if numbers is None else Reading(*numbers)
+        return Look(crank, position, self._moved(crank, position), reading)
+
+    def write_extras(self, now: int, seen: Look | Seen) -> list[bytes]:
+        """Return the messages beside the joint states at a time, in [ns]; b'' for none."""
+        return [self._written(extra, now, seen) for extra in self.extras]
+
+    def _written(self, extra: Extra, now: int, seen: Look | Seen) -> bytes:
+        writer = extra.writer
+        if writer.due is not None and not writer.due(now):
+            return b''
+        reading = seen.reading
+        forces = seen if extra.effect in _OF_FORCES and isinstance(seen, Seen) else None
+        if writer.of_reading or forces is not None:
+            return b'' if reading is None else writer.write(now, forces, reading)
+        _, position, motion, _ = self.looked(seen)
+        if motion is not None:
+            return b'' if reading is None else writer.write(now, motion, reading)
+        if position is None or writer.no_pose is None:
+            return b''
+        return writer.no_pose(now, position)
+
+    @property
+    def gap_begins(self) -> bool:
+        """Return whether a gap began with the last tick, if that had no pose."""
+        return any(sensor.gap_begins for sensor in self._sensors)
+
+    @property
+    def choice(self) -> Choice | None:
+        """Return what closes the loops and why, where an accuracy is asked for; else nothing."""
+        found: Choice | None = getattr(self.closure, 'choice', None)
+        return found
+
+    def offer(self, message: bytes, now: int) -> Rejection | None:
+        """Take a message of the drive's topic, serialized, at a time in [ns], or say why not."""
+        if self._read_message is None:
+            return Rejection.MISSING
+        for spoil in self._spoil:
+            message = spoil(message)
+        sample = self._read_message(message)
+        if isinstance(sample, Rejection):
+            return sample
+        rejection: Rejection | None = self.drive.offer(sample, now)  # type: ignore[attr-defined]
+        return rejection
+
+
+def _between_readings(member: Member, named: set[str], moves_by_rates: bool) -> set[str]:
+    """Return the effects that mix readings, where they do so without rates or not at all."""
+    found = {'jitter', 'delay'} & named
+    if moves_by_rates and 'delay' in found:
+        delay = module_of('delay')
+        parameters = member.effects.get('delay') or delay.PARAMETERS()
+        return set() if delay.interpolates(parameters, named) else {'delay'}
+    return set() if moves_by_rates else found
+
+
+def _extra(effect: Effect, writer: Any, member: str) -> Extra:
+    topic = f'~/{member}/{effect.topic[2:]}' if member else effect.topic
+    written = WriterStage.of(writer, of_reading=effect.of_reading)
+    return Extra(effect.name, topic, effect.message, written)
+
+
+def _without_rates(_now: int, reading: Reading) -> Reading:
+    """Let rates end that have served between readings."""
+    return reading._replace(rates=())
+
+
+def _silent_beyond(close: Callable[..., Position], closure: Closure) -> Callable[..., Position]:
+    """Return what closes the loops, and has no joints to publish where one is beyond limits."""
+
+    def within(*inputs: float) -> Position:
+        position = close(*inputs)
+        if position.joints and closure.bounds.exceeded(inputs, position.joints) is not None:
+            return replace(position, status=Status.LIMITED, joints=())
+        return position
+
+    return within
+
+
+def _refuse_not_imported(member: Member) -> None:
+    if member.not_imported:
+        from linkage_ros.effects.user_effects import (
+            found_in,  # local import: only where a scene has one
+        )
+
+        name = member.not_imported[0]
+        raise DefinitionError(
+            f'effects.{name}',
+            f'names a module, and what a bag names is not imported unasked; the name leads to '
+            f'{found_in(name)} here',
+            '--trust-effects imports it',
+        )
+
+
+def _refuse_idle(member: Member, forced: bool) -> None:
+    """Refuse what acts on nothing."""
+    # Of several linkages those without forces may share what others need.
+    own = member.content
+    for given, key in (
+        (member.loads and 'loads' in own, 'loads'),
+        ('friction' in member.effects and 'effects' in own, 'effects.friction'),
+    ):
+        if given and not forced:
+            raise DefinitionError(
+                key,
+                'acts on nothing here: no effect and no drive asks for forces',
+                f'leave it out, drive by torque, or name one of {listed(LOADED)}',
+            )
+
+
+def _refuse_solver(member: Member, forced: bool) -> None:
+    """Refuse what has no poses of dyads where forces start from these."""
+    if forced and member.solver is not None and member.solver[0] != 'closed_form':
+        raise DefinitionError(
+            'solver',
+            f'{member.solver[0]} finds no forces, and an effect or the drive asks for them',
+            f'write closed_form, or leave {listed(LOADED)} and torque out',
+        )
+
+
+def _closure(
+    member: Member,
+    effects: Sequence[Effect],
+    given: Mapping[str, Any],
+    seed: str,
+    forced: bool,
+) -> Closure:
+    linkage = member.linkage
+    for effect in effects:
+        if effect.alter is not None:
+            random = Context.generator(seed, effect.name)
+            linkage = effect.alter(given[effect.name], linkage, random)
+    if member.accuracy is not None:
+        from linkage_ros.solvers import choose  # local import: only where an accuracy is asked for
+
+        if forced:
+            return choose.only_closed_form(linkage, 'forces start from it')
+        return choose.choose(linkage, member.accuracy)
+    if member.solver is not None:
+        name, solving = member.solver
+        closure: Closure = import_module(SOLVERS[name]).build(solving, linkage)
+        return closure
+    return member.closure if linkage is member.closure.linkage else Closure(linkage)
+
+
+class Pipeline:
+    """
+    A scene at work. To reset it, build it again.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    closures
+        Its linkages, where they are at hand: they remember nothing, and serve every reset.
+    injection
+        Its faults, where they are at hand: they outlive a reset.
+
+    Raises
+    ------
+    FileError
+        Where something in the scene does not go together.
+    TypeError
+        Where it is not a scene.
+
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        closures: Sequence[Closure] | None = None,
+        injection: Injection | None = None,
+    ) -> None:
+        if not isinstance(scene, Scene):
+            raise TypeError(f'scene: {quoted(scene)} is not a Scene; load_scene() reads files')
+        if injection is None and scene.faults:
+            from linkage_ros.faults.injection import Injection
+
+            injection = Injection(scene.faults)
+        self.injection = injection
+        """The faults; nothing where the scene has none."""
+        self.lines = [
+            Line(scene, member, closures[number] if closures else None, injection)
+            for number, member in enumerate(scene.members)
+        ]
+        self.extras = [extra for line in self.lines for extra in line.extras]
+        """The topics beside the joint states."""
+        topics = sorted({line.topic for line in self.lines} - {''})
+        if len(topics) > 1:
+            raise scene.members[0].content.error(
+                'drive', f'{" and ".join(topics)} are listened to', 'drive all by one of them'
+            )
+        _refuse_stamps(scene)
+        self.topic = topics[0] if topics else ''
+        """The topic that the drives listen to; '' for none."""
+        # Of the drives only that from a topic remembers nothing of the ticks.
+        self._goes_on = any(
+            line.member.drive[0] != 'topic' or not _GOING_ON.isdisjoint(line.stages)
+            for line in self.lines
+        )
+        self.withholds = (
+            self._goes_on
+            or injection is not None
+            or any(not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines)
+        )
+        """Whether there may be ticks without a message of which a replay has to know."""
+        self._routes = Routes({line: line.member.inputs for line in self.lines})
+        self._offered = 0
+        self._newest: dict[Line, int] = {}
+        self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
+        self.tick = self._ticking()
+        """Ticks at a time, in [ns]."""
+
+    def offer(self, message: bytes, now: int) -> Rejection | None:
+        """
+        Take a crank message, serialized, or say why not.
+
+        Parameters
+        ----------
+        message
+            A ``sensor_msgs/msg/JointState`` in CDR.
+        now
+            The time, in [ns].
+
+        """
+        if len(self.lines) == 1:
+            return self.lines[0].offer(message, now)
+        # It may be for one linkage or for several: it is good if one of them takes it.
+        self._offered += 1
+        rejections = []
+        for line in self._routes.find(message):
+            rejections.append(line.offer(message, now))
+            if rejections[-1] is None:
+                self._newest[line] = self._offered
+        return None if None in rejections else next(iter(rejections), Rejection.MISSING)
+
+    def newly_used(self) -> int:
+        """Return of how many of the good messages since the last call no newer one came."""
+        if len(self.lines) == 1:
+            return 1
+        numbers = set(self._newest.values())
+        self._newest.clear()
+        return len(numbers)
+
+    def _made(self, now: int, seen: Sequence[Look | Seen]) -> Tick:
+        """Return what a tick comes to; joints are left out that have no reading."""
+        extras: tuple[bytes, ...] = ()
+        if self.extras:
+            pairs = zip(self.lines, seen, strict=True)
+            extras = tuple([extra for line, one in pairs for extra in line.write_extras(now, one)])
+        readings = [one.reading for one in seen if one.reading is not None]
+        if not readings:
+            return Tick(b'', extras if any(extras) else (), seen, self.lines)
+        present = tuple([one.reading is not None for one in seen])
+        writer = self._writers.get(present) or self._writer(present)
+        stamp = max([reading.stamp for reading in readings])
+        return Tick(writer.write(stamp, *_joined(readings)), extras, seen, self.lines)
+
+    def _ticking(self) -> Callable[[int], Tick]:
+        """Return a function of the time, in [ns]: the tick, as one text where it can be."""
+        wholes = [whole for line in self.lines if (whole := line.whole) is not None]
+        several = len(self.lines) > 1
+        if len(wholes) < len(self.lines) or (several and self.extras):
+            see = [line.see for line in self.lines]
+            return lambda now: self._made(now, [look(now) for look in see])
+        if several:
+            return self._together(wholes)
+        (line,), (whole,) = self.lines, wholes
+        return straight_tick(
+            whole,
+            self._writer((True,)),
+            [extra.writer for extra in self.extras],
+            Tick,
+            self.lines,
+            lambda now, crank: self._made(now, [line.look(now, crank)]),
+        )
+
+    def _together(self, wholes: Sequence[Straight]) -> Callable[[int], Tick]:
+        """Return the tick of several linkages that are all written as text."""
+        lines = self.lines
+        shares = [straight_share(one, line.look) for one, line in zip(wholes, lines, strict=True)]
+        write = self._writer((True,) * len(lines)).write
+        count = sum(len(whole.joints) for whole in wholes)
+
+        def tick(now: int) -> Tick:
+            positions: list[float] = []
+            rates: list[float] = []
+            efforts: list[float] = []
+            seen = [share(now, positions, rates, efforts) for share in shares]
+            if len(positions) < count:
+                return self._made(now, [_named(one) for one in seen])
+            message = write(now, positions, _of_all(rates, count), _of_all(efforts, count))
+            return Tick(message, (), seen, lines)
+
+        return tick
+
+    def remembers(self, tick: Tick) -> bool:
+        """Return whether a tick without a message changes what comes after it."""
+        return any(
+            not isinstance(seen, Look)
+            or line.gap_begins
+            or (seen.position is not None and (bool(seen.position.joints) or self._goes_on))
+            for line, seen in zip(self.lines, tick.seen, strict=True)
+        )
+
+    def _writer(self, present: tuple[bool, ...]) -> JointStateWriter:
+        joints = [
+            joint
+            for line, there in zip(self.lines, present, strict=True)
+            if there
+            for joint in line.member.joints
+        ]
+        self._writers[present] = writer = JointStateWriter(joints)
+        return writer
+
+    @property
+    def closures(self) -> list[Closure]:
+        """Return the linkages."""
+        return [line.closure for line in self.lines]
+
+    @property
+    def newest_stamp(self) -> int:
+        """Stamp of the newest good sample, in [ns]; 0 before the first."""
+        return max(line.drive.stamp for line in self.lines)
+
+    @property
+    def max_age(self) -> int:
+        """Age of the newest sample beyond which something is amiss, in [ns]; 0 for never."""
+        return max(line.drive.max_age for line in self.lines)
+
+
+def _refuse_stamps(scene: Scene) -> None:
+    """Refuse stamps of measurement that one message of several linkages could not bear."""
+    delays = [member.effects.get('delay') for member in scene.members]
+    for member, delay in zip(scene.members, delays, strict=True):
+        if delay is not None and delay.stamp == 'measured' and set(delays) != {delay}:
+            raise member.content.error(
+                'effects.delay.stamp',
+                'measured is a stamp of its own, and all linkages share one message',
+                'give all linkages the same delay, or write arrival',
+            )
+
+
+def _joined(
+    readings: Sequence[Reading],
+) -> tuple[list[float], list[float], list[float]]:
+    """
+    Return positions, rates and efforts of all readings.
+
+    The arrays of a JointState are of one length or empty. Where some readings have rates and
+    others, at a toggle or without the effect, have none, none are published; so with efforts.
+    """
+    positions = [value for reading in readings for value in reading.joints]
+    rates = [value for reading in readings for value in reading.rates]
+    efforts = [value for reading in readings for value in reading.efforts]
+    n = len(positions)
+    return positions, _of_all(rates, n), _of_all(efforts, n)
+
+
+def _of_all(values: list[float], count: int) -> list[float]:
+    """Return values if there is one for each joint, else none."""
+    return values if len(values) == count else []
+
+
+def _named(seen: Look | Numbers) -> Look | Seen:
+    """Return what a linkage comes to with the names of its parts."""
+    if isinstance(seen, Look):
+        return seen
+    crank, reading, reactions = seen
+    return Seen(CrankState(*crank), Reading(*reading), reactions)

@@ -1,0 +1,299 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The usual tick of a linkage as one function, written as text: nothing between its formulas.
+
+In the usual tick there is a crank, every loop closes, the linkage and its forces are on the path
+that was compiled, and no published angle jumps. All else, the first tick among it, is left to the
+plain tick. Both have the same bits.
+
+A tick comes once a millisecond, to a processor that has done other things since. What it costs
+then is the memory that it touches: frames, objects, functions. A straight function of local
+variables touches least.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import chain, islice
+from math import pi
+from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
+
+from linkage_ros.drives.drive import CrankState
+from linkage_ros.effects.stage import Reading
+from linkage_ros.generated_code import written
+
+if TYPE_CHECKING:
+    from linkage_ros.drives.drive import Drive
+    from linkage_ros.effects.angle_unwrap import Continuous
+    from linkage_ros.effects.stage import DriveStage, WriterStage
+    from linkage_ros.kinematics.compiling.linkage import Compiled
+    from linkage_ros.messages.joint_state import JointStateWriter
+
+_CRANK = ', '.join(CrankState._fields)
+
+Plain = Callable[[int, CrankState | None], Any]
+"""Does a tick at a time, in [ns], from the crank on, step by step."""
+
+
+class Seen(NamedTuple):
+    """
+    What a compiled linkage comes to at a tick: what is published, and what the rest follows from.
+
+    Attributes
+    ----------
+    crank
+        The crank.
+    reading
+        What is published; None where nothing is.
+    reactions
+        In pins and sliders, each as a `Reaction` has them; empty where no message has them.
+
+    """
+
+    crank: CrankState
+    reading: Reading | None
+    reactions: tuple[tuple[float, float, float], ...]
+
+
+Numbers: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
+"""The same as plain tuples."""
+
+
+class Straight(NamedTuple):
+    """
+    A usual tick up to its reading, in lines of Python.
+
+    Attributes
+    ----------
+    lines, bound
+        They make what follows of ``now``, the fields of a `CrankState` by their names among it, or
+        leave by ``plain``.
+    joints, rates, accelerations, efforts
+        Of the reading, as expressions; none where they are not called for.
+    reactions
+        The numbers of all, one after the other, as expressions; likewise.
+
+    """
+
+    lines: list[str]
+    bound: dict[str, Any]
+    joints: list[str]
+    rates: list[str]
+    accelerations: list[str]
+    efforts: list[str]
+    reactions: list[str]
+
+
+def straight(
+    drive: Drive,
+    drive_stages: Sequence[DriveStage],
+    compiled: Compiled,
+    angles: Continuous | None,
+) -> Straight:
+    """
+    Write the usual tick of a linkage.
+
+    Parameters
+    ----------
+    drive
+        Where the crank comes from.
+    drive_stages
+        What is between the drive and the crank.
+    compiled
+        The linkage; it is closed somewhere. It returns, as far as they are called for, what a
+        `Straight` has.
+    angles
+        Lets the published angles run on; None where they need not.
+
+    """
+    crank = drive.straight(compiled.driven, 'return plain(now, None)')
+    lines, bound = [*crank.lines], {**crank.bound}
+    state = f'CrankState({_CRANK})'
+    for number, stage in enumerate(drive_stages):
+        bound[f'stage{number}'] = stage
+        lines.append(f'crank = {_CRANK}, = stage{number}({state})')
+        state = 'crank'
+    leave = f'return plain(now, {state})'
+
+    def leave_unless(condition: str) -> None:
+        lines.extend((f'if not ({condition}):', f'    {leave}'))
+
+    path, *more_paths = compiled.paths
+    inputs = [one.name for one in path.inputs]
+    given = iter(inputs)
+    lines += [
+        f'{", ".join(islice(given, compiled.driven))}, = {field}'
+        for field in CrankState._fields[: 1 + compiled.derivatives]
+    ]
+    groups = [
+        [f'{letter}{i}' for i in range(len(group))]
+        for letter, group in zip('xyzef', path.outputs, strict=False)
+    ]
+    numbers = [*chain(*groups)]
+    if more_paths:
+        bound |= {'solve': compiled.fast, 'chain': chain}
+        lines.append(f'values = solve({", ".join(inputs)})')
+        leave_unless('values is not None')
+        lines.append(f'{", ".join(numbers)}, = chain(*values)')
+    else:
+        body = compiled.body(leave)
+        bound |= body.bound
+        lines += body.lines
+        outputs = chain(*body.outputs)
+        lines += [f'{name} = {output}' for name, output in zip(numbers, outputs, strict=True)]
+    joints, rates, accelerations, efforts, reactions = groups + [[]] * (5 - len(groups))
+    if efforts and drive_stages:
+        # A motor that moves alone, within its play, bears itself.
+        leave_unless("{*getattr(crank, 'free_motors', ())} <= {None}")
+    if angles is not None:
+        bound['running'] = angles
+        lines.append('last = running.raw')
+        leave_unless('last')
+        lasts = [f'l{i}' for i in range(len(joints))]
+        lines.append(f'{", ".join(lasts)}, = last')
+        near = [f'{-pi!r} < {lasts[i]} - {joints[i]} < {pi!r}' for i in angles.places]
+        if near:
+            leave_unless(' and '.join(near))
+        lines.append(f'running.raw = {_tuple(joints)}')
+        turns = [f'n{i}' for i in range(len(joints))]
+        lines.append(f'{", ".join(turns)}, = running.added')
+        lines += [f'{joint} += {turn}' for joint, turn in zip(joints, turns, strict=True)]
+    return Straight(lines, bound, joints, rates, accelerations, efforts, reactions)
+
+
+def straight_look(
+    usual: Straight, read: Callable[[int, Reading], Reading | None] | None, plain: Plain
+) -> Callable[[int], Any]:
+    """
+    Return what a linkage comes to, as a function of the time, in [ns].
+
+    Parameters
+    ----------
+    usual
+        Its usual tick.
+    read
+        What further sensors read; None where there are none.
+    plain
+        What does the other ticks.
+
+    """
+    lines = [f'crank = new(CrankState, ({_CRANK}))', f'reading = new(Reading, {_reading(usual)})']
+    if read is not None:
+        lines.append('reading = read(now, reading)')
+    lines.append(f'return new(Seen, (crank, reading, {_reactions(usual)}))')
+    return _function(usual, lines, {'read': read, 'plain': plain})
+
+
+def straight_share(usual: Straight, plain: Plain) -> Callable[..., Any]:
+    """
+    Return what adds a linkage's part to a message of several.
+
+    Parameters
+    ----------
+    usual
+        Its usual tick; its reading is what is published.
+    plain
+        What does the other ticks.
+
+    Returns
+    -------
+    share
+        A function of the time, in [ns], and of the lists of positions, rates and efforts, to which
+        it adds. It returns what the linkage comes to. In a tick that ``plain`` does it adds
+        nothing.
+
+    """
+    groups = {'positions': usual.joints, 'rates': usual.rates, 'efforts': usual.efforts}
+    lines = [
+        f'_, own_positions, own_rates, _, own_efforts = reading = {_reading(usual)}',
+        *[f'all_{name} += own_{name}' for name, group in groups.items() if group],
+        f'return (({_CRANK}), reading, {_reactions(usual)})',
+    ]
+    return _function(usual, lines, {'plain': plain}, ['now', *(f'all_{name}' for name in groups)])
+
+
+def straight_tick(
+    usual: Straight,
+    writer: JointStateWriter,
+    extras: Sequence[WriterStage],
+    tick: type[Any],
+    linkages: Sequence[Any],
+    plain: Plain,
+) -> Callable[[int], Any]:
+    """
+    Return the whole tick of a scene with one linkage, as a function of the time, in [ns].
+
+    Parameters
+    ----------
+    usual
+        The linkage's usual tick; its reading is what is published.
+    writer
+        Of the joint states.
+    extras
+        What writes the other messages, of the reading alone or of a `Seen`.
+    tick, linkages
+        The type of what a tick comes to, and the linkages that it names.
+    plain
+        What does the other ticks.
+
+    """
+    bound: dict[str, Any] = {'Tick': tick, 'linkages': linkages, 'plain': plain}
+    bound |= {f'write{number}': extra.write for number, extra in enumerate(extras)}
+    packed = writer.straight('now', usual.joints, usual.rates, usual.efforts)
+    lines = [f'reading = {_reading(usual)}', *packed.lines]
+    if extras:
+        lines.append('reading = new(Reading, reading)')
+    seen = f'(({_CRANK}), reading, {_reactions(usual)})'
+    messages = _tuple(
+        [
+            f'write{number}(now, {"None" if extra.of_reading else "seen"}, reading)'
+            for number, extra in enumerate(extras)
+        ]
+    )
+    if 'seen' in messages:
+        lines.append(f'seen = new(Seen, {seen})')
+        seen = 'seen'
+    lines.append(f'return new(Tick, (message, {messages}, ({seen},), linkages))')
+    return _function(usual, lines, bound | packed.bound)
+
+
+def _function(
+    usual: Straight,
+    lines: Sequence[str],
+    bound: dict[str, Any],
+    parameters: Sequence[str] = ('now',),
+) -> Callable[..., Any]:
+    # The constructor of a named tuple is a function of Python's; this is one of C's.
+    new = tuple.__new__
+    types = {'new': new, 'CrankState': CrankState, 'Reading': Reading, 'Seen': Seen}
+    source = '\n    '.join([f'def tick({", ".join(parameters)}):', *usual.lines, *lines])
+    function: Callable[..., Any] = written(source, 'tick', usual.bound | types | bound)
+    return function
+
+
+def _reading(usual: Straight) -> str:
+    groups = usual.joints, usual.rates, usual.accelerations, usual.efforts
+    return f'(now, {", ".join(map(_tuple, groups))})'
+
+
+def _reactions(usual: Straight) -> str:
+    numbers = iter(usual.reactions)
+    return _tuple([_tuple(three) for three in zip(numbers, numbers, numbers, strict=True)])
+
+
+def _tuple(parts: Sequence[str]) -> str:
+    return f'({", ".join(parts)},)' if parts else '()'

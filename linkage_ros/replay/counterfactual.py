@@ -1,0 +1,291 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What would have been: another scene over the crank samples of a bag.
+
+Where both scenes have the same rate, its ticks are those of the bag, and where the bag has none,
+because the linkage was open or had no crank, a period apart. At another rate they are a period
+apart from the first on, each moved onto a tick of the bag where one is within half a period; so
+what was recorded then can be compared. A scene with a rate of 0 ticks for every good sample.
+
+A fault that both scenes have alike begins and ends when it did in the run; others do as the other
+scene says. What is yielded is what a recorder would have been given, so that a replay of it comes
+to the same again: time jumps back where what is written does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Iterator
+from dataclasses import replace
+from typing import NamedTuple, TYPE_CHECKING
+
+from linkage_ros.bag.run_events import Event, Made, Reset, Taken, Turned
+from linkage_ros.errors import LinkageError
+from linkage_ros.messages.single_values import text_message, TIME_END
+from linkage_ros.pipeline.pipeline import Pipeline, Tick
+from linkage_ros.replay.replay import change_text, read_change
+from linkage_ros.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from linkage_ros.faults.injection import Injection
+
+
+_LARGEST_LEAD = 2 * 3600 * 1_000_000_000
+"""No sample that was taken was as far ahead of its tick, in [ns]."""
+
+
+class Remade(NamedTuple):
+    """
+    A tick as it would have been.
+
+    Attributes
+    ----------
+    log_time, time
+        When it is, and for when it is solved, in [ns].
+    recorded
+        What the bag has of it; nothing where it has none.
+    tick
+        What the scene comes to; nothing where it does not tick then.
+
+    """
+
+    log_time: int
+    time: int
+    recorded: tuple[bytes, ...]
+    tick: Tick | None
+
+
+Done = Taken | Turned | Reset | Remade
+
+
+def check_drives(scene: Scene, where: str) -> None:
+    """Raise LinkageError where a scene does not take its crank from a topic."""
+    for member in scene.members:
+        drive, _ = member.drive
+        if drive != 'topic':
+            raise LinkageError(
+                where,
+                f'{f"{member.name}: " if member.name else ""}its drive is {drive}, which takes no '
+                "samples of a bag's",
+                'write drive: {topic: {}}',
+            )
+
+
+class WhatIf:
+    """
+    A scene over the samples of a bag.
+
+    Parameters
+    ----------
+    scene
+        The scene; its drives are topics.
+    recorded
+        That which was run; nothing where it is not known.
+
+    """
+
+    def __init__(self, scene: Scene, recorded: Scene | None) -> None:
+        self._scene = scene
+        self._followed: set[str] = set()
+        if recorded is not None:
+            self._followed = {
+                name for name, fault in scene.faults.items() if recorded.faults.get(name) == fault
+            }
+        self._injection = self._inject()
+        self._pipeline = Pipeline(scene, None, self._injection)
+        self._closures = self._pipeline.closures
+        self.extras = self._pipeline.extras
+        """Its topics beside the joint states."""
+        self.withholds = self._pipeline.withholds
+        """Whether there may be ticks of which a replay has to know, and without a message."""
+        self._seen = self._last = 0  # the log times of the last event, and of what was written
+        self._period = round(1e9 / scene.rate) if scene.rate else 0
+        theirs = recorded.rate if recorded is not None else 0.0
+        self._clocked = theirs > 0.0
+        self._same_rate = theirs == scene.rate
+        self._slack = min(self._period, round(1e9 / theirs)) // 2 if theirs else 0
+        self._due: int | None = None
+
+    def _inject(self) -> Injection | None:
+        if not self._scene.faults:
+            return None
+        from linkage_ros.faults.injection import Injection
+
+        return Injection(
+            {
+                name: replace(fault, at=()) if name in self._followed else fault
+                for name, fault in self._scene.faults.items()
+            }
+        )
+
+    def run(self, events: Iterable[Event]) -> Iterator[Done]:
+        """Yield, in their order, what is written: samples, faults, resets and ticks."""
+        return self._on_clock(events) if self._period else self._on_samples(events)
+
+    def withheld(self, tick: Tick) -> bool:
+        """Return whether a tick without a message is one of which a replay has to know."""
+        said = tick.message or tick.extras
+        return self.withholds and not said and self._pipeline.remembers(tick)
+
+    def _on_samples(self, events: Iterable[Event]) -> Iterator[Done]:
+        made: Remade | None = None  # what the bag has of it may follow
+        for event in events:
+            if isinstance(event, Made):
+                if made is not None and made.time == event.time:
+                    yield made._replace(recorded=event.messages)
+                    made = None
+                else:
+                    yield Remade(event.log_time, event.time, event.messages, None)
+                continue
+            if made is not None:
+                yield made
+                made = None
+            if isinstance(event, Turned):
+                yield from self._follow(event)
+            elif isinstance(event, Reset):
+                yield self._reset(event)
+            elif (yield from self._offer(event)):
+                now = self._clock(event.log_time)
+                made = self._tick(now, self._pipeline.newest_stamp, ())
+        if made is not None:
+            yield made
+
+    def _on_clock(self, events: Iterable[Event]) -> Iterator[Done]:
+        taken: int | None = None  # when a tick took samples that may have published nothing
+        for event in events:
+            at = event.log_time
+            if taken is not None and taken != at:
+                yield from self._known(taken, taken, ())
+                taken = None
+            if at < self._seen:
+                yield from self._catch_up(self._seen + 1)
+                self._due = None
+            if isinstance(event, Made):
+                yield from self._known(at, event.time, event.messages)
+                taken = None
+                self._seen = at
+                continue
+            yield from self._catch_up(at)
+            self._seen = at
+            if isinstance(event, Turned):
+                yield from self._follow(event)
+                continue
+            if isinstance(event, Reset):
+                yield self._reset(event)
+                continue
+            yield from self._offer(event)
+            if self._clocked:
+                taken = at
+            elif self._due is None:
+                self._due = at
+        if taken is not None:
+            yield from self._known(taken, taken, ())
+        yield from self._catch_up(self._seen + 1)
+
+    def _known(
+        self, log_time: int, at: int, recorded: tuple[bytes, ...]
+    ) -> Iterator[Turned | Remade]:
+        """Tick where the run has ticked, if it is time; times in [ns]."""
+        yield from self._catch_up(at)
+        due = self._due
+        if due is not None and at < due - self._slack and not self._same_rate:
+            if recorded:
+                yield Remade(log_time, at, recorded, None)
+            return
+        yield from self._change(log_time)
+        yield from self._tick_unless_back(self._clock(log_time), self._clock(at), recorded)
+        self._due = (at if due is None or self._same_rate else due) + self._period
+
+    def _catch_up(self, to: int) -> Iterator[Turned | Remade]:
+        """Make the ticks that were due before a time, in [ns]."""
+        while (due := self._due) is not None and due + self._slack < to:
+            age = self._clock(due) - self._pipeline.newest_stamp
+            # Without a crank nothing comes of a tick, however many there are; and a bag whose
+            # times are nonsense may ask for years of them.
+            if not -_LARGEST_LEAD <= age <= self._pipeline.max_age:
+                self._due = due + -(-(to - self._slack - due) // self._period) * self._period
+                return
+            now = max(due, self._seen)
+            yield from self._change(now)
+            now = self._clock(now)
+            yield from self._tick_unless_back(now, now, ())
+            self._due = due + self._period
+
+    def _tick_unless_back(
+        self, now: int, at: int, recorded: tuple[bytes, ...]
+    ) -> Iterator[Remade]:
+        """Tick; where time has jumped back, there is no crank until the next sample."""
+        if now >= self._last:
+            yield self._tick(now, at, recorded)
+        elif recorded:
+            yield Remade(now, at, recorded, None)
+
+    def _tick(self, now: int, at: int, recorded: tuple[bytes, ...]) -> Remade:
+        if at >= TIME_END:
+            return Remade(now, at, recorded, None)
+        tick = self._pipeline.tick(at)
+        if tick.message or tick.extras or self.withheld(tick):
+            self._last = now
+        return Remade(now, at, recorded, tick)
+
+    def _offer(self, event: Taken) -> Generator[Taken | Turned, None, bool]:
+        """Offer a sample; return whether it was good."""
+        yield from self._change(event.log_time)
+        now = self._clock(event.log_time)
+        self._write_at(now)
+        good = self._pipeline.offer(event.data, now) is None
+        yield event._replace(log_time=now)
+        return good
+
+    def _reset(self, event: Reset) -> Reset:
+        """Begin anew where the run did."""
+        self._last = now = self._clock(event.log_time)
+        self._pipeline = Pipeline(self._scene, self._closures, self._injection)
+        return Reset(now, now, event.data)
+
+    def _follow(self, event: Turned) -> Iterator[Turned]:
+        """Let a fault begin or end as it did in the run."""
+        try:
+            name, on = read_change(event.data)
+        except ValueError:
+            return
+        if self._injection is None or name not in self._followed:
+            return
+        # What a jump did to the clock is in the times of the bag already.
+        if self._scene.faults[name].kind != 'time_jump':
+            self._injection.turn(name, on)
+        now = self._clock(event.log_time)
+        self._write_at(now)
+        yield Turned(now, now, event.data)
+
+    def _change(self, now: int) -> Iterator[Turned]:
+        """Let faults begin and end that are this scene's own, at a time in [ns]."""
+        if self._injection is None:
+            return
+        for change in self._injection.advance(now):
+            shifted = self._clock(now)
+            self._write_at(shifted)
+            text = change_text(change, self._scene.faults[change.name].kind)
+            yield Turned(shifted, shifted, text_message(text))
+
+    def _clock(self, time: int) -> int:
+        return time if self._injection is None else self._injection.clock(time)
+
+    def _write_at(self, now: int) -> None:
+        """Begin anew where what is written jumps back in time; a replay does so there too."""
+        if now < self._last:
+            self._pipeline = Pipeline(self._scene, self._closures, self._injection)
+        self._last = now

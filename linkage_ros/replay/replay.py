@@ -1,0 +1,221 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A run once more, from its bag: the same pipeline over the same samples in the same order.
+
+The bag holds the messages in the order in which the tick took and published them. The log time is
+that by which the tick judged a sample, the publish time of what it published that for which it
+solved. So the pipeline, built from the scene in the bag, comes to the same states. Faults begin
+and end where the bag says so, not by the scene's timeline: somebody may have asked for one. So
+with a reset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+import json
+import platform
+from typing import NamedTuple, TYPE_CHECKING
+
+from linkage_ros import __version__
+from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
+from linkage_ros.bag.run_events import (
+    Made,
+    recorded_events,
+    Reset,
+    run_account,
+    Taken,
+    VERSIONS,
+)
+from linkage_ros.errors import BagError, listed
+from linkage_ros.messages.joint_state import OwnJointStates
+from linkage_ros.messages.single_values import text_of, TIME_END
+from linkage_ros.pipeline.pipeline import Pipeline, Tick
+from linkage_ros.scene.load import LINKAGE_FILE, parse_scene, SCENE_FILE
+from linkage_ros.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from linkage_ros.faults.injection import Change, Injection
+
+
+class ReplayedTick(NamedTuple):
+    """
+    What a bag holds of a tick and what the same tick comes to now.
+
+    Attributes
+    ----------
+    time
+        Time of the tick, in [ns].
+    recorded
+        Its joint state in the bag; empty where there is none.
+    recorded_extras
+        For each of the pipeline's extras its message in the bag; empty where there is none.
+    tick
+        What the pipeline makes of the bag's samples.
+
+    """
+
+    time: int
+    recorded: bytes
+    recorded_extras: tuple[bytes, ...]
+    tick: Tick
+
+
+def recorded_scene(bag: Bag, *, trust_effects: bool = False) -> Scene:
+    """
+    Return the scene that a bag carries.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+    trust_effects
+        As for `parse_scene`: a bag may come from anybody.
+
+    Raises
+    ------
+    BagError
+        Where it carries none.
+    FileError
+        Where this version cannot read it.
+
+    """
+    missing = {RUN_FILE, SCENE_FILE} - set(bag.attachments)
+    if missing:
+        raise BagError(
+            bag.path,
+            f'carries no {listed(sorted(missing))}',
+            'name a bag that linkage_ros has recorded',
+        )
+    run = run_account(bag)
+    files = {name: data for name, data in bag.attachments.items() if name.endswith('.yaml')}
+    if len(files) < 2:
+        raise BagError(
+            bag.path, f'carries no {LINKAGE_FILE}', 'name a bag that linkage_ros has recorded'
+        )
+    return parse_scene(
+        run.scene,
+        str(bag.path),
+        files,
+        run.scene_folder,
+        run.solvers,
+        run.seed,
+        trust_effects=trust_effects,
+    )
+
+
+def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
+    """Run a scene over a bag's samples; yield every tick of which the bag holds a message."""
+    for tick in replay_all(bag, scene, bag.messages()):
+        if tick.recorded or any(tick.recorded_extras):
+            yield tick
+
+
+def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterator[ReplayedTick]:
+    """
+    Run a scene over a bag's samples; yield the ticks that withheld their messages, too.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+    scene
+        The scene that it carries.
+    messages
+        The bag's.
+
+    """
+    pipeline = Pipeline(scene)
+    closures, injection = pipeline.closures, pipeline.injection
+    last = 0
+    for event in recorded_events(run_account(bag), own_joint_states(scene), messages):
+        if event.log_time < last:
+            pipeline = Pipeline(scene, closures, injection)
+        last = event.log_time
+        if isinstance(event, Reset):
+            pipeline = Pipeline(scene, closures, injection)
+        elif isinstance(event, Made):
+            if event.time >= TIME_END:
+                raise BagError(
+                    bag.path,
+                    f'holds what was made at {event.time} ns, beyond the times of messages',
+                    'name another bag',
+                )
+            joint_states, *extras = event.messages
+            tick = pipeline.tick(event.time)
+            yield ReplayedTick(event.time, joint_states, tuple(extras), tick)
+        elif isinstance(event, Taken):
+            pipeline.offer(event.data, event.log_time)
+        elif injection is not None:
+            turn(bag, injection, event.data)
+
+
+def own_joint_states(scene: Scene) -> OwnJointStates:
+    """Return what tells the joint states of a scene from others on their topic."""
+    return OwnJointStates(member.joints for member in scene.members)
+
+
+def change_text(change: Change, kind: str) -> str:
+    """Return that a fault has begun or ended, as the text that is published and recorded."""
+    return json.dumps({'fault': change.name, 'kind': kind, 'injected': change.on})
+
+
+def read_change(message: bytes) -> tuple[str, bool]:
+    """
+    Return what a message of the faults' topic says: of which fault, and whether it began.
+
+    Raises
+    ------
+    ValueError
+        Where it does not say that.
+
+    """
+    try:
+        said = json.loads(text_of(message))
+    except RecursionError:
+        raise ValueError('too deep') from None
+    name, on = (said.get('fault'), said.get('injected')) if isinstance(said, dict) else (0, 0)
+    if not isinstance(name, str) or not isinstance(on, bool):
+        raise ValueError('not a change')
+    return name, on
+
+
+def turn(bag: Bag, injection: Injection, message: bytes) -> None:
+    """Turn a fault on or off, as a message of a bag says; raise `BagError` where it cannot be."""
+    try:
+        injection.turn(*read_change(message))
+    except (ValueError, KeyError):
+        raise BagError(
+            bag.path, 'a message on its faults topic names no fault of its scene', 'name another'
+        ) from None
+
+
+def versions_here() -> dict[str, str]:
+    """Return the versions of what runs here, as a run's account has them."""
+    found = (__version__, platform.python_version(), platform.machine())
+    return dict(zip(VERSIONS, found, strict=True))
+
+
+def own_effects_here(scene: Scene) -> dict[str, str]:
+    """Return which modules the effects of a scene are that are not of this package."""
+    names = {name for member in scene.members for name in member.effects if '.' in name}
+    if not names:
+        return {}
+    from linkage_ros.effects.user_effects import (
+        identity,  # local import: only where a scene names one
+    )
+
+    return {name: identity(name) for name in sorted(names)}

@@ -1,0 +1,169 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The proof of a bag: its scene run once more over its samples, and compared with what is recorded.
+
+A bag that does not hold its run from the beginning (begun in mid-run, or its first files have made
+way for newer ones) lacks what the node remembered then: the newest sample, whole turns, delay
+lines, random generators. Its first ticks, until one comes again, say nothing; and whole turns are
+no difference there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+from linkage_ros.bag.reader import Bag, BagMessage
+from linkage_ros.bag.run_events import lost_beginning, run_account
+from linkage_ros.kinematics.linkage import RevoluteJoint
+from linkage_ros.messages.joint_values import JOINT_STATE
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.compare import At, Comparison, First
+from linkage_ros.replay.replay import replay_all, ReplayedTick
+from linkage_ros.scene.scene import Scene
+
+IDENTICAL, DIFFERENT, UNTOLD = 'identical', 'different', 'cannot be told'
+
+_NEVER_FOUND_AGAIN = ('rate_limit', 'noise', 'jitter', 'dropout')
+"""
+Effects whose memory does not come back: generators, and the time of the first tick. So with an
+incremental encoder, which counts from where it was switched on, and with markers that leave a
+trace.
+"""
+
+
+class Proof(NamedTuple):
+    """
+    What came of running a bag's scene once more.
+
+    Attributes
+    ----------
+    comparison
+        The ticks that could be compared.
+    untold
+        How many ticks at the start could not be told, since the run's beginning is not in the bag.
+    first_untold
+        What the first of these differs in.
+    beginning
+        Why it is not; '' where it is.
+    lost
+        Drives and effects that then never come to the same again.
+
+    """
+
+    comparison: Comparison
+    untold: int
+    first_untold: First | None
+    beginning: str
+    lost: tuple[str, ...]
+
+    @property
+    def ticks(self) -> int:
+        """Return how many ticks the bag holds."""
+        return self.comparison.ticks + self.untold
+
+    @property
+    def verdict(self) -> str:
+        """Return `IDENTICAL`, `DIFFERENT` or `UNTOLD`."""
+        found = self.comparison
+        if self.untold and not found.ticks:
+            return UNTOLD
+        if found.differing:
+            return UNTOLD if self.lost else DIFFERENT
+        return IDENTICAL
+
+
+def prove(
+    bag: Bag,
+    scene: Scene,
+    messages: Iterable[BagMessage],
+    look: Callable[[ReplayedTick], None] = lambda _: None,
+) -> Proof:
+    """
+    Run a bag's scene once more and compare; memory does not grow with the bag.
+
+    Parameters
+    ----------
+    bag, scene, messages
+        As for `replay_all`.
+    look
+        Is shown every tick.
+
+    Raises
+    ------
+    LinkageError
+        Where the scene cannot be run.
+
+    """
+    run = run_account(bag)
+    types = [extra.message for extra in Pipeline(scene).extras]
+    types += [JOINT_STATE] * len(run.extras)  # for those of which the scene knows nothing
+    topics = [(run.joint_states_topic, JOINT_STATE), *zip(run.extras, types, strict=False)]
+    silent = (b'',) * len(topics)
+    beginning = lost_beginning(bag, run)
+    turning = turning_joints(scene) if beginning and not scene.wrapped else {}
+    comparison, probe = Comparison(topics, turning), Comparison(topics, turning)
+    untold, in_step = 0, not beginning
+    for number, replayed in enumerate(replay_all(bag, scene, messages), 1):
+        time, joint_states, extras, tick = replayed
+        look(replayed)
+        recorded = (joint_states, *extras)
+        now = (tick.message, *tick.extras, *silent)[: len(topics)]
+        at = At(number, time)
+        if not in_step:
+            probe.add(at, recorded, now)
+            in_step = probe.last != at and any(recorded)
+            if not in_step:
+                untold += 1
+                continue
+        comparison.add(at, recorded, now)
+    comparison.settle()
+    lost = _lost(scene) if beginning else ()
+    return Proof(comparison, untold, probe.first if untold else None, beginning, lost)
+
+
+def beginning_text(proof: Proof) -> str:
+    """Return in words what could not be told of a bag without the beginning of its run."""
+    text = f'{proof.beginning}: what the node remembered then is not in it, so {proof.untold} '
+    text += f'of {proof.ticks} ticks, at the start, could not be told'
+    if proof.verdict == UNTOLD and proof.lost:
+        text += f'; {" and ".join(proof.lost)} cannot come to the same again'
+    return text
+
+
+def turning_joints(scene: Scene) -> dict[str, bool]:
+    """Return of each joint of a scene, published or driven, whether it turns, or slides."""
+    found: dict[str, bool] = {}
+    for member in scene.members:
+        driven = [not given.slider for given in member.linkage.inputs]
+        found |= dict(zip(member.inputs, driven, strict=True))
+        kinds = [isinstance(joint, RevoluteJoint) for joint in member.linkage.joints.values()]
+        found |= dict(zip(member.joints, kinds, strict=True))
+    return found
+
+
+def _lost(scene: Scene) -> tuple[str, ...]:
+    named = [member.drive[0] for member in scene.members if member.drive[0] != 'topic']
+    for member in scene.members:
+        named += [effect for effect in member.effects if effect in _NEVER_FOUND_AGAIN]
+        encoder = member.effects.get('encoder')
+        if encoder and any(each.incremental for each in encoder.joints.values()):
+            named.append('encoder')
+        markers = member.effects.get('markers')
+        if markers and markers.trace:
+            named.append('markers')
+    return tuple(dict.fromkeys(named))

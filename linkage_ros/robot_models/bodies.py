@@ -1,0 +1,195 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What links look like in a robot model: bars along their points, discs at them, rails for sliders.
+
+Robot models know boxes and cylinders only. All stand in the frame of their link; each link has a
+layer of its own, so that links pass each other as they do in a machine. Frames stay in the plane
+z = 0: where links are drawn does not move their pins.
+"""
+
+from __future__ import annotations
+
+from cmath import phase
+from collections.abc import Mapping
+from statistics import median
+from typing import NamedTuple
+
+from linkage_ros.drawing.shapes import hull
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND, SlideJoint
+from linkage_ros.kinematics.ranges import reach
+from linkage_ros.robot_models.orientation import Span
+from linkage_ros.robot_models.orientation_part import named_joints
+
+_COLOURS = (
+    (0.30, 0.47, 0.66, 1.0),
+    (0.95, 0.56, 0.17, 1.0),
+    (0.35, 0.63, 0.31, 1.0),
+    (0.88, 0.34, 0.35, 1.0),
+    (0.46, 0.72, 0.70, 1.0),
+    (0.69, 0.48, 0.63, 1.0),
+    (0.93, 0.79, 0.28, 1.0),
+    (0.61, 0.46, 0.37, 1.0),
+)
+_GREY = (0.55, 0.55, 0.55, 1.0)
+
+
+class Solid(NamedTuple):
+    """
+    A box, or a cylinder whose axis is z.
+
+    Attributes
+    ----------
+    kind
+        ``bar``, ``disc``, ``block`` or ``rail``.
+    name
+        Of the point of a disc or block, of the slider of a rail; else ''.
+    centre, z
+        In the frame of the link, in [m].
+    angle
+        Of the box about z, in [rad].
+    length, width
+        Of the box; of a cylinder the diameter, twice. In [m].
+    height
+        Along z, in [m].
+
+    """
+
+    kind: str
+    name: str
+    centre: complex
+    z: float
+    angle: float
+    length: float
+    width: float
+    height: float
+
+
+class Body(NamedTuple):
+    """A link as it is seen."""
+
+    colour: tuple[float, float, float, float]
+    solids: tuple[Solid, ...]
+
+
+def bodies(closure: Closure, found: Mapping[str, Span], first_layer: int = 0) -> dict[str, Body]:
+    """
+    Return what each link looks like.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    found
+        How far its joints go.
+    first_layer
+        Layers that other linkages have below.
+
+    """
+    linkage = closure.linkage
+    width = bar_width(closure)
+    height = 0.5 * width
+    moving = [link for link in linkage.links if link != GROUND]
+    drawn = {}
+    for link in linkage.links:
+        layer = moving.index(link) + 1 if link != GROUND else 0
+        z = 1.2 * height * (first_layer + layer)
+        colour = _COLOURS[(layer - 1) % len(_COLOURS)] if layer else _GREY
+        solids = [*_bars(closure, link, z, width), *_rails(closure, link, found, z, width)]
+        drawn[link] = Body(colour, tuple(solids))
+    return drawn
+
+
+def bar_width(closure: Closure) -> float:
+    """Return the width of bars, in [m]: a part of the length that links commonly have."""
+    lengths = [
+        max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
+        for points in closure.linkage.links.values()
+        if len(points) > 1
+    ]
+    longest = max(lengths, default=0.0) or reach(closure) or 1.0
+    common = median([length for length in lengths if length > 0.0] or [longest])
+    return min(0.12 * common, 0.05 * longest)
+
+
+def _bars(closure: Closure, link: str, z: float, width: float) -> list[Solid]:
+    points = {name: complex(*at) for name, at in closure.linkage.links[link].items()}
+    height = 0.5 * width
+    if len(points) == 1 and link != GROUND:
+        ((name, at),) = points.items()
+        return [
+            Solid('block', name, at, z, _turned(closure, link), 3.0 * width, 2.0 * width, height)
+        ]
+    discs = [
+        Solid('disc', name, at, z, 0.0, 1.4 * width, 1.4 * width, height)
+        for name, at in points.items()
+    ]
+    if link == GROUND:
+        return discs
+    corners = hull(points.values())
+    ends = [*corners[1:], corners[0]] if len(corners) > 2 else corners[1:]
+    inner = [at for at in points.values() if at not in corners and len(corners) > 2]
+    lines = [*zip(corners, ends, strict=False), *((corners[0], at) for at in inner)]
+    bars = [
+        Solid('bar', '', 0.5 * (p + q), z, phase(q - p), abs(q - p), width, 0.8 * height)
+        for p, q in lines
+    ]
+    return bars + discs
+
+
+def _turned(closure: Closure, link: str) -> float:
+    """Return the angle at which a block lies along its slider, in its own frame."""
+    for slider in closure.linkage.sliders.values():
+        if slider.block == link:
+            return phase(complex(*slider.direction)) - slider.angle
+    return next(
+        (
+            phase(complex(*slider.direction))
+            for slider in closure.linkage.sliders.values()
+            if slider.along == link
+        ),
+        0.0,
+    )
+
+
+def _rails(
+    closure: Closure, link: str, found: Mapping[str, Span], z: float, width: float
+) -> list[Solid]:
+    rails = []
+    for name, slider in closure.linkage.sliders.items():
+        if slider.along != link:
+            continue
+        low, high = travel(closure, name, found)
+        if link != GROUND:
+            low, high = min(low, 0.0), max(high, 0.0)  # it hangs together with the link's bars
+        unit = complex(*slider.direction) / abs(complex(*slider.direction))
+        start = complex(*closure.linkage.links[link][slider.through])
+        centre = start + 0.5 * (low + high) * unit
+        length = high - low + 3.0 * width
+        rails.append(
+            Solid('rail', name, centre, z, phase(unit), length, 0.35 * width, 0.4 * width)
+        )
+    return rails
+
+
+def travel(closure: Closure, slider: str, found: Mapping[str, Span]) -> tuple[float, float]:
+    """Return how far a slider's point goes along its line, in [m], as far as that is told."""
+    for name, joint in named_joints(closure.linkage).items():
+        if isinstance(joint, SlideJoint) and joint.slider == slider:
+            return found[name].lowest, found[name].highest
+    far = 0.5 * reach(closure)
+    return -far, far

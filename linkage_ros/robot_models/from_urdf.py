@@ -1,0 +1,242 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A linkage out of a URDF and the pins that close it."""
+
+from __future__ import annotations
+
+from cmath import rect
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import hypot, inf, tau
+from typing import NamedTuple
+
+from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed
+from linkage_ros.kinematics.linkage import (
+    GROUND,
+    Input,
+    Limits,
+    Linkage,
+    NO_LIMITS,
+    RevoluteJoint,
+)
+from linkage_ros.robot_models.closings import find_closings, find_loops
+from linkage_ros.robot_models.planar import lay_flat, Planar
+from linkage_ros.robot_models.sides import assembled
+from linkage_ros.robot_models.urdf_robot import MOVING, UrdfFile
+from linkage_ros.robot_models.urdf_topology import Skeleton, skeleton
+
+_MET = 1e-3
+"""How far pins may be apart in a pose and meet in it, of the size."""
+
+
+class Imported(NamedTuple):
+    """
+    A linkage, and what of the URDF is not in it, in words.
+
+    Its start is that of the URDF where the linkage itself would start elsewhere.
+    """
+
+    linkage: Linkage
+    left_out: tuple[str, ...]
+
+
+def imported(
+    urdf: UrdfFile,
+    close: Sequence[tuple[str, str]] = (),
+    inputs: Sequence[str] = (),
+    at: Mapping[str, float] | None = None,
+    *,
+    limits: bool = True,
+) -> Imported:
+    """
+    Make a linkage of a URDF.
+
+    Parameters
+    ----------
+    urdf
+        The robot.
+    close
+        Pairs of its links whose origins are to meet, beside those that are named for it.
+    inputs
+        Names of joints that are driven; without them those that the file names.
+    at
+        Values of joints in a pose in which the loops close, in [rad] or [m]; those that are not
+        named are as the file has them, or 0.
+    limits
+        Whether the limits of its joints are kept.
+
+    Raises
+    ------
+    FileError
+        Where it does not make a linkage, with what would help.
+
+    """
+    made = _Import(urdf, close, inputs, at or {}).made()
+    if not limits:
+        return made
+    return made._replace(linkage=_limited(made.linkage, urdf))
+
+
+class _Import:
+    def __init__(
+        self,
+        urdf: UrdfFile,
+        close: Sequence[tuple[str, str]],
+        inputs: Sequence[str],
+        at: Mapping[str, float],
+    ) -> None:
+        self._urdf = urdf
+        self._closings, alone = find_closings(urdf, close)
+        moving = [joint.name for joint in urdf.joints.values() if joint.kind in MOVING]
+        for option, names in (('--input', inputs), ('--at', at)):
+            for name in names:
+                if name not in moving:
+                    raise self._error(
+                        f'{option} {name}',
+                        'is no joint that moves',
+                        did_you_mean(name, moving, f'name one of {listed(moving)}'),
+                    )
+        self._inputs = tuple(inputs) or urdf.inputs
+        self._loops = find_loops(urdf, self._closings, self._inputs)
+        if not self._closings or not self._loops.joints:
+            raise self._error(
+                '',
+                'closes no loop',
+                'name frames that meet: --close FRAME=FRAME, or call them PIN_on_LINK',
+            )
+        self._planar: Planar = lay_flat(urdf, self._loops)
+        self._pose = dict.fromkeys(moving, 0.0) | dict(urdf.start) | dict(at)
+        self._told = {*urdf.start, *at}
+        self._skeleton: Skeleton = skeleton(urdf, self._planar, self._closings, alone)
+
+    def _error(self, where: str, reason: str, remedy: str) -> FileError:
+        return FileError(self._urdf.file, where, reason, remedy)
+
+    def made(self) -> Imported:
+        made = self._skeleton
+        links = {
+            link: {name: (at.real, at.imag) for name, at in points.items()}
+            for link, points in made.links.items()
+        }
+        masses = {
+            link: self._planar.masses[body]
+            for link, body in made.bodies.items()
+            if link != GROUND and body in self._planar.masses
+        }
+        linkage = Linkage(
+            links,
+            tuple(self._input(name) for name in self._inputs),
+            {},
+            {name: of for name, of in made.joints.items() if name not in self._inputs},
+            made.sliders,
+            made.traced,
+            masses=masses,
+        )
+        if not linkage.inputs:
+            raise self._error(
+                '',
+                'does not say which joint drives it',
+                f'write --input JOINT, one of {listed(made.joints)}',
+            )
+        frames = self._frames()
+        self._check_met(frames)
+        given = tuple(self._pose[each.joint] for each in linkage.inputs)
+        poses = {link: frames[body] for link, body in made.bodies.items()}
+        try:
+            linkage = assembled(linkage, given, poses, self._where())
+        except DefinitionError as error:
+            raise self._error(error.where, error.reason, error.remedy) from None
+        return Imported(linkage, self._loops.left_out)
+
+    def _input(self, name: str) -> Input:
+        joint = self._skeleton.joints.get(name)
+        if joint is None:
+            raise self._error(f'--input {name}', 'moves nothing of a loop', self._one_of())
+        if not isinstance(joint, RevoluteJoint):
+            return Input(name, slider=joint.slider)
+        links = self._skeleton.links
+        if not {*links[joint.parent]} & {*links[joint.child]}:
+            raise self._error(
+                f'--input {name}', 'turns links that no pin joins', self._one_of(but=name)
+            )
+        return Input(name, joint.parent, joint.child)
+
+    def _one_of(self, but: str = '') -> str:
+        return f'name one of {listed(each for each in self._skeleton.joints if each != but)}'
+
+    def _frames(self) -> dict[str, tuple[complex, float]]:
+        """Return place and angle of every body in the pose, in the frame of the root."""
+        frames = {self._planar.root: (0j, 0.0)}
+        for joint in self._planar.joints:
+            value = self._pose[joint.name]
+            if joint.mimics and joint.name not in self._told:
+                value = joint.multiplier * self._pose[joint.mimics] + joint.offset
+            place, angle = frames[joint.parent]
+            place += rect(1.0, angle) * joint.place
+            if joint.kind == 'P':
+                place += rect(1.0, angle) * joint.axis * value
+            else:
+                angle += joint.axis.real * value
+            frames[joint.child] = (place, angle)
+        return frames
+
+    def _check_met(self, frames: Mapping[str, tuple[complex, float]]) -> None:
+        def place(name: str) -> complex:
+            frame = self._planar.frames[name]
+            there, angle = frames[frame.body]
+            return there + rect(1.0, angle) * frame.place
+
+        size = max(
+            (hypot(x.real, x.imag) for of in self._skeleton.links.values() for x in of.values()),
+            default=0.0,
+        )
+        for closing in self._closings:
+            first, *others = closing.frames
+            for other in others:
+                apart = place(other) - place(first)
+                if closing.line:
+                    frame = self._planar.frames[first]
+                    _, angle = frames[frame.body]
+                    apart = complex(0.0, (apart / frame.facing / rect(1.0, angle)).imag)
+                if abs(apart) > _MET * size:
+                    raise self._error(
+                        f'--close {first}={other}',
+                        f'these are {abs(apart):.3g} m apart {self._where()}',
+                        'give a pose in which they meet: --at JOINT=VALUE, once for each joint',
+                    )
+
+    def _where(self) -> str:
+        return 'in the pose' if self._told else 'where all joints are 0'
+
+
+def _limited(linkage: Linkage, urdf: UrdfFile) -> Linkage:
+    """Return a linkage whose joints have the limits of the robot's."""
+
+    def of(name: str, turns: bool) -> Limits:
+        limits = urdf.joints[name].limits if name in urdf.joints else NO_LIMITS
+        if turns and limits.high - limits.low >= tau:
+            # Angles come round: these are no limits of one that is published.
+            return replace(limits, low=-inf, high=inf)
+        return limits
+
+    return replace(
+        linkage,
+        inputs=tuple(replace(one, limits=of(one.joint, False)) for one in linkage.inputs),
+        joints={
+            name: replace(joint, limits=of(name, isinstance(joint, RevoluteJoint)))
+            for name, joint in linkage.joints.items()
+        },
+    )

@@ -1,0 +1,270 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+The bodies of a linkage in MJCF: nested as the linkage hangs together, with joints, masses, shapes.
+
+The axes of a body are parallel to its link's own; its origin lies at the pin or slider that it
+hangs by.
+"""
+
+from __future__ import annotations
+
+from cmath import phase, rect
+from math import inf, prod, remainder, tau
+from xml.etree import ElementTree as ET
+
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.linkage import GROUND, Limits, Mass, NO_LIMITS
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.robot_models.bodies import bar_width, bodies, Body, Solid
+from linkage_ros.robot_models.orientation import spans
+from linkage_ros.robot_models.part import PrefixedNames
+from linkage_ros.robot_models.part_part import Part
+from linkage_ros.robot_models.physical_tree import Branch, physical_tree
+from linkage_ros.robot_models.xml import number, numbers, rough
+
+DENSITY = 7850.0
+"""Of links whose mass nobody gives: steel, in [kg/m³]."""
+
+LIGHT = 10.0
+"""Of the blocks that pins in slots stand for, in [kg/m³]: next to nothing."""
+
+_DIFFERENCE = 1e-4
+"""In [rad], or of a length."""
+
+_FARTHEST = 1e9
+"""In [rad] or [m]: where a joint is limited that has a limit on the other side only."""
+
+_LEAST_INERTIA = 1e-12
+"""An engine has no points with a mass; what has no extent gets this, in [kg·m²]."""
+
+
+class Bodies:
+    """
+    The bodies of a linkage, written into a model.
+
+    Parameters
+    ----------
+    world
+        Element of the model that they go into.
+    part, names
+        The linkage, and what its parts are called.
+    first_layer
+        Layers that other linkages have below.
+
+    Attributes
+    ----------
+    cuts
+        Pins that are cut: the point, and the two links that it joins.
+    inputs
+        Where the linkage starts, in [rad] or [m].
+    start
+        Likewise the value of every joint, in the order of the model.
+    joints
+        Elements of the joints that messages name, by their names there.
+
+    """
+
+    def __init__(
+        self, world: ET.Element, part: Part, names: PrefixedNames, first_layer: int
+    ) -> None:
+        self._closure = closure = part.closure
+        self._names = names
+        tree = physical_tree(closure)
+        self.cuts = tree.cuts
+        self._drawn = bodies(closure, spans(closure), first_layer)
+        self.inputs = usual_inputs(closure)
+        self._position = closure.position(*self.inputs)
+        self._driven = dict(
+            zip((given.joint for given in closure.linkage.inputs), self.inputs, strict=True)
+        )
+        self.joints: dict[str, ET.Element] = {}
+        self.start: list[float] = []
+        self._masses: dict[str, float] = {}
+        self._links = {GROUND: ET.SubElement(world, 'body', name=names.own(GROUND))}
+        self._origins = {GROUND: 0j}
+        self._sites: dict[tuple[str, str], str] = {}
+        _geoms(self._links[GROUND], self._drawn[GROUND], 0j)
+        self._hung: dict[str, list[Branch]] = {}
+        for branch in tree.branches:
+            self._hung.setdefault(branch.parent, []).append(branch)
+        self._hang_on(GROUND)
+
+    def site(self, link: str, point: str) -> str:
+        """Return the name of a site at a point of a link; it is made where there is none."""
+        if (link, point) not in self._sites:
+            name = self._sites[link, point] = self._names.on(point, link)
+            place = complex(*self._closure.structure.links[link][point]) - self._origins[link]
+            where = numbers(place.real, place.imag, 0.0)
+            ET.SubElement(self._links[link], 'site', name=name, pos=where)
+        return self._sites[link, point]
+
+    def inertia(self, index: int) -> float:
+        """
+        Return about what an input has to move where the linkage starts, in [kg·m²] or [kg].
+
+        Half of it is the kinetic energy at a rate of 1, by differences, each link's mass spread
+        over its points.
+        """
+        closure = self._closure
+        step = _DIFFERENCE * (closure.scale if closure.linkage.inputs[index].slider else 1.0)
+        for sign in (1.0, -1.0):
+            moved = [*self.inputs]
+            moved[index] += sign * step
+            there = closure.position(*moved)
+            if there.joints:
+                break
+        else:
+            return 0.0  # its range is narrower than that: it hardly moves at all
+        before, after = closure.points(self._position), closure.points(there)
+        found = 0.0
+        for link, mass in self._masses.items():
+            squares = [
+                abs((after[link, point] - before[link, point]) / step) ** 2
+                for point in closure.structure.links[link]
+            ]
+            found += mass * sum(squares) / len(squares)
+        return found
+
+    def _hang_on(self, parent: str) -> None:
+        """Write what hangs on a link, depth first, as the engine counts its joints."""
+        for branch in self._hung.get(parent, ()):
+            self._hang(branch)
+            self._hang_on(branch.child)
+
+    def _hang(self, branch: Branch) -> None:
+        closure, child = self._closure, branch.child
+        place, turn, axis, origin = _held(closure, branch)
+        self._origins[child] = origin
+        place -= self._origins[branch.parent]
+        given = child in closure.linkage.links
+        name = self._names.own(child) if given else self._names.frame(child)
+        value = self._value(branch)
+        if branch.kind == 'R':
+            turn += branch.sign * value
+        else:
+            place += value * axis * rect(1.0, turn)
+        where = numbers(place.real, place.imag, 0.0)
+        body = ET.SubElement(self._links[branch.parent], 'body', name=name, pos=where)
+        if turn:
+            body.set('euler', numbers(0.0, 0.0, turn))
+        self._links[child] = body
+        joint = ET.SubElement(body, 'joint', type='hinge' if branch.kind == 'R' else 'slide')
+        if branch.joint:
+            joint.set('name', self._names.own(branch.joint))
+            self.joints[branch.joint] = joint
+            _limit(joint, closure.linkage.limits.get(branch.joint, NO_LIMITS))
+        else:
+            joint.set('name', self._names.joint(f'{child}_at_{branch.name}'))
+        flat = numbers(axis.real, axis.imag, 0.0)
+        joint.set('axis', numbers(0.0, 0.0, branch.sign) if branch.kind == 'R' else flat)
+        # What the engine resets to is the pose that is written, with this as the joint's value.
+        joint.set('ref', number(value))
+        self.start.append(value)
+        mass = closure.linkage.masses.get(child)
+        solids = self._drawn[child] if given else _block(closure, child)
+        if mass is not None:
+            _inertial(body, mass, origin)
+        self._masses[child] = mass.mass if mass else _weight(solids)
+        _geoms(body, solids, origin)
+
+    def _value(self, branch: Branch) -> float:
+        """Return the value of a joint where the linkage starts."""
+        if branch.joint in self._driven:
+            return self._driven[branch.joint]
+        if branch.kind == 'P':
+            return self._closure.slide_values(self._position)[branch.name]
+        angles = self._closure.link_angles(self._position)
+        value = remainder(branch.sign * (angles[branch.child] - angles[branch.parent]), tau)
+        for bound in self._closure.bounds.joints:
+            if bound.name == branch.joint:
+                return bound.turned(value)
+        return value
+
+
+def _held(closure: Closure, branch: Branch) -> tuple[complex, float, complex, complex]:
+    """
+    Return how a body hangs on its parent where its joint is at 0.
+
+    Where it does, in the frame of the parent's link; its angle; of one that slides the axis, in
+    its own frame; and its origin, in the frame of its own link.
+    """
+    links = closure.structure.links
+    if branch.kind == 'R':
+        place, own = links[branch.parent][branch.name], links[branch.child][branch.name]
+        return complex(*place), 0.0, 0j, complex(*own)
+    slider = closure.linkage.sliders[branch.name]
+    unit = complex(*slider.direction) / abs(complex(*slider.direction))
+    if branch.parent == slider.along:
+        place, own = links[branch.parent][slider.through], links[branch.child][slider.point]
+        turn, axis = slider.angle, unit * rect(1.0, -slider.angle)
+    else:
+        place, own = links[branch.parent][slider.point], links[branch.child][slider.through]
+        turn, axis = -slider.angle, -unit
+    return complex(*place), turn, axis, complex(*own)
+
+
+def _block(closure: Closure, block: str) -> Body:
+    """Return the block that a pin in a slot stands for."""
+    name = next(slider for slider, of in closure.structure.blocks.items() if of == block)
+    slider, width = closure.linkage.sliders[name], bar_width(closure)
+    angle = phase(complex(*slider.direction))
+    solid = Solid('slot', slider.point, 0j, 0.0, angle, 2.0 * width, 1.5 * width, 0.5 * width)
+    return Body((0.35, 0.35, 0.35, 1.0), (solid,))
+
+
+def _weight(body: Body) -> float:
+    """Return about what the solids of a link weigh, in [kg]."""
+    return sum(
+        (LIGHT if solid.kind == 'slot' else DENSITY)
+        * prod((solid.length, solid.width, solid.height))
+        for solid in body.solids
+    )
+
+
+def _limit(joint: ET.Element, limits: Limits) -> None:
+    """Write what a joint can do, as far as the engine has words for it: no rate is limited."""
+    if limits.bounded:
+        joint.set('range', numbers(max(limits.low, -_FARTHEST), min(limits.high, _FARTHEST)))
+    if limits.effort < inf:
+        joint.set('actuatorfrcrange', numbers(-limits.effort, limits.effort))
+
+
+def _inertial(body: ET.Element, mass: Mass, origin: complex) -> None:
+    centre = complex(*mass.center) - origin
+    about = max(mass.inertia, _LEAST_INERTIA)
+    ET.SubElement(
+        body,
+        'inertial',
+        pos=numbers(centre.real, centre.imag, 0.0),
+        mass=number(mass.mass),
+        diaginertia=numbers(0.5 * about, 0.5 * about, about),
+    )
+
+
+def _geoms(element: ET.Element, body: Body, origin: complex) -> None:
+    for solid in body.solids:
+        at = solid.centre - origin
+        where = {'pos': rough(at.real, at.imag, solid.z), 'rgba': numbers(*body.colour)}
+        if solid.kind == 'disc':
+            size = rough(0.5 * solid.width, 0.5 * solid.height)
+            ET.SubElement(element, 'geom', where, type='cylinder', size=size)
+            continue
+        size = rough(0.5 * solid.length, 0.5 * solid.width, 0.5 * solid.height)
+        where['euler'] = rough(0.0, 0.0, solid.angle)
+        if solid.kind == 'slot':
+            where['density'] = number(LIGHT)
+        ET.SubElement(element, 'geom', where, type='box', size=size)

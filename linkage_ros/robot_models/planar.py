@@ -1,0 +1,247 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A URDF laid into its plane: bodies, which are links that fixed joints hold together, and joints.
+
+All joints of the loops turn about one direction, or slide across it. Where all joints are at 0,
+all bodies have the frame of the ground: a joint is at 0 where the frames of its bodies are
+parallel, as in a linkage file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import cos, sin
+from typing import Any, NamedTuple
+
+from linkage_ros.errors import FileError
+from linkage_ros.kinematics.linkage import Mass
+from linkage_ros.robot_models.closings import Loops
+from linkage_ros.robot_models.urdf_robot import MOVING, UrdfFile, UrdfJoint
+import numpy as np
+
+Array = Any
+"""A vector of three, or a matrix of three by three."""
+
+_PARALLEL = 1e-6
+"""Sine of the angle that joints may be off their plane by, and be in it."""
+
+
+class Frame(NamedTuple):
+    """Where a link is on its body, in [m], and its x axis there, as complex numbers."""
+
+    body: str
+    place: complex
+    facing: complex
+
+
+class PlanarJoint(NamedTuple):
+    """
+    A joint between bodies.
+
+    Attributes
+    ----------
+    name
+        Of the URDF's joint.
+    kind
+        ``R`` or ``P``.
+    parent, child
+        Bodies.
+    place
+        On the parent, in [m]; the child has its origin there.
+    axis
+        Of a slide a unit vector; of a turn +1 or −1.
+    mimics, multiplier, offset
+        The joint that it follows, '' for none, and how.
+
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    place: complex
+    axis: complex
+    mimics: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(slots=True)
+class Planar:
+    """
+    A URDF in its plane.
+
+    Attributes
+    ----------
+    root
+        The body that the others hang on: the ground.
+    frames
+        Of all links of the URDF.
+    joints
+        In an order in which parents come first.
+    bodied
+        Bodies of which there is something to be seen or to be weighed.
+    marks
+        Names of places on bodies.
+    masses
+        Of bodies, as far as they are given.
+
+    """
+
+    root: str
+    frames: dict[str, Frame] = field(default_factory=dict)
+    joints: list[PlanarJoint] = field(default_factory=list)
+    bodied: set[str] = field(default_factory=set)
+    marks: list[tuple[str, str, complex]] = field(default_factory=list)
+    masses: dict[str, Mass] = field(default_factory=dict)
+
+
+def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
+    """
+    Lay the loops of a URDF into their plane.
+
+    Raises
+    ------
+    FileError
+        Where its joints are not in one plane, with the first that is not.
+
+    """
+    turns: dict[str, Array] = {loops.ground: np.eye(3)}
+    for joint in urdf.joints.values():
+        if joint.parent in turns:
+            turns[joint.child] = turns[joint.parent] @ _turned(joint.rpy)
+    basis = _basis(urdf, turns, loops)
+
+    def flat(vector: Array) -> complex:
+        return complex(basis[0] @ vector, basis[1] @ vector)
+
+    planar = Planar(loops.ground)
+    bodies = {loops.ground: (loops.ground, np.zeros(3))}
+    for joint in urdf.joints.values():
+        if joint.parent not in bodies or not (
+            joint.name in loops.joints or joint.kind not in MOVING
+        ):
+            continue
+        body, place = bodies[joint.parent]
+        place = place + turns[joint.parent] @ np.array(joint.xyz)
+        if joint.kind not in MOVING:
+            bodies[joint.child] = (body, place)
+            continue
+        bodies[joint.child] = (joint.child, np.zeros(3))
+        axis = turns[joint.child] @ _unit(joint.axis)
+        turning = joint.kind != 'prismatic'
+        along = complex(1 if basis[2] @ axis > 0.0 else -1) if turning else flat(axis)
+        planar.joints.append(
+            PlanarJoint(
+                joint.name,
+                'R' if turning else 'P',
+                body,
+                joint.child,
+                flat(place),
+                along,
+                joint.mimics,
+                joint.multiplier,
+                joint.offset,
+            )
+        )
+    weights: dict[str, list[tuple[float, complex, float]]] = {}
+    for name, (body, place) in bodies.items():
+        link = urdf.links[name]
+        planar.frames[name] = Frame(body, flat(place), flat(turns[name][:, 0]))
+        if link.bodied:
+            planar.bodied.add(body)
+        for mark, xyz in link.marks:
+            planar.marks.append((mark, body, flat(place + turns[name] @ np.array(xyz))))
+        if link.inertial is not None:
+            centre = flat(place + turns[name] @ np.array(link.inertial.xyz))
+            axes = turns[name] @ _turned(link.inertial.rpy)
+            ixx, ixy, ixz, iyy, iyz, izz = link.inertial.tensor
+            tensor = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+            about = float(basis[2] @ axes @ tensor @ axes.T @ basis[2])
+            weights.setdefault(body, []).append((link.inertial.mass, centre, about))
+    planar.masses = {body: _together(found) for body, found in weights.items()}
+    return planar
+
+
+def _together(parts: list[tuple[float, complex, float]]) -> Mass:
+    """Return masses that are fixed to each other as one (by the theorem of Steiner)."""
+    mass = sum(each for each, _, _ in parts)
+    centre = sum(each * place for each, place, _ in parts) / mass
+    inertia = sum(own + each * abs(place - centre) ** 2 for each, place, own in parts)
+    if len(parts) == 1:
+        (_, centre, inertia), mass = parts[0], parts[0][0]
+    return Mass(mass, (centre.real, centre.imag), max(inertia, 0.0))
+
+
+def _basis(urdf: UrdfFile, turns: dict[str, Array], loops: Loops) -> Array:
+    """
+    Return x and y of the plane and its normal in the frame of the ground, as rows.
+
+    They are the ground's own axes where the plane is one of its own; the normal has its largest
+    part positive.
+    """
+
+    def axis(joint: UrdfJoint) -> Array:
+        return turns[joint.child] @ _unit(joint.axis)
+
+    moving = [joint for joint in urdf.joints.values() if joint.name in loops.joints]
+    turning = [joint for joint in moving if joint.kind != 'prismatic']
+    if not turning:
+        raise FileError(urdf.file, '', 'no joint of its loops turns', 'close others by --close')
+    normal = axis(turning[0])
+    largest = int(np.argmax(np.abs(normal)))
+    normal = normal * np.sign(normal[largest])
+    for joint in moving:
+        found = axis(joint)
+        off = (
+            float(np.linalg.norm(np.cross(found, normal)))
+            if joint.kind != 'prismatic'
+            else abs(float(found @ normal))
+        )
+        if off > _PARALLEL:
+            how = 'does not slide in the plane' if joint.kind == 'prismatic' else 'turns about'
+            reason = (
+                f'{how} that {turning[0].name} turns in'
+                if joint.kind == 'prismatic'
+                else f'{how} another direction than {turning[0].name}'
+            )
+            raise FileError(
+                urdf.file,
+                f'joint {joint.name}',
+                reason,
+                'write it fixed, or leave it out: a linkage lies in one plane',
+            )
+    x = np.eye(3)[(largest + 1) % 3]
+    x = _unit(x - (x @ normal) * normal)
+    return np.array([x, np.cross(normal, x), normal])
+
+
+def _unit(vector: Any) -> Array:
+    vector = np.array(vector, float)
+    return vector / np.linalg.norm(vector)
+
+
+def _turned(rpy: tuple[float, float, float]) -> Array:
+    """Return the matrix of roll, pitch and yaw about fixed axes, as URDF has them."""
+    (cr, cp, cy), (sr, sp, sy) = map(cos, rpy), map(sin, rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

@@ -1,0 +1,298 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A linkage as a tree of frames whose joints are those that messages name.
+
+The frame of a link is parallel to the link's own, with its origin where the link hangs: at a pin,
+or at the point that its slider is measured to. Every published joint is a joint of the tree once,
+with its own sign and zero. Where the angle of a link against the one it hangs on is not published
+itself, it is a sum of published joints; for each term there is a frame without a body, and where
+such a joint is in the tree already, one that mimics it.
+"""
+
+from __future__ import annotations
+
+from cmath import rect
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple
+
+from linkage_ros.errors import DefinitionError, listed, quoted
+from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
+from linkage_ros.robot_models.orientation_part import named_joints, Orientations, Turn
+from linkage_ros.robot_models.part import free_name, Names, PrefixedNames
+from linkage_ros.robot_models.untold import joint_text, remedy
+
+Kind = Literal['revolute', 'prismatic', 'fixed']
+
+
+class TreeJoint(NamedTuple):
+    """
+    A joint of the tree.
+
+    Attributes
+    ----------
+    name
+        As messages name it, where it moves and mimics none.
+    kind
+        What it does.
+    parent, child
+        Frames, by name.
+    place
+        Of the child's frame in the parent's where the joint is at 0, in [m].
+    turn
+        Likewise its angle, in [rad].
+    axis
+        Of a slide a unit vector in the child's frame; of a pin +1 or −1, about z.
+    mimics
+        The joint whose value it takes; '' for its own.
+
+    """
+
+    name: str
+    kind: Kind
+    parent: str
+    child: str
+    place: complex
+    turn: float = 0.0
+    axis: complex = 1 + 0j
+    mimics: str = ''
+
+
+@dataclass(slots=True)
+class Tree:
+    """
+    A linkage as a tree.
+
+    Attributes
+    ----------
+    linkage
+        The linkage.
+    joints
+        All joints, each after the one that its parent hangs on.
+    origins
+        For each link where the origin of its frame is in the link's own, in [m].
+    pins
+        Pins of the tree: the point, and the two links that it holds together.
+    slides
+        Sliders of the tree.
+    spare
+        Joints that messages name and no link hangs by.
+
+    """
+
+    linkage: Linkage
+    joints: list[TreeJoint] = field(default_factory=list)
+    origins: dict[str, complex] = field(default_factory=lambda: {GROUND: 0j})
+    pins: list[tuple[str, str, str]] = field(default_factory=list)
+    slides: list[str] = field(default_factory=list)
+    spare: list[str] = field(default_factory=list)
+
+    def place(self, link: str, point: str) -> complex:
+        """Return where a point of a link is in the frame of the link, in [m]."""
+        return complex(*self.linkage.links[link][point]) - self.origins[link]
+
+
+class _Hang(NamedTuple):
+    """
+    A way to hang a link on another that is in the tree.
+
+    Attributes
+    ----------
+    link, on
+        The two.
+    at
+        Name of the point at which they meet: of ``on``, for a slider that it carries ``through``.
+    point
+        Name of the point of ``link`` that becomes its origin.
+    turns
+        Angle of ``link`` against ``on``.
+    slider
+        Slider between them; '' for a pin.
+    slide
+        Joint that says how far.
+
+    """
+
+    link: str
+    on: str
+    at: str
+    point: str
+    turns: tuple[Turn, ...]
+    slider: str = ''
+    slide: str = ''
+
+
+def grow(linkage: Linkage, names: PrefixedNames) -> Tree:
+    """
+    Hang all links of a linkage on its ground.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    names
+        Gives frames and joints that messages do not name names of their own.
+
+    Raises
+    ------
+    DefinitionError
+        Where the joints that are published do not tell where a link is; it names what would.
+
+    """
+    growth = _Growth(linkage, names)
+    if len(growth.grow()) < len(linkage.links):
+        raise _missing(linkage)
+    growth.tree.spare += growth.unused
+    return growth.tree
+
+
+class _Growth:
+    """The tree as it grows, and the joints that are not in it yet."""
+
+    def __init__(self, linkage: Linkage, names: PrefixedNames) -> None:
+        self._linkage = linkage
+        self._names = names
+        self.tree = Tree(linkage)
+        self.unused = dict.fromkeys(named_joints(linkage))
+        self._angles = Orientations(linkage)
+        self._known = {link: self._angles.between(GROUND, link) for link in linkage.links}
+        self._slides: dict[str, list[str]] = {name: [] for name in linkage.sliders}
+        for name, joint in named_joints(linkage).items():
+            if isinstance(joint, SlideJoint):
+                self._slides[joint.slider].append(name)
+
+    def grow(self) -> Collection[str]:
+        """Hang link after link, as long as there is a way; return those that hang."""
+        while ways := list(self._ways()):
+            self._hang(min(ways, key=self._cost))
+        return self.tree.origins
+
+    def _ways(self) -> Iterator[_Hang]:
+        links = self._linkage.links
+        for link in links:
+            if link in self.tree.origins:
+                continue
+            for on in self.tree.origins:
+                turns = self._angles.between(on, link) if self._known[link] is not None else None
+                if turns is None:
+                    continue
+                for pin in links[link]:
+                    if pin in links[on]:
+                        yield _Hang(link, on, pin, pin, turns)
+                yield from self._sliding(link, on, turns)
+
+    def _sliding(self, link: str, on: str, turns: tuple[Turn, ...]) -> Iterator[_Hang]:
+        links = self._linkage.links
+        for name, slider in self._linkage.sliders.items():
+            if not self._slides[name]:
+                continue
+            slide = next((s for s in self._slides[name] if s in self.unused), '')
+            slide = slide or self._slides[name][0]
+            if on == slider.along and slider.point in links[link]:
+                yield _Hang(link, on, slider.through, slider.point, turns, name, slide)
+            elif link == slider.along and slider.point in links[on]:
+                yield _Hang(link, on, slider.point, slider.through, turns, name, slide)
+
+    def _cost(self, way: _Hang) -> tuple[int, int]:
+        """
+        Return what a way costs: frames without a body, and joints that another link may need.
+
+        What is left of a choice is in the order of the file.
+        """
+        turning = [turn.joint for turn in way.turns if turn.joint]
+        moving = turning + [way.slide] * bool(way.slider)
+        mimics = sum(joint not in self.unused for joint in moving)
+        taken = sum(joint in self.unused for joint in turning[:-1])
+        return max(0, len(moving) - 1) + mimics + _DEAR * taken, mimics
+
+    def _hang(self, way: _Hang) -> None:
+        tree, names = self.tree, self._names
+        tree.origins[way.link] = complex(*self._linkage.links[way.link][way.point])
+        if way.slider:
+            tree.slides.append(way.slider)
+        else:
+            tree.pins.append((way.at, way.on, way.link))
+        moves = list(self._moves(way))
+        parent, place = names.own(way.on), tree.place(way.on, way.at)
+        for number, move in enumerate(moves, 1):
+            last = number == len(moves)
+            child = names.own(way.link) if last else names.frame(f'{way.link}_{number}')
+            joint = move._replace(parent=parent, child=child, place=place)
+            if move.kind == 'fixed':
+                joint = joint._replace(name=names.joint(f'{way.link}_at_{way.at}'))
+            elif move.name in self.unused:
+                del self.unused[move.name]
+                joint = joint._replace(name=names.own(move.name))
+            else:
+                own = names.joint(f'{move.name}_in_{way.link}')
+                joint = joint._replace(name=own, mimics=names.own(move.name))
+            tree.joints.append(joint)
+            parent, place = child, 0j
+
+    def _moves(self, way: _Hang) -> Iterator[TreeJoint]:
+        """Yield joints, from that of the parent to that of the link, between no frames yet."""
+        turning = [i for i, turn in enumerate(way.turns) if turn.joint]
+        # A constant stands before the joint behind it, the last ones before the last joint: they
+        # turn about one axis.
+        constant = 0.0 if turning else sum(turn.constant for turn in way.turns)
+        slide = None
+        if way.slider:
+            slider = self._linkage.sliders[way.slider]
+            unit = complex(*slider.direction) / abs(complex(*slider.direction))
+            along = way.on == slider.along
+            axis = unit * rect(1.0, -constant) if along else -unit
+            slide = TreeJoint(way.slide, 'prismatic', '', '', 0j, constant, axis)
+            if along:
+                yield slide
+        behind = turning[-1] + 1 if turning else 0
+        before, after = 0.0, sum(turn.constant for turn in way.turns[behind:])
+        for i, turn in enumerate(way.turns):
+            before += turn.constant
+            if turn.joint:
+                if i == turning[-1]:
+                    before += after
+                yield TreeJoint(turn.joint, 'revolute', '', '', 0j, before, complex(turn.sign))
+                before = 0.0
+        if slide is not None and not along:
+            yield slide
+        if slide is None and not turning:
+            yield TreeJoint('', 'fixed', '', '', 0j, constant)
+
+
+_DEAR = 9
+"""What it costs to take a joint away from the link that it is there for."""
+
+
+def _missing(linkage: Linkage) -> DefinitionError:
+    """Return the error that names the joints without which no tree holds all links."""
+    whole, lost, added = linkage, dict[str, None](), dict[str, RevoluteJoint | SlideJoint]()
+    while True:
+        growth = _Growth(whole, Names().of('', whole))
+        placed = growth.grow()
+        if len(placed) == len(linkage.links):
+            break
+        link, name, joint = remedy(whole, placed)
+        lost[link] = None
+        added[free_name(name, named_joints(whole))] = joint
+        whole = replace(linkage, joints=dict(linkage.joints) | added)
+    several = len(lost) > 1
+    return DefinitionError(
+        'joints',
+        f'the published ones do not tell where link{"s" if several else ""} '
+        f'{listed(map(quoted, lost), " and ")} {"stand" if several else "stands"}',
+        f'add to joints: {", ".join(joint_text(name, joint) for name, joint in added.items())}',
+    )

@@ -1,0 +1,284 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+A linkage as URDF: the tree of its published joints, and frames where pins close its loops.
+
+Root is the ground; where several linkages stand in one model, a frame without a body that holds
+their grounds, since a scene does not say where they stand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
+import re
+from typing import NamedTuple
+from xml.etree import ElementTree as ET
+
+from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.kinematics.linkage import GROUND, Limits, Mass, NO_LIMITS
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.robot_models.bodies import bodies, Body
+from linkage_ros.robot_models.cuts import add_frames, Cut
+from linkage_ros.robot_models.orientation import Span, spans
+from linkage_ros.robot_models.orientation_part import named_joints
+from linkage_ros.robot_models.part import prefixed, PrefixedNames
+from linkage_ros.robot_models.part_part import Part, PartError
+from linkage_ros.robot_models.tree import grow, Tree, TreeJoint
+from linkage_ros.robot_models.xml import comment, document, number, numbers, rough
+
+EFFORT, VELOCITY = 1000.0, 100.0
+"""Limits that URDF asks for and nobody knows, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
+
+FARTHEST = 1e9
+"""In [rad]: where an angle is limited that goes on and on to this side, and to the other not."""
+
+_ROOT = 'world'
+
+_EXPRESSION = re.compile(r'\$[{(]')
+"""What xacro evaluates (https://wiki.ros.org/xacro)."""
+
+
+class _Model(NamedTuple):
+    """A linkage, ready to be written."""
+
+    part: Part
+    names: PrefixedNames
+    tree: Tree
+    cuts: Sequence[Cut]
+    spans: Mapping[str, Span]
+    bodies: Mapping[str, Body]
+
+
+def urdf(name: str, parts: Sequence[Part]) -> bytes:
+    """
+    Return a robot model.
+
+    Parameters
+    ----------
+    name
+        Of the robot.
+    parts
+        Its linkages.
+
+    Raises
+    ------
+    PartError
+        Where the published joints of one do not tell where all its links are, or xacro would
+        evaluate one of its names.
+
+    """
+    names, own = prefixed([(part.prefix, part.closure.linkage) for part in parts])
+    models = []
+    layers = 0
+    for count, (part, its) in enumerate(zip(parts, own, strict=True)):
+        try:
+            tree = grow(part.closure.linkage, its)
+        except DefinitionError as error:
+            raise PartError(count, error.where, error.reason, error.remedy) from None
+        cuts = add_frames(tree, its)
+        found = spans(part.closure)
+        models.append(_Model(part, its, tree, cuts, found, bodies(part.closure, found, layers)))
+        layers += len(part.closure.linkage.links)
+    robot = ET.Element('robot', name=name)
+    robot.append(comment(list(_head(models))))
+    if len(models) > 1:
+        root = names.frame(_ROOT)
+        ET.SubElement(robot, 'link', name=root)
+        for model in models:
+            mount = TreeJoint(
+                model.names.joint('mount'), 'fixed', root, model.names.own(GROUND), 0j
+            )
+            _joint(robot, mount, None, NO_LIMITS)
+    _refuse_expressions(0, robot, of_linkage=False)
+    for count, model in enumerate(models):
+        before = len(robot)
+        _write(robot, model)
+        for element in robot[before:]:
+            _refuse_expressions(count, element)
+    return document(robot)
+
+
+def _refuse_expressions(number: int, element: ET.Element, *, of_linkage: bool = True) -> None:
+    """
+    Refuse names that xacro would evaluate.
+
+    A launch file reads a URDF by way of xacro or as it is; what is escaped for the one is another
+    name in the other.
+    """
+    for each in element.iter():
+        for text in each.attrib.values():
+            if _EXPRESSION.search(text):
+                raise PartError(
+                    number,
+                    '',
+                    f'xacro would evaluate the name {quoted(text)}',
+                    'choose a name without ${ and $(',
+                    of_linkage=of_linkage,
+                )
+
+
+def _head(models: Sequence[_Model]) -> Iterator[str]:
+    yield from _HEAD.splitlines()
+    if len(models) > 1:
+        yield 'A scene does not say where its linkages stand. Change the origin of NAME_mount.'
+    if any(joint.mimics for model in models for joint in model.tree.joints):
+        yield 'Frames without a body between joints at one pin turn with joints that they mimic,'
+        yield 'so that a published joint starts from the link that it is measured from.'
+    for model in models:
+        yield ''
+        if not model.cuts:
+            yield 'Nothing is cut.'
+        for cut in model.cuts:
+            first, *others = cut.frames
+            met = ' and '.join(others)
+            what = 'pin' if cut.kind == 'pin' else 'slider'
+            line = f'{met} is on the x axis of {first}'
+            how = line if cut.kind == 'line' else f'{first} meets {met}'
+            yield f'{what} {cut.name} is cut, {how}'
+        if spare := ', '.join(map(model.names.own, model.tree.spare)):
+            yield f'no link hangs by {spare}'
+
+
+_HEAD = f"""\
+A planar linkage, cut open to a tree. Names, axes, signs and zeroes of the joints are those of
+the published joint states. Lengths in [m], angles in [rad]; the plane is z = 0.
+Links are bars in layers, of no particular shape; those with a mass are thin plates, with ixx =
+iyy = izz/2.
+A limit is as the linkage gives it; else what the joint comes to over the range of the input that
+the linkage starts in, and 0.001 rad, or of the reach, on either side; with several inputs none for
+angles, the reach for slides. An angle that passes pi has none either, since it is published as it
+begins in (-pi, pi], or wrapped. Efforts not given are {EFFORT:g}, velocities {VELOCITY:g}."""
+
+
+def _write(robot: ET.Element, model: _Model) -> None:
+    names, linkage = model.names, model.part.closure.linkage
+    for link in linkage.links:
+        element = ET.SubElement(robot, 'link', name=names.own(link))
+        origin = model.tree.origins[link]
+        if link in linkage.masses and link != GROUND:
+            _inertial(element, linkage.masses[link], origin)
+        _visuals(element, names.own(link), model.bodies[link], origin)
+    links = {names.own(link) for link in linkage.links}
+    for joint in model.tree.joints:
+        if joint.child not in links:
+            ET.SubElement(robot, 'link', name=joint.child)
+    found = {names.own(name): span for name, span in model.spans.items()}
+    given = {names.own(name): limits for name, limits in linkage.limits.items()}
+    computed: dict[str, dict[str, str]] = {}
+    for joint in model.tree.joints:
+        of = joint.mimics or joint.name
+        limits = given.get(of, NO_LIMITS)
+        computed[of] = _joint(robot, joint, found.get(of), limits, model.part.wrapped)
+    _start(robot, model, computed)
+
+
+def _inertial(link: ET.Element, mass: Mass, origin: complex) -> None:
+    inertial = ET.SubElement(link, 'inertial')
+    _origin(inertial, complex(*mass.center) - origin)
+    ET.SubElement(inertial, 'mass', value=number(mass.mass))
+    flat, about = number(0.5 * mass.inertia), number(mass.inertia)
+    ET.SubElement(inertial, 'inertia', ixx=flat, ixy='0', ixz='0', iyy=flat, iyz='0', izz=about)
+
+
+def _visuals(link: ET.Element, name: str, body: Body, origin: complex) -> None:
+    for count, solid in enumerate(body.solids):
+        visual = ET.SubElement(link, 'visual')
+        if solid.name and solid.kind in ('disc', 'block'):
+            visual.set('name', solid.name)
+        centre = solid.centre - origin
+        seen = {'xyz': rough(centre.real, centre.imag, solid.z), 'rpy': rough(0, 0, solid.angle)}
+        ET.SubElement(visual, 'origin', seen)
+        geometry = ET.SubElement(visual, 'geometry')
+        if solid.kind == 'disc':
+            radius = rough(0.5 * solid.width)
+            ET.SubElement(geometry, 'cylinder', radius=radius, length=rough(solid.height))
+        else:
+            size = rough(solid.length, solid.width, solid.height)
+            ET.SubElement(geometry, 'box', size=size)
+        material = ET.SubElement(visual, 'material', name=f'colour of {name}')
+        if not count:
+            ET.SubElement(material, 'color', rgba=numbers(*body.colour))
+
+
+def _joint(
+    robot: ET.Element, joint: TreeJoint, span: Span | None, limits: Limits, wrapped: bool = False
+) -> dict[str, str]:
+    """Write a joint; return those of its limits that the linkage does not give."""
+    kind: str = joint.kind
+    if kind == 'revolute' and span is not None:
+        # Wrapped, an angle is on both sides of what it passes at π.
+        passing = wrapped and Span(limits.low, limits.high).passes_pi
+        if passing if limits.bounded else not span.limited:
+            kind = 'continuous'
+    element = ET.SubElement(robot, 'joint', name=joint.name, type=kind)
+    _origin(element, joint.place, joint.turn)
+    ET.SubElement(element, 'parent', link=joint.parent)
+    ET.SubElement(element, 'child', link=joint.child)
+    if joint.kind == 'fixed':
+        return {}
+    assert span is not None, 'all that moves is published'
+    if joint.kind == 'revolute':
+        axis = numbers(0.0, 0.0, joint.axis.real)
+    else:
+        axis = numbers(joint.axis.real, joint.axis.imag, 0.0)
+    ET.SubElement(element, 'axis', xyz=axis)
+    # What is limited on one side only, and turns on and on to the other, is limited far away.
+    lowest, highest = (span.lowest, span.highest) if span.limited else (-FARTHEST, FARTHEST)
+    known = {
+        'lower': (limits.low, lowest),
+        'upper': (limits.high, highest),
+        'effort': (limits.effort, EFFORT),
+        'velocity': (limits.velocity, VELOCITY),
+    }
+    if kind == 'continuous':
+        del known['lower'], known['upper']
+    written = {
+        key: number(given if isfinite(given) else ours) for key, (given, ours) in known.items()
+    }
+    ET.SubElement(element, 'limit', written)
+    if joint.mimics:
+        ET.SubElement(element, 'mimic', joint=joint.mimics, multiplier='1', offset='0')
+    return {key: written[key] for key, (given, _) in known.items() if not isfinite(given)}
+
+
+def _origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:
+    xyz, rpy = numbers(place.real, place.imag, 0.0), numbers(0.0, 0.0, turn)
+    ET.SubElement(element, 'origin', xyz=xyz, rpy=rpy)
+
+
+def _start(robot: ET.Element, model: _Model, computed: Mapping[str, Mapping[str, str]]) -> None:
+    """
+    Say what URDF has no words for: the inputs, and a pose in which the loops close.
+
+    Of each joint also those limits that the linkage does not give. Readers of URDF pass over
+    elements that they do not know; ``linkage import`` knows these.
+    """
+    closure, names = model.part.closure, model.names
+    inputs = usual_inputs(closure)
+    given = zip(closure.linkage.inputs, inputs, strict=True)
+    values = {driven.joint: value for driven, value in given}
+    position = closure.position(*inputs)
+    if not position.joints:
+        return  # of several inputs: it closes nowhere
+    values |= dict(zip(closure.linkage.joints, position.joints, strict=True))
+    element = ET.SubElement(robot, 'linkage_start')
+    for name in named_joints(closure.linkage):
+        kind = 'input' if name in [each.joint for each in closure.linkage.inputs] else 'joint'
+        own = names.own(name)
+        joint = ET.SubElement(element, kind, name=own, value=number(values[name]))
+        if own in computed:
+            ET.SubElement(joint, 'computed', dict(computed[own]))

@@ -1,0 +1,291 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A URDF as it stands: links and joints by name, each joint checked for what URDF asks of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import inf, isfinite
+from xml.etree import ElementTree as ET
+
+from linkage_ros.errors import FileError, listed, quoted
+from linkage_ros.kinematics.linkage import Limits, NO_LIMITS
+from linkage_ros.robot_models.urdf_robot import (
+    Inertial,
+    MOVING,
+    UrdfFile,
+    UrdfJoint,
+    UrdfLink,
+    Vector,
+)
+
+_KINDS = (*MOVING, 'fixed', 'floating', 'planar')
+_FARTHEST = 1e9
+
+
+def read_urdf(data: bytes, file: str) -> UrdfFile:
+    """
+    Read a URDF.
+
+    Raises
+    ------
+    FileError
+        With the file and the link or joint that is at fault, and what would help.
+
+    """
+    try:
+        root = ET.fromstring(data)
+    except ET.ParseError as error:
+        line, _ = error.position
+        raise FileError(file, '', f'is no XML ({error})', 'name a URDF file', line) from None
+    except (ValueError, LookupError) as error:  # an encoding that is said and is none
+        raise FileError(file, '', f'is no XML ({error})', 'name a URDF file') from None
+    return _Reader(file).read(root)
+
+
+class _Reader:
+    def __init__(self, file: str) -> None:
+        self._file = file
+
+    def read(self, root: ET.Element) -> UrdfFile:
+        if root.tag != 'robot':
+            raise self._error('', f'holds <{root.tag}>, not <robot>', 'name a URDF file')
+        for element in root.iter():
+            if 'ros.org/wiki/xacro' in element.tag or '${' in ''.join(element.attrib.values()):
+                raise self._error('', 'is written in xacro', 'run first: xacro FILE > FILE.urdf')
+        links: dict[str, UrdfLink] = {}
+        for element in root.findall('link'):
+            name = self._named(element, links, 'link')
+            links[name] = self._link(element, f'link {name}')
+        if not links:
+            raise self._error('', 'has no link', 'name a URDF file')
+        start = root.find('linkage_start')
+        made_up = {} if start is None else {each.get('name', ''): _made_up(each) for each in start}
+        joints: dict[str, UrdfJoint] = {}
+        for element in root.findall('joint'):
+            name = self._named(element, joints, 'joint')
+            limits = NO_LIMITS
+            if name not in made_up or made_up[name] is not None:
+                limits = self._limits(element, name, made_up.get(name))
+            joints[name] = self._joint(element, name, links)._replace(limits=limits)
+        self._check_mimics(joints)
+        base, ordered = self._tree(links, joints)
+        said = [] if start is None else [each for each in start if each.get('name') in joints]
+        return UrdfFile(
+            self._file,
+            root.get('name', ''),
+            base,
+            links,
+            {joint.name: joint for joint in ordered},
+            tuple(joints),
+            tuple(each.get('name', '') for each in said if each.tag == 'input'),
+            {each.get('name', ''): self._value(each, 'value', 'linkage_start') for each in said},
+        )
+
+    def _error(self, key: str, reason: str, remedy: str) -> FileError:
+        return FileError(self._file, key, reason, remedy)
+
+    def _named(self, element: ET.Element, taken: Mapping[str, object], kind: str) -> str:
+        name = element.get('name', '')
+        if not name or not name.isprintable():
+            raise self._error('', f'a {kind} has the name {quoted(name)}', 'give it a name')
+        if name in taken:
+            raise self._error(f'{kind} {name}', 'is there twice', 'rename one')
+        return name
+
+    def _value(self, element: ET.Element, key: str, where: str, default: str = '') -> float:
+        (value,) = self._values(element, key, where, 1, default)
+        return value
+
+    def _values(
+        self, element: ET.Element | None, key: str, where: str, count: int, default: str
+    ) -> tuple[float, ...]:
+        text = default if element is None else element.get(key, default)
+        try:
+            values = tuple(map(float, text.split()))
+        except ValueError:
+            values = ()
+        if len(values) != count or not all(isfinite(v) and abs(v) <= _FARTHEST for v in values):
+            numbers = 'a finite number' if count == 1 else f'{count} finite numbers'
+            raise self._error(where, f'{key}={quoted(text)} is not {numbers}', 'put it right')
+        return values
+
+    def _vector(self, element: ET.Element | None, key: str, where: str, default: str) -> Vector:
+        x, y, z = self._values(element, key, where, 3, default)
+        return x, y, z
+
+    def _link(self, element: ET.Element, where: str) -> UrdfLink:
+        seen = [*element.findall('visual'), *element.findall('collision')]
+        marks = tuple(
+            (each.get('name', ''), self._vector(each.find('origin'), 'xyz', where, '0 0 0'))
+            for each in seen
+            if each.get('name')
+        )
+        inertial = element.find('inertial')
+        weighed = self._inertial(inertial, where) if inertial is not None else None
+        return UrdfLink(weighed, bool(seen) or weighed is not None, marks)
+
+    def _inertial(self, element: ET.Element, where: str) -> Inertial | None:
+        mass = element.find('mass')
+        if mass is None:
+            return None
+        weight = self._value(mass, 'value', where)
+        origin, tensor = element.find('origin'), element.find('inertia')
+        keys = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+        ixx, ixy, ixz, iyy, iyz, izz = (
+            self._values(tensor, key, where, 1, '0')[0] for key in keys
+        )
+        if weight <= 0.0:
+            return None  # as some exporters write frames
+        return Inertial(
+            weight,
+            self._vector(origin, 'xyz', where, '0 0 0'),
+            self._vector(origin, 'rpy', where, '0 0 0'),
+            (ixx, ixy, ixz, iyy, iyz, izz),
+        )
+
+    def _joint(self, element: ET.Element, name: str, links: Mapping[str, UrdfLink]) -> UrdfJoint:
+        where, kind = f'joint {name}', element.get('type', '')
+        if kind not in _KINDS:
+            raise self._error(
+                where, f'type={quoted(kind)} is none', f'write {listed(MOVING)} or fixed'
+            )
+        if kind in ('floating', 'planar'):
+            raise self._error(
+                where,
+                f'is {kind}, which no pin or slider of a planar linkage is',
+                f'write {listed(MOVING)} or fixed, or leave it out with what hangs on it',
+            )
+        parent, child = (self._end(element, end, where, links) for end in ('parent', 'child'))
+        axis = self._vector(element.find('axis'), 'xyz', where, '1 0 0')
+        if kind in MOVING and axis == (0.0, 0.0, 0.0):
+            raise self._error(where, 'its axis is 0 0 0', 'write 0 0 1, for example')
+        origin, mimic = element.find('origin'), element.find('mimic')
+        return UrdfJoint(
+            name,
+            kind,
+            parent,
+            child,
+            xyz=self._vector(origin, 'xyz', where, '0 0 0'),
+            rpy=self._vector(origin, 'rpy', where, '0 0 0'),
+            axis=axis,
+            mimics='' if mimic is None else mimic.get('joint', ''),
+            multiplier=self._values(mimic, 'multiplier', where, 1, '1')[0],
+            offset=self._values(mimic, 'offset', where, 1, '0')[0],
+            limits=NO_LIMITS,
+        )
+
+    def _limits(self, joint: ET.Element, name: str, made_up: Mapping[str, str] | None) -> Limits:
+        """
+        Return what ``<limit>`` says, as far as it says something.
+
+        Nothing do numbers that ``linkage urdf`` had to make up, bounds of a continuous joint, two
+        bounds of 0, and a velocity or an effort of 0, which exporters write who do not know them.
+        """
+        limit, where = joint.find('limit'), f'joint {name}'
+        if limit is None or joint.get('type') not in MOVING:
+            return NO_LIMITS
+        told = {
+            key: self._value(limit, key, where, default='0')
+            for key in ('lower', 'upper', 'velocity', 'effort')
+        }
+        book = dict(made_up or {})
+        if any(book.get(key, limit.get(key)) != limit.get(key) for key in ('lower', 'upper')):
+            # Somebody has put one of the two right, and left the other as it was.
+            book = {key: text for key, text in book.items() if key not in ('lower', 'upper')}
+        for key, text in book.items():
+            if key in told and text == limit.get(key):
+                del told[key]
+        low, high = told.get('lower', -inf), told.get('upper', inf)
+        if joint.get('type') == 'continuous' or low == high == 0.0:
+            low, high = -inf, inf
+        if low >= high:
+            raise self._error(
+                where,
+                f'its limits, {low:g} to {high:g}, leave nothing between them',
+                'put <limit> right, or import with --no-limits',
+            )
+        rates = [told.get(key, 0.0) for key in ('velocity', 'effort')]
+        velocity, effort = (value if value > 0.0 else inf for value in rates)
+        return Limits(low, high, velocity, effort)
+
+    def _end(
+        self, element: ET.Element, end: str, where: str, links: Mapping[str, UrdfLink]
+    ) -> str:
+        found = element.find(end)
+        link = found.get('link', '') if found is not None else ''
+        if link not in links:
+            raise self._error(where, f'its {end} {quoted(link)} is no link', 'name a link')
+        return link
+
+    def _check_mimics(self, joints: Mapping[str, UrdfJoint]) -> None:
+        for joint in joints.values():
+            if not joint.mimics:
+                continue
+            if joint.mimics not in joints:
+                raise self._error(
+                    f'joint {joint.name}',
+                    f'mimics {quoted(joint.mimics)}, which is no joint',
+                    'name a joint',
+                )
+            if joints[joint.mimics].mimics or joints[joint.mimics].kind not in MOVING:
+                raise self._error(
+                    f'joint {joint.name}',
+                    f'mimics {quoted(joint.mimics)}, which does not move by itself',
+                    'name the joint that it follows in the end',
+                )
+
+    def _tree(
+        self, links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint]
+    ) -> tuple[str, list[UrdfJoint]]:
+        held: dict[str, UrdfJoint] = {}
+        for joint in joints.values():
+            if joint.child in held:
+                raise self._error(
+                    f'link {joint.child}',
+                    f'hangs on two joints, {held[joint.child].name} and {joint.name}',
+                    'end one of them in a frame of its own, and close it by --close',
+                )
+            held[joint.child] = joint
+        roots = [link for link in links if link not in held]
+        if len(roots) != 1:
+            reason = f'has {len(roots)} roots ({listed(roots)})' if roots else 'has no root'
+            raise self._error('', reason, 'join all links by joints to one that is held by none')
+        ordered = list(_below(roots[0], joints))
+        for joint in joints.values():
+            if joint not in ordered:
+                raise self._error(
+                    f'joint {joint.name}',
+                    'is in a ring of joints',
+                    'close it by --close instead',
+                )
+        return roots[0], ordered
+
+
+def _made_up(joint: ET.Element) -> Mapping[str, str] | None:
+    """Return the limits of a joint that ``linkage urdf`` made up; None where it kept no book."""
+    computed = joint.find('computed')
+    return None if computed is None else computed.attrib
+
+
+def _below(root: str, joints: Mapping[str, UrdfJoint]) -> Iterator[UrdfJoint]:
+    """Yield joints, those that hang on a link after that link's own."""
+    reached = [root]
+    for link in reached:
+        for joint in joints.values():
+            if joint.parent == link:
+                yield joint
+                reached.append(joint.child)

@@ -1,0 +1,270 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A URDF, and what closes it, as links, pins, sliders and joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from linkage_ros.errors import FileError
+from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.robot_models.chains import Chain, chains, plus, Symbol, symbols
+from linkage_ros.robot_models.closings import Closing
+from linkage_ros.robot_models.planar import Frame, Planar
+from linkage_ros.robot_models.points import Points
+from linkage_ros.robot_models.urdf_robot import UrdfFile
+
+NEAR = 1e-9
+"""Of the size, what places may be apart by and be one."""
+
+_TREE, _CUT, _MARK, _ALONE = 8, 0, 1, 2
+"""Where the name of a point comes from; the lowest is taken."""
+
+
+class _Rail(NamedTuple):
+    """A slider between bodies, its points by their numbers."""
+
+    point: int
+    along: str
+    through: int
+    direction: complex
+    block: str
+    angle: float
+
+
+@dataclass(slots=True)
+class Skeleton:
+    """
+    What a URDF comes to.
+
+    Attributes
+    ----------
+    links
+        Points of every link, by name, in [m].
+    bodies
+        Of each link the body of the URDF.
+    sliders, joints
+        By name.
+    traced
+        Names of points.
+
+    """
+
+    links: dict[str, dict[str, complex]] = field(default_factory=dict)
+    bodies: dict[str, str] = field(default_factory=dict)
+    sliders: dict[str, Slider] = field(default_factory=dict)
+    joints: dict[str, RevoluteJoint | SlideJoint] = field(default_factory=dict)
+    traced: tuple[str, ...] = ()
+
+
+def skeleton(
+    urdf: UrdfFile,
+    planar: Planar,
+    closings: Sequence[Closing],
+    alone: dict[str, str],
+) -> Skeleton:
+    """
+    Put the loops of a URDF together.
+
+    Parameters
+    ----------
+    urdf, planar
+        The robot.
+    closings
+        What closes it.
+    alone
+        Frames that are points, with their names.
+
+    Raises
+    ------
+    FileError
+        Where a joint or a closing is one that a linkage cannot have.
+
+    """
+    return _Building(urdf, planar, closings, alone).built()
+
+
+class _Building:
+    def __init__(
+        self,
+        urdf: UrdfFile,
+        planar: Planar,
+        closings: Sequence[Closing],
+        alone: dict[str, str],
+    ) -> None:
+        self._urdf, self._planar, self._closings, self._alone = urdf, planar, closings, alone
+        places = [abs(joint.place) for joint in planar.joints]
+        places += [abs(frame.place) for frame in planar.frames.values()]
+        self.near = NEAR * (max(places, default=0.0) or 1.0)
+        self._symbols = symbols(planar)
+        closing = {frame for each in closings for frame in each.frames}
+        # A slide that ends in a frame is the place of a slider's point, not a link.
+        leaves = {j.child for j in planar.joints} - {j.parent for j in planar.joints}
+        self._tips = {j.child: j for j in planar.joints if j.kind == 'P' and j.child in leaves}
+        self._tips = {b: j for b, j in self._tips.items() if b not in planar.bodied}
+        marked = {planar.frames[frame].body for frame in closing} - set(self._tips)
+        self._chains = chains(planar, marked, self.near)
+        self._points = Points(self.near)
+        self._rails: dict[str, _Rail] = {}
+        self._joints: dict[str, tuple[str, str] | str] = {}
+
+    def built(self) -> Skeleton:
+        kept = [self._planar.root]
+        kept += [each.child for each in self._chains if each.child not in self._tips]
+        for chain in self._chains:
+            if chain.child not in self._tips:
+                self._hold(chain, kept)
+        for closing in self._closings:
+            self._close(closing)
+        made = Skeleton(bodies=dict(self._link_names(kept)))
+        names = {body: link for link, body in made.bodies.items()}
+        for mark, body, place in self._planar.marks:
+            number = self._points.there(body, place)
+            if number is not None:
+                self._points.hint(number, mark, _MARK)
+        traced = [
+            self._points.at(frame.body, frame.place, self._alone[name], _ALONE)
+            for name, frame in self._planar.frames.items()
+            if name in self._alone
+        ]
+        points, called = self._points.named(kept)
+        made.links = {names[body]: points[body] for body in kept}
+        made.traced = tuple(dict.fromkeys(called[number] for number in traced))
+        for name, rail in self._rails.items():
+            made.sliders[name] = Slider(
+                called[rail.point],
+                names[rail.along],
+                called[rail.through],
+                (rail.direction.real, rail.direction.imag),
+                names[rail.block] if rail.block else '',
+                rail.angle if rail.block else 0.0,
+            )
+        order = [*self._urdf.start, *(n for n in self._urdf.order if n not in self._urdf.start)]
+        for name in order:
+            joint = self._joints.get(name)
+            if isinstance(joint, str):
+                made.joints[name] = SlideJoint(joint)
+            elif isinstance(joint, tuple):
+                made.joints[name] = RevoluteJoint(names[joint[0]], names[joint[1]])
+        return made
+
+    def _link_names(self, kept: Sequence[str]) -> Iterator[tuple[str, str]]:
+        yield GROUND, kept[0]
+        taken = {GROUND, *kept[1:]}
+        for body in kept[1:]:
+            name = body
+            while name == GROUND or (name != body and name in taken):
+                name = f'{name}_link'
+            yield name, body
+
+    def _hold(self, chain: Chain, kept: Sequence[str]) -> None:
+        """Take the pin or slider that holds a body."""
+        first, last = chain.joints[0], chain.joints[-1]
+        at_parent = self._points.at(chain.parent, first.place, f'{last.name}_pin', _TREE)
+        at_child = self._points.at(chain.child, 0j)
+        self._turns(chain, kept)
+        slide = chain.slide
+        if slide is None:
+            self._points.join(at_parent, at_child)
+            return
+        if first is slide:
+            block = chain.child if self._rigid(chain.parent, chain.child) else ''
+            angle = self._symbols[chain.child][1] - self._symbols[chain.parent][1]
+            rail = _Rail(at_child, chain.parent, at_parent, slide.axis, block, angle)
+        else:
+            # The rod slides; its way counts against the direction in which it moves.
+            block = chain.parent if self._rigid(chain.parent, chain.child) else ''
+            angle = self._symbols[chain.parent][1] - self._symbols[chain.child][1]
+            rail = _Rail(at_parent, chain.child, at_child, -slide.axis, block, angle)
+        self._rails[slide.name] = rail
+        self._joints[slide.name] = slide.name
+
+    def _turns(self, chain: Chain, kept: Sequence[str]) -> None:
+        """Find between which links the angles of a chain's joints are."""
+        symbol = self._symbols[chain.parent]
+        for joint in chain.joints:
+            if joint.kind != 'R':
+                continue
+            before, symbol = symbol, plus(symbol, joint)
+            if joint.mimics and len(chain.joints) > 1:
+                continue  # it turns a frame until it is parallel to some link
+            ends = []
+            for where, likely in ((before, chain.parent), (symbol, chain.child)):
+                found = [likely, *kept]
+                ends.append(next((b for b in found if _same(self._symbols[b], where)), ''))
+            if not all(ends):
+                raise FileError(
+                    self._urdf.file,
+                    f'joint {joint.name}',
+                    'turns between frames that are parallel to no link',
+                    'give these frames a body, or leave out what they hold',
+                )
+            parent, child = ends if joint.axis.real > 0.0 else reversed(ends)
+            self._joints[joint.name] = (parent, child)
+
+    def _rigid(self, one: str, other: str) -> bool:
+        return self._symbols[one][0] == self._symbols[other][0]
+
+    def _close(self, closing: Closing) -> None:
+        frames = [self._planar.frames[name] for name in closing.frames]
+        tips = [frame for frame in frames if frame.body in self._tips]
+        if closing.line:
+            self._line(closing, frames[0], frames[1], frames[0].facing, '')
+            return
+        if len(tips) > 1 or (tips and len(frames) > 2):
+            raise FileError(
+                self._urdf.file,
+                f'--close {"=".join(closing.frames)}',
+                'closes a slide that ends in a frame by more than one link',
+                'close it by one',
+            )
+        if tips:
+            joint = self._tips[tips[0].body]
+            other = next(frame for frame in frames if frame is not tips[0])
+            line = Frame(joint.parent, joint.place + tips[0].place, joint.axis)
+            # What is held at the tip besides may turn about it: the tip is a point.
+            self._line(closing, line, other, joint.axis, joint.name)
+            return
+        first, *others = frames
+        one = self._points.at(first.body, first.place, closing.name, _CUT)
+        for other in others:
+            if other.body == first.body:
+                raise FileError(
+                    self._urdf.file,
+                    f'--close {"=".join(closing.frames)}',
+                    f'both are fixed to {first.body!r}',
+                    'name frames of two links between which something moves',
+                )
+            self._points.join(one, self._points.at(other.body, other.place))
+
+    def _line(
+        self, closing: Closing, line: Frame, point: Frame, direction: complex, joint: str
+    ) -> None:
+        """Take a slider that no body hangs by."""
+        name = joint or closing.name
+        at = self._points.at(point.body, point.place, f'{closing.name}_point', _TREE)
+        through = self._points.at(line.body, line.place, f'{closing.name}_line', _TREE)
+        block = point.body if self._rigid(line.body, point.body) else ''
+        angle = self._symbols[point.body][1] - self._symbols[line.body][1]
+        self._rails[name] = _Rail(at, line.body, through, direction, block, angle)
+        if joint:
+            self._joints[joint] = joint
+
+
+def _same(one: Symbol, other: Symbol) -> bool:
+    return one[0] == other[0] and abs(one[1] - other[1]) < NEAR

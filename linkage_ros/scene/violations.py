@@ -1,0 +1,180 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""All that is wrong with a file by its schema, one line each; by the library jsonschema."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from re import search
+from typing import Any, TYPE_CHECKING
+
+from jsonschema import Draft202012Validator
+from linkage_ros.errors import did_you_mean, FileError, listed, quoted
+from linkage_ros.files.parameters import Schema
+from linkage_ros.files.section import LinedDict, Section
+
+if TYPE_CHECKING:
+    from jsonschema import ValidationError
+
+_TYPES = {
+    'object': 'a mapping',
+    'array': 'a list',
+    'string': 'a text',
+    'number': 'a number',
+    'integer': 'a whole number',
+    'boolean': 'true or false',
+}
+_BOUNDS = {
+    'exclusiveMinimum': 'more than',
+    'minimum': 'at least',
+    'maximum': 'at most',
+}
+
+_Path = tuple[str | int, ...]
+_Said = tuple[_Path, str, str]
+
+
+def violations(content: Section, schema: Schema) -> list[FileError]:
+    """
+    Return what is wrong with a file, in the order of its lines.
+
+    Parameters
+    ----------
+    content
+        The file.
+    schema
+        Its JSON Schema.
+
+    """
+    whole = content.mapping
+    broken = list(Draft202012Validator(schema).iter_errors(whole))
+    # What is of the wrong type breaks further rules, of which nobody needs to hear.
+    mistyped = {tuple(error.absolute_path) for error in broken if error.validator == 'type'}
+    found = [
+        FileError(content.file, _dotted(path), reason, remedy, _line(whole, path))
+        for error in broken
+        if error.validator == 'type' or tuple(error.absolute_path) not in mistyped
+        for path, reason, remedy in _said(error, schema)
+    ]
+    return sorted(found, key=lambda error: (error.line, error.key))
+
+
+def _said(error: ValidationError, whole: Schema) -> Iterator[_Said]:
+    """Yield path, reason and remedy of what one broken rule comes to."""
+    path = tuple(error.absolute_path)
+    value: Any = error.instance
+    wanted: Any = error.validator_value
+    schema: Any = error.schema
+    rule: Any = error.validator
+    match rule:
+        case 'additionalProperties':
+            known = list(schema['properties'])
+            others = '|'.join(schema.get('patternProperties', ())) or '$^'
+            for key in value:
+                if key not in known and not search(others, key):
+                    yield (*path, key), 'unknown key', _near(key, known)
+        case 'required':
+            # Each missing key is an error of its own, which names it in its message only.
+            missing = next(key for key in wanted if error.message.startswith(repr(key)))
+            meaning = _meaning(schema.get('properties', {}).get(missing, {}), whole)
+            yield path, f'the key {missing!r} is missing', f'add {missing}: {meaning or "…"}'
+        case 'maxProperties':
+            others = f'leave all but {wanted} out'
+            yield path, f'{listed(value)} stand beside each other', others
+        case 'minProperties':
+            yield path, 'is empty', 'name one at least'
+        case 'oneOf':
+            kinds = [kind['required'][0] for kind in wanted]
+            named = [kind for kind in kinds if kind in value]
+            yield path, f'{len(named)} kinds', f'name one of {listed(kinds)}'
+        case 'not':
+            one, other = wanted['required']
+            yield (*path, other), f'stands beside {one}', 'write one of the two'
+        case None:
+            yield path, 'does not go with the keys beside it', 'leave it out'
+        case _:
+            meaning = schema.get('description', '')
+            expected = f'write {_expected(error)}{meaning and f" ({meaning})"}'
+            yield path, f'{quoted(value)} {_fault(error)}', expected
+
+
+def _fault(error: ValidationError) -> str:
+    rule: Any = error.validator
+    wanted: Any = error.validator_value
+    match rule:
+        case 'type':
+            return f'is not {_TYPES[wanted]}'
+        case 'minItems':
+            return 'is too short'
+        case 'maxItems':
+            return 'is too long'
+        case _ if rule in _BOUNDS:
+            return 'is out of bounds'
+    return 'does not fit'
+
+
+def _expected(error: ValidationError) -> str:
+    """Return what the broken rule, and those beside it, want of the value."""
+    rule: Any = error.validator
+    wanted: Any = error.validator_value
+    schema: Any = error.schema
+    match rule:
+        case 'type':
+            quote = '; quote what looks like a number' if wanted == 'string' else ''
+            return f'{_TYPES[wanted]}{_bounds(schema)}{quote}'
+        case 'enum':
+            return ' or '.join(wanted)
+        case 'minItems' | 'maxItems':
+            least, most = schema.get('minItems', 0), schema.get('maxItems')
+            return f'{least} of them{"" if least == most else " at least"}'
+        case _ if rule in _BOUNDS:
+            return f'a number{_bounds(schema)}'
+    return 'a text on one line'
+
+
+def _bounds(schema: Mapping[str, Any]) -> str:
+    said = ' and '.join(
+        f'{word} {schema[key]:g}' for key, word in _BOUNDS.items() if key in schema
+    )
+    return f', {said}' if said else ''
+
+
+def _meaning(schema: Schema, whole: Schema) -> str:
+    if '$ref' in schema:
+        schema = whole['$defs'][schema['$ref'].rpartition('/')[2]]
+    return str(schema.get('description', ''))
+
+
+def _near(key: str, known: Sequence[str]) -> str:
+    otherwise = f'known: {listed(sorted(known))}' if known else 'leave it out'
+    return did_you_mean(key, known, otherwise)
+
+
+def _dotted(path: _Path) -> str:
+    """Return a path as messages show it, with the items of lists counted from 1."""
+    return ''.join(
+        f'[{part + 1}]' if isinstance(part, int) else f'.{part}' for part in path
+    ).removeprefix('.')
+
+
+def _line(content: Any, path: _Path) -> int:
+    """Return the line of a key, or that of the last key on the way to it."""
+    line = 0
+    for part in path:
+        if isinstance(content, LinedDict) and isinstance(part, str):
+            line = content.lines[part]
+        content = content[part]
+    return line

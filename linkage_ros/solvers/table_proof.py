@@ -1,0 +1,430 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+How many knots a table needs, so that a tolerance is met at every input: a proof.
+
+The error of a polynomial between knots follows from a bound of the second or fourth derivative
+over the range (see `table`). The range is cut into cells, each as small as it takes to enclose the
+loops' solution over all of it (see `validated_enclosure`), and to bound its derivatives by about
+their values in its middle. At the ends of the cells, and at the knots of a table, the closed
+form's values are enclosed likewise, within the cells on both sides: so the solutions of
+neighbouring cells are one, the closed form is on it and on no other assembly, and the errors of
+its values and slopes are known and counted. The proof rests on IEEE 754 arithmetic, on sines of
+numpy that are good to 4 units in the last place, and on nothing that was sampled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import degrees, pi, remainder, sqrt, tau
+from typing import Any, NamedTuple, NoReturn
+
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiling.solve import Solver
+from linkage_ros.kinematics.compiling.trace import Motion
+from linkage_ros.kinematics.singularity_margin import away
+from linkage_ros.solvers.loops import Loops, Turns
+from linkage_ros.solvers.validated_enclosure import (
+    Array,
+    Cells,
+    Disc,
+    enclose,
+    Enclosure,
+    Jet,
+    Mask,
+    times,
+    total,
+)
+import numpy as np
+from numpy.typing import NDArray
+
+_NEAR = 0.01
+"""In [rad]: what fails nearer to a toggle than this fails because of it."""
+
+_NARROWER = 'write solver: closed_form, or a span: [low, high] that keeps away from it'
+
+
+class TableRequest(NamedTuple):
+    """
+    What is to be proven.
+
+    Attributes
+    ----------
+    closed
+        A linkage of one input, in closed form.
+    groups
+        Its loops.
+    joints
+        Its published joints, each as factor·(Σ ±x_j) + constant.
+    tolerance
+        In [rad] or [m].
+    order
+        Between the knots: 'linear' or 'hermite'.
+
+    """
+
+    closed: Closure
+    groups: Sequence[Loops]
+    joints: Sequence[tuple[Turns, float, float]]
+    tolerance: float
+    order: str
+
+
+def refuse_trouble(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> None:
+    """Refuse where a toggle or a change point lies in a range: there is no bound."""
+    for low, high in ranges:
+        for singular in request.closed.singular_inputs:
+            middle = 0.5 * (low + high)
+            if low <= middle - away(request.closed, middle, singular.value) <= high:
+                raise refusal(request, f'cannot be proven near {place(request, singular.value)}')
+
+
+def place(request: TableRequest, value: float) -> str:
+    """Return a value of the input as a user reads it."""
+    if request.closed.linkage.inputs[0].slider:
+        return f'{value:.6g} m'
+    where = f'{degrees(remainder(value, tau)):.4g}°'
+    near = any(
+        abs(away(request.closed, value, singular.value)) < _NEAR
+        for singular in request.closed.singular_inputs
+    )
+    return f'the toggle or change point at {where}' if near else where
+
+
+def refusal(request: TableRequest, reason: str, remedy: str = _NARROWER) -> DefinitionError:
+    """Return the error for a tolerance that is not proven."""
+    unit = 'rad' if any(request.closed.turning) else 'm'
+    return DefinitionError(
+        'solver.table', f'tolerance {request.tolerance:g} {unit} {reason}', remedy
+    )
+
+
+MOST_KNOTS = 2**20
+_FEWEST_KNOTS = 4
+_FIRST_CELLS = 16
+_SMALLEST_CELL = 2.0**-18
+"""Of the range: where that is too large to prove anything, there is a toggle, or next to one."""
+
+_MOST_CELLS = 2**14
+_PLENTY = 2**10
+"""Of cells: for each so many twice as many knots cost less than cells that spare them."""
+
+_BLOCK = 4096
+_TIGHT = 1.1
+"""A bound that exceeds the middle's by no more than this is not worth smaller cells."""
+
+_ERRORS = {'linear': (2, 2.0 / 8.0), 'hermite': (4, 24.0 / 384.0)}
+"""For each order the Taylor coefficient that the error goes with, and the factor."""
+
+_ROUNDING = 2.0**-49
+
+
+class _Bounds(NamedTuple):
+    """
+    What holds over each cell of a range.
+
+    Attributes
+    ----------
+    low, high
+        The cell, in the coordinate of the input.
+    proven
+        Whether anything does.
+    bound, middle
+        Of the joints' Taylor coefficient: a bound over the cell, and what it is in the middle.
+    slope
+        A bound of the joints' first derivative.
+    unknowns, boxes
+        Of all groups, (cells, unknowns): what the closed form has in the middle, and how far from
+        it there is no other solution.
+
+    """
+
+    low: Array
+    high: Array
+    proven: Mask
+    bound: Array
+    middle: Array
+    slope: Array
+    unknowns: Array
+    boxes: Array
+
+    def chosen(self, cells: Any) -> _Bounds:
+        """Return those of some cells, in their order."""
+        return _Bounds(*(field[cells] for field in self))
+
+
+def _joined(parts: Sequence[_Bounds]) -> _Bounds:
+    fields: Any = zip(*parts, strict=True)
+    return _Bounds(*(np.concatenate(each) for each in fields))
+
+
+class RangeProof:
+    """A range of the input, cut into cells that are as small as it takes."""
+
+    def __init__(self, request: TableRequest, low: float, high: float) -> None:
+        self._request = request
+        self._closed_form = _ClosedForm(request)
+        self._ends = low, high
+        self._unit = request.closed.scale if request.closed.linkage.inputs[0].slider else 1.0
+        self._span = (high - low) / self._unit
+        self._power, self._factor = _ERRORS[request.order]
+        self._bounds = self._refined()
+
+    def knots(self) -> int:
+        """Return how many the derivatives ask for."""
+        # The table tells whole turns apart by the mean slope of a cell.
+        least = self._span * float(self._bounds.slope.max()) / (0.5 * pi)
+        count = self._needed(float(self._bounds.bound.max()))
+        while count < least:
+            count *= 2
+        return count
+
+    def errors(self, knots: int) -> tuple[float, float]:
+        """
+        Return what positions and their derivatives are off by, with so many knots.
+
+        That is interpolation; what values and slopes at the knots are off by, times what the
+        polynomials make of that; and what their evaluation is rounded by.
+        """
+        x = np.linspace(*self._ends, knots + 1)
+        found = self._request.closed.solve(x, rates=1.0, derivatives=1)
+        assert found.velocities is not None
+        value = slope = 0.0
+        for begin in range(0, knots + 1, _BLOCK):
+            block = slice(begin, begin + _BLOCK)
+            at = x[block]
+            enclosed = self._linked(self._bounds, at)
+            for k, (turns, factor, constant) in enumerate(self._request.joints):
+                joint = _joint(turns, factor, enclosed.jets, 0)
+                off = found.positions[k, block] - joint.center - constant
+                if self._request.closed.turning[k]:
+                    off = np.remainder(off + pi, 2.0 * pi) - pi
+                value = max(value, float((np.abs(off) + joint.radius).max()))
+                joint = times(_joint(turns, factor, enclosed.jets, 1), 1.0 / self._unit)
+                off = found.velocities[k, block] - joint.center
+                slope = max(slope, float((np.abs(off) + joint.radius).max()))
+        bounds = self._bounds
+        h = self._span / knots
+        bound = float(bounds.bound.max())
+        position, rate = self._factor * h**self._power * bound + value, 2.0 * value / h
+        if self._request.order == 'hermite':
+            position += 0.25 * h * self._unit * slope
+            rate += sqrt(3.0) / 9.0 * h**3 * bound + value / h + self._unit * slope
+        else:
+            rate += h * bound
+        farthest = max(map(abs, self._ends)) / self._unit
+        sizes = pi + farthest * float(bounds.slope.max()) + float(np.abs(found.positions).max())
+        rounding = _ROUNDING * sizes
+        return position + rounding, (rate + rounding / h) / self._unit
+
+    def _refined(self) -> _Bounds:
+        """Return bounds over cells no larger than they may be."""
+        low, high = self._ends
+        edges = np.linspace(low / self._unit, high / self._unit, _FIRST_CELLS + 1)
+        done = self._over(edges[:-1], edges[1:])
+        while True:
+            split = ~done.proven
+            if split.any():
+                where = int(np.flatnonzero(split)[np.argmin((done.high - done.low)[split])])
+                width = done.high[where] - done.low[where]
+                if width < _SMALLEST_CELL * self._span or len(split) > _MOST_CELLS:
+                    self._refuse(0.5 * (done.low[where] + done.high[where]))
+            else:
+                # What the middles ask for is asked for in any case: no cell need be tighter.
+                knots = self._needed(float(done.middle.max()))
+                allowed = self._allowed(knots << min(len(split) // _PLENTY, 8))
+                split = (done.bound > allowed) & (done.bound > _TIGHT * done.middle)
+            if len(split) > _MOST_CELLS or not split.any():
+                done = done.chosen(np.argsort(done.low))
+                for begin in range(0, len(done.low), _BLOCK):
+                    block = slice(begin, begin + _BLOCK)
+                    self._linked(done, done.low[block] * self._unit)
+                self._linked(done, done.high[-1:] * self._unit)
+                return done
+            halves = done.low[split], 0.5 * (done.low[split] + done.high[split]), done.high[split]
+            new = self._over(np.concatenate(halves[:2]), np.concatenate(halves[1:]))
+            done = _joined([done.chosen(~split), new])
+
+    def _needed(self, bound: float) -> int:
+        """Return the fewest knots at which interpolation keeps the tolerance; a power of two."""
+        knots = _FEWEST_KNOTS
+        while self._allowed(knots) < bound and knots <= MOST_KNOTS:
+            knots *= 2
+        return knots
+
+    def _allowed(self, knots: int) -> float:
+        """Return what the Taylor coefficient may be."""
+        share = 0.95 * self._request.tolerance
+        return float(share / (self._factor * (self._span / knots) ** self._power))
+
+    def _over(self, low: Array, high: Array) -> _Bounds:
+        """Return the bounds over some cells, given in the coordinate of the input."""
+        found = []
+        for begin in range(0, len(low), _BLOCK):
+            block = slice(begin, begin + _BLOCK)
+            ends = low[block] * self._unit, high[block] * self._unit
+            enclosed = self._enclosed(*ends, self._power)
+            highest, slopes = (
+                [
+                    _joint(turns, factor, enclosed.jets, k)
+                    for turns, factor, _ in self._request.joints
+                ]
+                for k in (self._power, 1)
+            )
+            count = len(low[block])
+            found.append(
+                _Bounds(
+                    low[block],
+                    high[block],
+                    enclosed.proven,
+                    _largest([disc.size for disc in highest], count),
+                    _largest([np.abs(disc.center) for disc in highest], count),
+                    _largest([disc.size for disc in slopes], count),
+                    np.concatenate([group.middle for group in enclosed.groups], axis=1),
+                    np.concatenate([group.box for group in enclosed.groups], axis=1),
+                )
+            )
+        return _joined(found)
+
+    def _enclosed(self, low: Array, high: Array, order: int) -> Enclosure:
+        """Enclose cells, given in [rad] or [m]."""
+        middle = 0.5 * (low + high)
+        coordinates, pins = self._closed_form.at(middle)
+        # Wide enough to hold its ends, whatever was rounded.
+        half = 0.5 * (high - low) / self._unit + _ROUNDING * np.abs(middle / self._unit)
+        cells = Cells(middle / self._unit, half, coordinates, pins)
+        with np.errstate(all='ignore'):
+            enclosed = enclose(self._request.groups, cells, order)
+        finite = np.isfinite(
+            _largest([jet[-1].size for jet in enclosed.jets.values()], len(middle))
+        )
+        return enclosed._replace(proven=enclosed.proven & finite)
+
+    def _linked(self, bounds: _Bounds, x: Array) -> Enclosure:
+        """Enclose points; refuse if there is one that is not the solution of the cells about."""
+        found = self._enclosed(x, x, 1)
+        middle, radius, turning = (
+            np.concatenate([getattr(group, name) for group in found.groups], axis=-1)
+            for name in ('middle', 'radius', 'turning')
+        )
+        at = x / self._unit
+        last = np.searchsorted(bounds.low, at, 'right') - 1
+        linked = found.proven.copy()
+        for cell in (last, np.where(bounds.low[last] == at, np.maximum(last - 1, 0), last)):
+            off = middle - bounds.unknowns[cell]
+            off = np.where(turning, np.remainder(off + pi, 2.0 * pi) - pi, off)
+            held = np.abs(off) + radius + _ROUNDING < bounds.boxes[cell]
+            linked &= held.all(axis=1)
+        if not linked.all():
+            self._refuse(float(at[~linked][0]))
+        return found
+
+    def _refuse(self, at: float) -> NoReturn:
+        raise refusal(
+            self._request, f'cannot be proven near {place(self._request, at * self._unit)}'
+        )
+
+
+def _joint(turns: Turns, factor: float, jets: Mapping[int, Jet], order: int) -> Disc:
+    """Return a Taylor coefficient of a published joint, without its constant."""
+    found = times(total([times(jets[k][order], sign) for k, sign in turns]), factor)
+    return Disc(np.real(found.center), found.radius)
+
+
+def _largest(values: Sequence[Any], count: int) -> Array:
+    """Return the largest of each cell."""
+    found: Array = np.max([np.broadcast_to(value, (count,)) for value in values], axis=0)
+    return found
+
+
+class _ClosedForm:
+    """Coordinates and pins of the closed form, at many values of the input."""
+
+    def __init__(self, request: TableRequest) -> None:
+        self._numbers = [k for group in request.groups for k in group.coordinates]
+        self._pins = [k for group in request.groups for k in group.pins]
+        width = len(self._numbers) + 2 * len(self._pins)
+        self._solver = Solver(request.closed, width, self._wanted)
+
+    def at(self, x: Array) -> tuple[Array, NDArray[np.complex128]]:
+        """Return them, each in its row, at values in [rad] or [m]."""
+        found = self._solver.solve([x], derivatives=0).positions
+        numbers, parts = np.split(found, [len(self._numbers)])
+        coordinates = np.zeros((max(self._numbers) + 1, len(x)))
+        coordinates[self._numbers] = numbers
+        pins = np.zeros((max(self._pins, default=-1) + 1, len(x)), np.complex128)
+        pins[self._pins] = parts[0::2] + 1j * parts[1::2]
+        return coordinates, pins
+
+    def _wanted(self, motion: Motion) -> list[list[float]]:
+        if not motion.position.joints:
+            return [[]]
+        x, pins = motion.position.state
+        places = [part for k in self._pins for part in (pins[k].real, pins[k].imag)]
+        return [[*(x[k] for k in self._numbers), *places]]
+
+
+class Proven(NamedTuple):
+    """
+    What is proven.
+
+    Attributes
+    ----------
+    knots
+        How many cells there are to each range.
+    position
+        What positions are off by at most, in [rad] or [m].
+    rate
+        And their derivatives by the input.
+
+    """
+
+    knots: int
+    position: float
+    rate: float
+
+
+def knots_for(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> Proven:
+    """
+    Return how many cells each range of the input needs, and what is proven of the error then.
+
+    Parameters
+    ----------
+    request
+        What is to be proven.
+    ranges
+        Of the input, in [rad] or [m].
+
+    Raises
+    ------
+    DefinitionError
+        Where a toggle or a change point is in the way, or it takes more than `MOST_KNOTS`.
+
+    """
+    refuse_trouble(request, ranges)
+    found = [RangeProof(request, low, high) for low, high in ranges]
+    knots = max(one.knots() for one in found)
+    while True:
+        if knots > MOST_KNOTS:
+            raise refusal(request, f'takes more than {MOST_KNOTS} knots', 'ask for less')
+        position, rate = map(max, zip(*(one.errors(knots) for one in found), strict=True))
+        if position <= request.tolerance:
+            return Proven(knots, position, rate)
+        if position > 2.0 * request.tolerance:
+            least = f'{position:.1g}'
+            raise refusal(request, f'is finer than rounding allows here, {least}', 'ask for less')
+        knots *= 2

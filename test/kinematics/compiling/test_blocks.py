@@ -1,0 +1,276 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Compiled linkages in Python and in numpy: their bits, and what they ask."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import inf, nan, nextafter, pi
+from pathlib import Path
+import random
+import re
+from typing import Any
+
+from campaigns.topologies.families import FAMILIES
+from linkage_ros.dynamics.loads import Loads
+from linkage_ros.dynamics.mechanics import Mechanics
+from linkage_ros.errors import DefinitionError
+from linkage_ros.files.linkage_file import read_linkage
+from linkage_ros.files.yaml_file import read_yaml
+from linkage_ros.kinematics.arithmetic import sin, sqrt
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiling.blocks import BlockFunction
+from linkage_ros.kinematics.compiling.function import straight
+from linkage_ros.kinematics.compiling.linkage import Compiled
+from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm
+from linkage_ros.kinematics.compiling.python import python_source
+from linkage_ros.kinematics.compiling.tape import Tape
+from linkage_ros.kinematics.compiling.trace import Motion
+from linkage_ros.kinematics.linkage import Limits
+from linkage_ros.kinematics.status import Status
+import numpy as np
+import pytest
+
+# How a path is written for arrays: what is asked, what is kept, and how constants are written.
+
+
+def written(root: object, condition: object = True, **given: int) -> BlockFunction:
+    form = ArrayForm(given)
+    held = form.number(condition)
+    return BlockFunction(['q0', 'w0'], ['q0'], [form.number(root)], held)
+
+
+def values_of(function: BlockFunction, x: np.ndarray, rate: float = 1.0) -> np.ndarray:
+    found = np.empty_like(x)
+    rows = np.empty((function.rows, len(x)))
+    function([x, rate], [found], rows, np.empty((function.masks, len(x)), bool))
+    return found
+
+
+def passes(function: BlockFunction) -> int:
+    return function.source.count('out=')
+
+
+def test_a_condition_that_bounds_settle_is_not_asked() -> None:
+    tape = Tape()
+    sine = sin(tape.given('q0', 0.3))
+    assert written(sine.operation, (sine * sine + 0.5 > 0.4).operation).masks == 0
+    assert written(sine.operation, (sine * sine + 0.5 > 0.6).operation).masks > 0
+
+
+def test_constants_are_drawn_together_and_nothing_is_worked_out_of_0() -> None:
+    tape = Tape()
+    x, rate = tape.given('q0', 0.3), tape.given('w0', 1.25)
+    function = written((2.0 * (3.0 * x) / 4.0).operation)
+    assert passes(function) == 1
+    assert values_of(function, np.array([2.0])).tolist() == [3.0]
+    assert passes(written((rate * (x * x + 1.0)).operation, w0=0)) == 0
+    assert passes(written((rate * (x * x)).operation, w0=1)) == 1
+
+
+@pytest.mark.parametrize('constant', [0.5, np.float64(0.5), -0.0, inf, -inf, nan, 3])
+def test_every_constant_is_written_as_it_is(constant: float) -> None:
+    found = values_of(written(constant), np.zeros(4))
+    np.testing.assert_array_equal(found, np.full(4, constant))
+    assert np.signbit(found).all() == np.signbit(constant)
+
+
+def test_a_row_is_used_again_when_nobody_needs_what_is_in_it() -> None:
+    tape = Tape()
+    total = x = tape.given('q0', 0.3)
+    for k in range(30):
+        total = sqrt(total + float(k)) * x
+    assert written(total.operation).rows <= 2
+
+
+# What is compiled answers as the plain steps do, to the last bit, and does nothing unasked.
+
+
+LINKAGES = sorted((Path(__file__).parents[3] / 'config' / 'linkages').glob('*.yaml'))
+
+
+ITERATED = {'class_3'}
+
+
+STATES = 10_000
+
+
+"""Of a linkage of the gallery; one that is iterated takes a hundred times as long for each."""
+
+
+def closure_of(name: str) -> Closure:
+    (path,) = (path for path in LINKAGES if path.stem == name)
+    return Closure(read_linkage(read_yaml(path)[0]))
+
+
+def states(closure: Closure, count: int) -> Iterator[tuple[float, ...]]:
+    """Yield inputs over all ranges and a little beyond, with rates and accelerations."""
+    rng = random.Random(7)
+    driven = len(closure.linkage.inputs)
+    ranges = closure.input_ranges
+    low = min((r.lowest for r in ranges), default=-pi)
+    high = max((r.highest for r in ranges), default=pi)
+    beyond = 0.02 * (high - low)
+    for _ in range(count):
+        inputs = [rng.uniform(low - beyond, high + beyond) for _ in range(driven)]
+        yield (*inputs, *(rng.uniform(-3.0, 3.0) for _ in range(2 * driven)))
+
+
+def answered(call: Any, *numbers: float) -> str:
+    """Return all bits of an answer, the sign of each zero too; or the error."""
+    try:
+        return repr(call(*numbers))
+    except ValueError as error:
+        return f'{type(error).__name__}: {error}'
+
+
+@pytest.mark.parametrize('name', [path.stem for path in LINKAGES])
+def test_every_shipped_linkage_has_the_bits_of_the_plain_steps(name: str) -> None:
+    closure = closure_of(name)
+    compiled = Compiled(closure, 2)
+    closed = left = 0
+    for numbers in states(closure, STATES // 100 if name in ITERATED else STATES):
+        plain = compiled.plain(*numbers)
+        assert repr(compiled(*numbers)) == repr(plain)
+        if plain.status is Status.CLOSED:
+            closed += 1
+            left += compiled.fast(*numbers) is None
+    assert closed
+    assert left < 0.01 * closed, 'so many states leave the compiled way'
+
+
+@pytest.mark.parametrize('family', FAMILIES)
+def test_random_linkages_of_every_topology_have_them(family: str) -> None:
+    seen = set()
+    for number in range(3):
+        rng = random.Random(f'{family}/{number}')
+        topology = FAMILIES[family].make(rng)
+        try:
+            closure = Closure(topology.linkage)
+        except DefinitionError:  # it closes nowhere, or has two pins in one place
+            continue
+        iterated = any(hasattr(step, 'branch') for step in closure.steps)
+        compiled = Compiled(closure, 2)
+        for _ in range(3 if iterated else 40):
+            inputs = [start + rng.uniform(-1.0, 1.0) for start in topology.start]
+            motion = [rng.uniform(-2.0, 2.0) for _ in range(2 * len(inputs))]
+            plain = compiled.plain(*inputs, *motion)
+            assert repr(compiled(*inputs, *motion)) == repr(plain)
+            seen.add(plain.status)
+    assert seen
+
+
+SPECIAL = (0.0, -0.0, pi, -pi, 2 * pi, 0.5 * pi, -0.5 * pi, nextafter(pi, 4.0), 1e-300, 1e6, 1e300)
+
+
+@pytest.mark.parametrize('name', [path.stem for path in LINKAGES if path.stem not in ITERATED])
+def test_toggles_change_points_and_huge_angles_have_them(name: str) -> None:
+    closure = closure_of(name)
+    driven = len(closure.linkage.inputs)
+    compiled = Compiled(closure, 2)
+    singular = [found.value for found in closure.singular_inputs]
+    beside = [x for value in singular for x in (nextafter(value, -9.0), nextafter(value, 9.0))]
+    for value in (*SPECIAL, *singular, *beside):
+        for rate in (0.0, -0.0, 1.5):
+            numbers = [value] * driven + [rate] * driven + [0.25] * driven
+            assert answered(compiled, *numbers) == answered(compiled.plain, *numbers)
+
+
+@pytest.mark.parametrize('wrong', [nan, inf, -inf])
+@pytest.mark.parametrize('place', range(3))
+def test_what_is_not_finite_is_answered_by_the_plain_steps(wrong: float, place: int) -> None:
+    compiled = Compiled(closure_of('four_bar'), 2)
+    numbers = [1.0, 2.0, 3.0]
+    numbers[place] = wrong
+    assert compiled.fast(*numbers) is None
+    assert answered(compiled, *numbers) == answered(compiled.plain, *numbers)
+
+
+def test_beyond_a_limit_the_plain_steps_say_so() -> None:
+    closure = closure_of('four_bar')
+    joint = next(iter(closure.linkage.joints))
+    at = closure.position(1.0).joints[0]
+    limits = replace(closure.linkage.joints[joint], limits=Limits(at - 0.2, at + 0.2))
+    linkage = replace(closure.linkage, joints={**closure.linkage.joints, joint: limits})
+    compiled = Compiled(Closure(linkage), 1)
+    found = {compiled(0.1 * i, 1.0).status for i in range(63)}
+    assert found == {Status.CLOSED, Status.LIMITED}
+    for i in range(63):
+        assert repr(compiled(0.1 * i, 1.0)) == repr(compiled.plain(0.1 * i, 1.0))
+
+
+def source(closure: Closure, derivatives: int, wanted: Any = None) -> str:
+    compiled = Compiled(closure, derivatives, *([wanted] if wanted else []))
+    return python_source(compiled.paths[0])[0]
+
+
+def operations(text: str) -> int:
+    return len(re.findall(r'[-+*/]|\b(?:sin|cos|sqrt|atan2)\b', text))
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'jansen_leg', 'andrews_squeezer', 'slider_crank'])
+def test_what_is_not_asked_for_is_not_in_the_line(name: str) -> None:
+    closure = closure_of(name)
+
+    def last(motion: Motion) -> list[list[float]]:
+        return [[motion.position.joints[-1]]]
+
+    sizes = [operations(source(closure, 0, last))]
+    sizes += [operations(source(closure, derivatives)) for derivatives in range(3)]
+    assert sizes == sorted(sizes)
+    assert len(set(sizes)) == len(sizes)
+    assert 'w0' not in source(closure, 0)
+    assert 'a0' not in source(closure, 1)
+
+
+def test_the_direction_of_one_joint_is_one_arc_tangent_more_than_none() -> None:
+    closure = closure_of('four_bar')
+    counts = [
+        source(closure, 0, lambda motion, n=n: [motion.position.joints[:n]]).count('atan2(')
+        for n in range(3)
+    ]
+    # The diagonal's direction and the coupler's; then the rocker's.
+    assert counts == [0, 2, 3]
+
+
+def test_simplified_operations_keep_their_bits() -> None:
+    def done(x: float, y: float) -> list[float]:
+        return [
+            x + 0.0, 0.0 + x, x - 0.0, 0.0 - x, x * 1.0, 1.0 * x, x / 1.0, -1.0 * x, 0.0 - (-x),
+            (0.0 + x) + 0.0, 0.0 + (0.0 + x), abs(x) + 0.0, (-x) + y, x + (-y), x - (-y),
+            (x + y) + 0.0, 0.0 + (x - y), 0.0 + (0.5 + x), abs(abs(x)), x - y, x * y,
+        ]  # fmt: skip
+
+    line = straight(done, (1.0, 2.0))
+    assert line.places == tuple(range(len(line.results)))
+    values = (0.0, -0.0, 1.0, -1.5, 5e-324, -1e300, 3.0)
+    for x in values:
+        for y in values:
+            expected = done(x, y)
+            assert repr(list(line.varying(x, y))) == repr(expected)
+
+
+@pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'watt_1', 'excavator_bucket'])
+def test_the_equation_of_motion_is_that_of_the_plain_steps(name: str) -> None:
+    closure = closure_of(name)
+    mechanics = Mechanics(closure, Loads(gravity=(0.5, -9.81), drive_inertia=1e-4))
+    for value, *_ in states(closure, 500):
+        assert repr(mechanics.equation(value)) == repr(mechanics.terms(closure.position(value)))
+
+
+def test_a_function_that_decides_has_no_straight_line() -> None:
+    with pytest.raises(ValueError, match='decides'):
+        straight(lambda x: [x if x > 0.0 else -x], (1.0,))

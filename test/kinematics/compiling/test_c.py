@@ -1,0 +1,185 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A linkage in C says what the plain steps say, to the last bit, and compiles in silence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, nan, pi
+from pathlib import Path
+import random
+
+from campaigns.topologies.families import FAMILIES
+from linkage_ros.errors import DefinitionError
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiling.c import C
+from linkage_ros.kinematics.compiling.source import source
+from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
+import pytest
+
+from .emitted import (
+    build,
+    COMPILERS,
+    COUNT,
+    needs,
+    plain,
+    run_c,
+    State,
+    states,
+    subject,
+    Told,
+)
+from ..test_gallery import closure_of, KINDS
+
+GALLERY = [name for name, kinds in KINDS.items() if kinds != 'iterated']
+DYADS = [family for family in FAMILIES if not family.startswith('class III')]
+
+pytestmark = needs['C99']
+
+
+def told_of(
+    closure: Closure, folder: Path, count: int, seed: str, start: State = ()
+) -> list[Told]:
+    """Return what C says of states, after it was found to be what the steps say."""
+    given = states(closure, count, seed, start)
+    told = run_c(subject(closure), given, folder)
+    for state, one in zip(given, told, strict=True):
+        assert one == plain(closure, state), state
+    return told
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize('name', GALLERY)
+def test_a_linkage_of_the_gallery_says_what_the_steps_say(name: str, tmp_path: Path) -> None:
+    told = told_of(closure_of(name), tmp_path, COUNT, name)
+    assert sum(one.status == 'CLOSED' for one in told) > COUNT / 2
+
+
+@pytest.mark.parametrize('family', DYADS)
+def test_any_topology_says_what_the_steps_say(family: str, tmp_path: Path) -> None:
+    topology = FAMILIES[family].make(random.Random(family))
+    told = told_of(Closure(topology.linkage), tmp_path, 300, family, topology.start)
+    assert sum(one.status == 'CLOSED' for one in told) > 30
+
+
+def test_a_change_point_has_the_values_of_the_motion_that_passes(tmp_path: Path) -> None:
+    for name in ('parallelogram', 'peaucellier'):
+        closure = closure_of(name)
+        given = [(i * pi, 1.5, 0.5) for i in range(-4, 5)]
+        told = run_c(subject(closure), given, tmp_path)
+        assert told == [plain(closure, state) for state in given]
+        assert name != 'parallelogram' or {one.status for one in told} == {'CHANGE_POINT'}
+
+
+def test_behind_a_toggle_nobody_looks(tmp_path: Path) -> None:
+    rocker = closure_of('double_rocker')
+    links = {name: dict(points) for name, points in rocker.linkage.links.items()}
+    links['ground']['O6'] = (0.15, -0.3)
+    links |= {
+        'arm': {'B': (0.0, 0.0), 'E': (0.08, 0.0)},
+        'lever': {'O6': (0.0, 0.0), 'E': (0.08, 0.0)},
+    }
+    assembly = {**rocker.linkage.assembly, 'E': 'left'}
+    joints = {**rocker.linkage.joints, 'lever_joint': RevoluteJoint('ground', 'lever')}
+    closure = Closure(replace(rocker.linkage, links=links, assembly=assembly, joints=joints))
+    given = [(rocker.closing_ranges[0].lowest, 1.0, 0.0)]
+    assert plain(closure, given[0]).status == 'OPEN'
+    assert run_c(subject(closure), given, tmp_path) == [Told('TOGGLE', ())]
+
+
+def limited(**limits: tuple[float, float]) -> Closure:
+    """Return the four-bar of the gallery with limits of joints."""
+    linkage = closure_of('four_bar').linkage
+    inputs = tuple(
+        replace(one, limits=Limits(*limits.get(one.joint, (-inf, inf)))) for one in linkage.inputs
+    )
+    joints = {
+        name: replace(joint, limits=Limits(*limits.get(name, (-inf, inf))))
+        for name, joint in linkage.joints.items()
+    }
+    return Closure(replace(linkage, inputs=inputs, joints=joints))
+
+
+@pytest.mark.parametrize(
+    'limits',
+    [
+        {'crank_joint': (0.2, 2.0)},
+        {'rocker_joint': (1.5, 1.9)},
+        # The same angles, some turns on: a published angle is compared in the nearest turn.
+        {'rocker_joint': (1.5 + 4.0 * pi, 1.9 + 4.0 * pi), 'crank_joint': (-9.0, 2.5)},
+    ],
+)
+def test_beyond_limits_there_are_values_and_the_status_says_so(limits, tmp_path: Path) -> None:
+    told = told_of(limited(**limits), tmp_path, 400, 'limited')
+    assert {'CLOSED', 'LIMITED'} <= {one.status for one in told}
+    assert all(len(one.values) == 6 for one in told if one.status == 'LIMITED')
+
+
+def test_limits_hold_of_joints_that_are_not_asked_for(tmp_path: Path) -> None:
+    closure = limited(rocker_joint=(1.5, 1.9))
+    given = states(closure, 300, 'limited')
+    told = run_c(subject(closure, 0, ['coupler_joint']), given, tmp_path)
+    assert [one.status for one in told] == [plain(closure, state).status for state in given]
+
+
+@pytest.mark.parametrize('derivatives', [0, 1, 2])
+def test_what_is_not_asked_for_is_not_in_the_code(derivatives: int, tmp_path: Path) -> None:
+    closure = closure_of('jansen_leg')
+    joint = list(closure.linkage.joints)[1]
+    asked, whole = subject(closure, derivatives, [joint]), subject(closure)
+    given = states(closure, 200, 'asked')
+    for one, all_of_it in zip(
+        run_c(asked, given, tmp_path), run_c(whole, given, tmp_path), strict=True
+    ):
+        count = len(closure.linkage.joints)
+        assert one.values == all_of_it.values[1::count][: 1 + derivatives]
+    short, long = (source(what, C('leg', header=False)) for what in (asked, whole))
+    assert short.count(' const ') < long.count(' const ')
+
+
+@pytest.mark.parametrize('odd', [nan, inf, -inf])
+@pytest.mark.parametrize('place', [0, 1, 2])
+def test_what_is_not_finite_is_indeterminate(odd: float, place: int, tmp_path: Path) -> None:
+    state = [1.0, 1.0, 1.0]
+    state[place] = odd
+    assert run_c(subject(closure_of('four_bar')), [tuple(state)], tmp_path) == [
+        Told('INDETERMINATE', ())
+    ]
+
+
+@pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
+@pytest.mark.parametrize('header', [False, True])
+@pytest.mark.parametrize('name', GALLERY)
+def test_it_compiles_without_a_warning(name, header, kind, tmp_path: Path) -> None:
+    text = source(subject(closure_of(name)), C('linkage', header=header))
+    file = tmp_path / 'linkage.c'
+    # A header may be included twice.
+    (tmp_path / 'linkage.h').write_text(text)
+    file.write_text('#include "linkage.h"\n' * 2 + 'int nothing;\n' if header else text)
+    build([*COMPILERS[kind], '-c'], file, tmp_path / 'linkage.o')
+
+
+@pytest.mark.parametrize('kind', [pytest.param(k, marks=needs[k]) for k in COMPILERS])
+def test_headers_of_one_linkage_go_together(kind: str, tmp_path: Path) -> None:
+    closure = closure_of('four_bar')
+    texts = [source(subject(closure, i), C('four_bar', header=True)) for i in range(3)]
+    (tmp_path / 'all.c').write_text('\n'.join(texts))
+    build([*COMPILERS[kind], '-Wno-unused-function', '-c'], tmp_path / 'all.c', tmp_path / 'all.o')
+
+
+def test_links_that_are_iterated_are_refused() -> None:
+    closure = closure_of('class_3')
+    with pytest.raises(DefinitionError, match='links: some are only solved by iteration'):
+        source(subject(closure), C('linkage', header=False))

@@ -1,0 +1,201 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A linkage as a module of Python, and of JavaScript, says what the plain steps say."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Sequence
+import json
+import math
+from math import ulp
+from pathlib import Path
+import subprocess
+from typing import Any
+
+from linkage_ros.kinematics.compiling.javascript import JavaScript
+from linkage_ros.kinematics.compiling.python_module import PythonModule
+from linkage_ros.kinematics.compiling.source import FUNCTIONS, source, Subject
+import pytest
+
+from .emitted import COUNT, needs, NUMBERS, parts, plain, State, states, subject, Told
+from .test_c import GALLERY, limited
+from ..test_gallery import closure_of
+
+_ULPS = 4
+"""So many units in the last place may a function of JavaScript be off."""
+
+_MANY = 1024
+_DIGITS = 1e-9
+
+CURVED = ('sin', 'cos', 'atan2')
+"""Functions of which a language has its own last digits."""
+
+Solve = Callable[..., tuple[Any, ...]]
+
+
+def python_of(what: Subject) -> dict[str, Any]:
+    """Return the names of the module that a linkage makes."""
+    namespace: dict[str, Any] = {}
+    exec(source(what, PythonModule(what.derivatives)), namespace)
+    return namespace
+
+
+def told_by(solve: Solve, state: State) -> Told:
+    """Return what a function of Python says."""
+    status, *groups = solve(*parts(state, len(state) // 3))
+    return Told(NUMBERS[status], tuple(value for group in groups for value in group))
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize('name', GALLERY)
+def test_python_has_the_bits_of_the_steps(name: str) -> None:
+    closure = closure_of(name)
+    solve = python_of(subject(closure))['motion']
+    for state in states(closure, COUNT, name):
+        assert told_by(solve, state) == plain(closure, state), state
+
+
+def test_python_needs_nothing_but_math() -> None:
+    text = source(subject(closure_of('jansen_leg')), PythonModule(2))
+    imports = [line for line in text.splitlines() if 'import ' in line]
+    assert imports == ['from math import atan2, copysign, cos, inf, isfinite, sin, sqrt']
+
+
+@pytest.mark.parametrize('derivatives', [0, 1, 2])
+def test_python_takes_and_gives_what_is_asked_for(derivatives: int) -> None:
+    closure = closure_of('four_bar')
+    solve = python_of(subject(closure, derivatives, ['rocker_joint']))[FUNCTIONS[derivatives]]
+    given = ((0.3,), (2.0,), (0.5,))
+    status, *groups = solve(*given[: 1 + derivatives])
+    steps = plain(closure, (0.3, 2.0, 0.5)).values[1::2]
+    assert (NUMBERS[status], *groups) == ('CLOSED', *((v,) for v in steps[: 1 + derivatives]))
+
+
+def test_python_tells_of_limits() -> None:
+    closure = limited(rocker_joint=(1.5, 1.9))
+    solve = python_of(subject(closure))['motion']
+    told = [told_by(solve, state) for state in states(closure, 300, 'limited')]
+    assert told == [plain(closure, state) for state in states(closure, 300, 'limited')]
+    assert {one.status for one in told} == {'CLOSED', 'LIMITED', 'INDETERMINATE'}
+
+
+RUN = """
+import { readFileSync, writeFileSync } from 'node:fs';
+import { motion, Status } from './linkage.js';
+const names = Object.keys(Status);
+const n = Number(process.argv[2]);
+const bytes = readFileSync('given');
+const given = new Float64Array(bytes.buffer, bytes.byteOffset, bytes.length / 8);
+const told = [];
+for (let i = 0; i < given.length; i += 3 * n) {
+    const part = (k) => given.slice(i + k * n, i + (k + 1) * n);
+    const found = motion(part(0), part(1), part(2));
+    const values = [...found.joints, ...found.joint_rates, ...found.joint_accelerations];
+    told.push([names[found.status], values]);
+}
+writeFileSync('told', JSON.stringify(told));
+"""
+
+
+def run_javascript(what: Subject, given: Sequence[State], folder: Path) -> list[Told]:
+    """Return what a linkage in JavaScript says of states."""
+    (folder / 'package.json').write_text('{"type": "module"}')
+    (folder / 'linkage.js').write_text(source(what, JavaScript()))
+    (folder / 'run.js').write_text(RUN)
+    (folder / 'given').write_bytes(array('d', (v for state in given for v in state)).tobytes())
+    typed = ['node', 'run.js', str(len(what.closure.linkage.inputs))]
+    subprocess.run(typed, cwd=folder, check=True, timeout=60)
+    return [
+        Told(name, tuple(values)) for name, values in json.loads((folder / 'told').read_text())
+    ]
+
+
+def carried(what: Subject, given: Sequence[State]) -> list[list[float]]:
+    """
+    Return for each value of each state what one unit in the last place of all before it makes.
+
+    Each input and each sine, cosine and arc tangent is changed, one after the other, by so many
+    units that rounding is small beside them. To the sum one unit of the value itself is added, or
+    of a half turn: angles are sums of angles.
+    """
+    namespace = python_of(what)
+    exact = {name: getattr(math, name) for name in CURVED}
+    calls, changed = 0, -1
+
+    def changing(name: str) -> Callable[..., float]:
+        def call(*arguments: float) -> float:
+            nonlocal calls
+            calls += 1
+            value: float = exact[name](*arguments)
+            return value + _MANY * ulp(value) if calls - 1 == changed else value
+
+        return call
+
+    namespace |= {name: changing(name) for name in CURVED}
+    found = []
+    for state in given:
+        calls, changed = 0, -1
+        values = told_by(namespace['motion'], state).values
+        sums = [ulp(max(abs(value), math.pi)) for value in values]
+        count = calls
+        for one in range(count + len(state) if values else 0):
+            calls, changed = 0, one
+            near = list(state)
+            if one >= count:
+                near[one - count] += _MANY * ulp(near[one - count])
+            others = told_by(namespace['motion'], tuple(near)).values
+            # A change may reach a limit, where there are no values.
+            others = others or [math.inf] * len(values)
+            sums = [
+                total + abs(other - value) / _MANY
+                for total, value, other in zip(sums, values, others, strict=True)
+            ]
+        found.append(sums)
+    return found
+
+
+def off(what: Subject, told: Sequence[Told], given: Sequence[State]) -> float:
+    """Return what values differ by from the steps', in units of what a last place carries."""
+    worst, left_out = 0.0, 0
+    for state, one, units in zip(given, told, carried(what, given), strict=True):
+        steps = plain(what.closure, state)
+        assert one.status == steps.status, state
+        for value, right, unit in zip(one.values, steps.values, units, strict=True):
+            # Within some floats of a singular state a rate has no digits that could be compared.
+            if unit < _DIGITS * max(abs(right), 1.0):
+                worst = max(worst, abs(value - right) / unit)
+            else:
+                left_out += 1
+    assert left_out < 0.05 * len(given) * len(what.joints)
+    return worst
+
+
+@needs['JavaScript']
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize('name', GALLERY)
+def test_javascript_is_as_near_as_its_functions(name: str, tmp_path: Path) -> None:
+    what = subject(closure_of(name))
+    given = states(what.closure, COUNT // 5, name)
+    assert off(what, run_javascript(what, given, tmp_path), given) <= _ULPS
+
+
+@needs['JavaScript']
+def test_javascript_tells_of_limits(tmp_path: Path) -> None:
+    what = subject(limited(rocker_joint=(1.5 + 4.0 * math.pi, 1.9 + 4.0 * math.pi)))
+    given = states(what.closure, 300, 'limited')
+    told = run_javascript(what, given, tmp_path)
+    assert {one.status for one in told} == {'CLOSED', 'LIMITED', 'INDETERMINATE'}
+    assert off(what, told, given) <= _ULPS

@@ -1,0 +1,65 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Floods of messages and storms of calls, from `campaigns.attacks.graph`, bounded in time."""
+
+from campaigns.attacks.graph import attack
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.pipeline.sample_router import Routes
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from .graph import crank, wait_for
+
+
+def test_floods_and_storms_end_nothing_and_every_message_is_accounted_for():
+    tried, findings = attack(12.0, 7)
+    assert findings == []
+    assert tried['of these received'] > 100
+    assert tried['of these rejected'] > 0
+    assert tried['change_state'] > 0
+    assert tried['set_parameters'] > 0
+
+
+def test_a_parameter_of_no_known_type_does_not_end_the_node(graph, write_scene, start):
+    # rclpy raises in its service, and would end the executor.
+    node = start(write_scene('no_type', 'rate: 100'))
+    client = graph.node.create_client(SetParameters, '/linkage_node/set_parameters')
+    assert client.wait_for_service(20.0)
+    request = SetParameters.Request(parameters=[Parameter(value=ParameterValue(type=77))])
+    futures = [client.call_async(request) for _ in range(100)]
+    node.wait_for_log('a call failed: ValueError')
+    assert graph.call(Trigger, '/linkage_node/reset').success
+    assert not any(future.done() for future in futures), 'rclpy has no answer to these'
+    heard = graph.listen(JointState, '/joint_states')
+    publisher = graph.publisher(JointState, '/crank_states')
+    wait_for(lambda: publisher.publish(crank(0.5)) or len(heard) > 5, 'joint states')
+    assert sum('a call failed' in line for line in node.log.splitlines()) <= 3, 'once a period'
+    assert node.end() == 0
+    assert 'Traceback' not in node.log
+
+
+def test_what_huge_messages_are_for_is_not_remembered():
+    routes = Routes({'left': ['crank_joint'], 'right': ['other']})
+    for number in range(3):
+        names = ['crank_joint', f'of_message_{number}', *(f'joint_{n}' for n in range(20_000))]
+        message = JointStateWriter(names).write(1, [0.0] * len(names), [])
+        assert routes.find(message) == ('left',)
+    assert routes._found == {}
+    small = JointStateWriter(['crank_joint', 'other']).write(1, [0.0, 0.0], [])
+    assert routes.find(small) == routes.find(small) == ('left', 'right')
+    assert len(routes._found) == 1

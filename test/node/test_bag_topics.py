@@ -1,0 +1,78 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""How topics are described in bags, by what rosbag2 writes of them."""
+
+from __future__ import annotations
+
+import re
+
+from linkage_ros.bag.topic import INFINITE
+from linkage_ros.node.bag_topics import bag_topic
+from rclpy.duration import Duration
+from rclpy.qos import (
+    LivelinessPolicy,
+    qos_profile_sensor_data,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from sensor_msgs.msg import MultiDOFJointState
+from trajectory_msgs.msg import JointTrajectory
+
+
+def test_what_a_type_needs_follows_by_full_name():
+    # As rosbag2_cpp's LocalMessageDefinitionSource, which keeps them in a std::set.
+    needed = re.findall(
+        r'^MSG: (.+)$',
+        bag_topic('/a', MultiDOFJointState, QoSProfile(depth=1)).definition,
+        re.MULTILINE,
+    )
+    assert needed == [
+        'geometry_msgs/Transform',
+        'geometry_msgs/Quaternion',
+        'geometry_msgs/Vector3',
+        'geometry_msgs/Twist',
+        'geometry_msgs/Wrench',
+        'std_msgs/Header',
+        'builtin_interfaces/Time',
+    ]
+    trajectory = bag_topic('/b', JointTrajectory, QoSProfile(depth=1)).definition
+    assert trajectory.index('MSG: std_msgs/Header') < trajectory.index('MSG: trajectory_msgs/')
+
+
+def test_every_policy_of_a_publisher_is_kept():
+    qos = bag_topic(
+        '/a',
+        JointTrajectory,
+        QoSProfile(
+            depth=7,
+            reliability=ReliabilityPolicy.BEST_EFFORT,
+            deadline=Duration(nanoseconds=20_000_000),
+            lifespan=Duration(seconds=2),
+            liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+            liveliness_lease_duration=Duration(seconds=1),
+            avoid_ros_namespace_conventions=True,
+        ),
+    ).qos
+    assert (qos.depth, qos.reliability) == (7, 'best_effort')
+    assert (qos.deadline, qos.lifespan) == (20_000_000, 2 * 10**9)
+    assert (qos.liveliness, qos.liveliness_lease_duration) == ('manual_by_topic', 10**9)
+    assert qos.avoid_ros_namespace_conventions
+
+
+def test_what_a_publisher_leaves_open_has_no_limit():
+    qos = bag_topic('/a', JointTrajectory, qos_profile_sensor_data).qos
+    assert {qos.deadline, qos.lifespan, qos.liveliness_lease_duration} == {INFINITE}
+    assert qos.liveliness == 'automatic'

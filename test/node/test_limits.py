@@ -1,0 +1,198 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What a tick publishes beyond the limits of a joint, and what the node says of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from math import pi, tau
+
+from linkage_ros.kinematics.status import Status
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.node.diagnostics import Health, Snapshot
+from linkage_ros.node.tick_loop import TickLoop
+from linkage_ros.node.warnings import Warnings
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.scene.load import parse_scene
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+MS = 1_000_000
+BEGIN = 1_700_000_000_000_000_000
+WARN = b'\1'
+LIMITED = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, input: {limits: [0.5, 1.5]}}'
+CRANK = JointStateWriter(['crank_joint'])
+
+
+def scene(said='', linkage=LIMITED):
+    files = {
+        'scene.yaml': f'linkage: linkage.yaml\n{said}'.encode(),
+        'linkage.yaml': linkage.encode(),
+    }
+    return parse_scene('s', 's', files)
+
+
+def read(message):
+    return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+
+
+def at(pipeline, angle, number=0, rate=1.0):
+    now = BEGIN + number * MS
+    assert pipeline.offer(CRANK.write(now, [angle], [rate]), now) is None
+    return pipeline.tick(now)
+
+
+def test_by_default_the_same_is_published_as_within():
+    tick = at(Pipeline(scene('effects: {velocity: {}}')), 2.0)
+    free = LIMITED.replace(', input: {limits: [0.5, 1.5]}', '')
+    other = at(Pipeline(scene('effects: {velocity: {}}', free)), 2.0)
+    assert tick.looks[0].position.status is Status.LIMITED
+    assert tick.message == other.message != b''
+
+
+@pytest.mark.parametrize('effects', ['{}', '{velocity: {}}', '{acceleration: {}}'])
+def test_silent_is_silent_beyond_and_within_the_same(effects):
+    said = f'effects: {effects}\n'
+    silent = Pipeline(scene(said + 'beyond_limits: silent'))
+    free = Pipeline(scene(said))
+    for number, angle in enumerate((1.0, 1.4, 1.6, 2.0, 1.5, 1.2, 0.4)):
+        tick, other = at(silent, angle, number), at(free, angle, number)
+        assert other.message
+        if angle in (1.6, 2.0, 0.4):
+            assert tick.message == b''
+            assert tick.looks[0].position.status is Status.LIMITED
+        else:
+            assert tick.message == other.message
+
+
+def test_silent_at_a_toggle_beyond_the_limits():
+    """It has another status, and is beyond the limits all the same."""
+    linkage = 'four_bar: {a: 0.1, b: 0.07, c: 0.06, d: 0.05, input: {limits: [-0.5, 0.5]}}'
+    silent = Pipeline(scene('beyond_limits: silent', linkage))
+    (closure,) = silent.closures
+    (one,) = closure.closing_ranges
+    assert closure.position(one.highest).status is Status.TOGGLE
+    assert at(silent, one.highest).message == b''
+    assert at(Pipeline(scene('', linkage)), one.highest).message
+
+
+@pytest.mark.parametrize('turns', [-2, -1, 0, 1])
+def test_a_published_angle_begins_within_its_limits(turns):
+    """So a consumer that has the limits from a URDF is never told of another turn."""
+    low, high = (end + turns * tau for end in (1.5, 2.0))
+    linkage = LIMITED.replace(
+        'input: {limits: [0.5, 1.5]}', f'joints: {{rocker_joint: {{limits: [{low!r}, {high!r}]}}}}'
+    )
+    pipeline = Pipeline(scene('', linkage))
+    for number in range(100):
+        message = read(at(pipeline, 2.0 + 0.005 * number, number).message)
+        values = dict(zip(message.name, message.position, strict=True))
+        assert low <= values['rocker_joint'] <= high
+        assert -pi < values['coupler_joint'] <= pi
+
+
+def test_an_input_with_limits_is_published_as_it_is_driven():
+    linkage = LIMITED.replace('[0.5, 1.5]', '[8, 12]')
+    pipeline = Pipeline(scene('drive: {sine: {amplitude: 1, mean: 10, frequency: 1}}', linkage))
+    message = read(pipeline.tick(BEGIN).message)
+    assert message.position[0] == 10.0
+
+
+class Said(list):
+    """Takes the place of a logger."""
+
+    def warning(self, line):
+        self.append(line)
+
+
+def ran(said, angles, linkage=LIMITED):
+    """Return a tick loop that has seen crank angles, and what was published."""
+    made = scene(said, linkage)
+    messages = [CRANK.write(BEGIN + n * MS, [angle], [1.0]) for n, angle in enumerate(angles)]
+    waiting, published = [], []
+
+    def take():
+        return (waiting.pop(0), {'source_timestamp': 0}) if waiting else None
+
+    loop = TickLoop(lambda: Pipeline(made), take, published.append)
+    for number, message in enumerate(messages):
+        waiting.append(message)
+        loop.tick_at(BEGIN + number * MS)
+    return loop, published
+
+
+def health(loop):
+    window = Snapshot(), Snapshot.of(loop.counts, BEGIN)
+    return Health(
+        'node', 's', 1000.0, BEGIN, '/crank', (), loop, *window, '',
+        {'transmission_angle': 0.0, 'conditioning': 0.0, 'toggle_distance': 0.0},
+    )  # fmt: skip
+
+
+ANGLES = (1.0, 2.0, 2.1, 1.0)
+
+
+@pytest.mark.parametrize(('said', 'published'), [('', 4), ('beyond_limits: silent', 2)])
+def test_what_is_counted_and_told(said, published):
+    loop, messages = ran(said, ANGLES)
+    counts = loop.counts
+    assert Counter(counts.unclosed) == Counter({Status.LIMITED: 2})
+    assert (len(messages), counts.published, counts.withheld) == (published, published, 0)
+    lines = Said()
+    Warnings(lines).look(counts, loop.pipeline.closures, '/crank', 1.0)
+    what = 'nothing published' if said else 'published all the same'
+    assert lines == [f'2 ticks beyond limits, {what}: crank_joint at 2.1, limits [0.5, 1.5]']
+    status = health(loop).statuses()[2]
+    assert (status.level, status.message) == (
+        WARN, 'Beyond limits: crank_joint at 2.1, limits [0.5, 1.5]',
+    )  # fmt: skip
+    values = {pair.key: pair.value for pair in status.values}
+    assert values['Ticks beyond limits'] == '2'
+    assert values['Reachable'] == '0.5 to 1.5 rad'
+
+
+def test_rates_and_efforts_are_told_by_their_limits():
+    linkage = LIMITED.replace(
+        'input: {limits: [0.5, 1.5]}',
+        'input: {velocity: 0.8}, joints: {rocker_joint: {velocity: 100}}',
+    )
+    loop, _ = ran('effects: {velocity: {}}', (1.0,), linkage)
+    status = health(loop).statuses()[2]
+    assert (status.level, status.message) == (
+        WARN, 'Velocity of crank_joint is 1, its limit 0.8',
+    )  # fmt: skip
+    values = {pair.key: pair.value for pair in status.values}
+    assert values['Velocity of crank_joint, of its limit'] == '1.25'
+    (rate,) = [
+        rate
+        for name, rate in zip(
+            loop.pipeline.closures[0].linkage.joints,
+            loop.counts.last.looks[0].reading.rates,
+            strict=True,
+        )
+        if name == 'rocker_joint'
+    ]
+    assert values['Velocity of rocker_joint, of its limit'] == f'{abs(rate) / 100:.4g}'
+    bare, _ = ran('', (1.0,), linkage)
+    keys = [pair.key for pair in health(bare).statuses()[2].values]
+    assert not any('rocker_joint, of its limit' in key for key in keys)
+
+
+def test_where_nothing_has_limits_nothing_is_told_of_them():
+    loop, _ = ran('', (1.0,), LIMITED.replace(', input: {limits: [0.5, 1.5]}', ''))
+    keys = [pair.key for status in health(loop).statuses() for pair in status.values]
+    assert [key for key in keys if 'limit' in key] == ['Ticks beyond limits']

@@ -1,0 +1,309 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What is published on ~/motion, and that nothing of it is there where no scene asks for it."""
+
+from array import array
+from cmath import exp
+import os
+from pathlib import Path
+import subprocess
+import sys
+import time
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.replay.replay import recorded_scene, replay
+import pytest
+from rosbags.highlevel import AnyReader
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
+
+from .graph import crank, NS, stamp_of, wait_for
+from .loops import (
+    accelerations,
+    FIVE_BAR,
+    five_bar_gap,
+    four_bar,
+    inverted_slider_crank,
+    modulo_turns,
+    rates,
+)
+
+MOTION = '/linkage_node/motion'
+OMEGA = 20.0
+ERROR = b'\2'
+ROOT = Path(__file__).parents[2]
+ONE_ANGLE = 'four_bar: {a: 1.0, b: 1.0, c: 1.0, d: 3.0}'
+
+
+@pytest.fixture
+def publisher(graph):
+    return graph.publisher(JointState, '/crank_states')
+
+
+@pytest.fixture
+def motions(graph):
+    return graph.listen(JointTrajectory, MOTION)
+
+
+def turn(publisher, seconds, begin):
+    """Publish a crank that turns at OMEGA from the time `begin` on."""
+    wait_for(publisher.get_subscription_count, 'the node')
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        stamp = time.time_ns()
+        publisher.publish(crank(OMEGA * ((stamp - begin) / NS), OMEGA, stamp))
+        time.sleep(0.005)
+
+
+@pytest.mark.parametrize(
+    ('linkage', 'loop'),
+    [('four_bar', four_bar), ('inverted_slider_crank', inverted_slider_crank)],
+)
+def test_accelerations_of_a_crank_at_a_constant_rate(
+    graph, write_scene, start, publisher, motions, linkage, loop
+):
+    text = 'rate: 200\neffects: {acceleration: {}}'
+    node = start(write_scene(f'motion_{linkage}', text, linkage))
+    states = graph.listen(JointState, '/joint_states')
+    begin = time.time_ns()
+    turn(publisher, 1.0, begin)
+    wait_for(lambda: len(motions) > 50, 'motions')
+    same_tick = {stamp_of(state): state for state in states}
+
+    compared = 0
+    for message in motions.copy():
+        theta = OMEGA * ((stamp_of(message) - begin) / NS)
+        (point,) = message.points
+        assert list(point.effort) == []
+        assert (point.time_from_start.sec, point.time_from_start.nanosec) == (0, 0)
+        for value, expected in zip(point.positions, loop(theta), strict=True):
+            assert exp(1j * value) == modulo_turns(expected)
+        assert list(point.velocities) == pytest.approx(rates(loop, theta, OMEGA), abs=1e-5)
+        expected = accelerations(loop, theta, OMEGA)
+        assert list(point.accelerations) == pytest.approx(expected, abs=1e-5)
+        if (state := same_tick.get(stamp_of(message))) is not None:
+            compared += 1
+            assert message.joint_names == state.name
+            assert message.header == state.header
+            assert point.positions == state.position
+            assert point.velocities == state.velocity
+    assert compared > 50
+    assert node.end() == 0
+    assert f'to /joint_states and {MOTION}' in node.log
+
+
+def test_two_inputs(graph, write_scene, start, publisher, motions):
+    text = 'rate: 200\neffects: {acceleration: {}}\ndrive: {topic: {max_age: 60}}'
+    node = start(write_scene('two_inputs', text, FIVE_BAR))
+    begin = time.time_ns()
+    names, speeds, starts = ['right_crank', 'x', 'left_crank'], [0.5, 7.0, -0.3], [2.0, 0.0, 0.5]
+
+    def publish():
+        seconds = (time.time_ns() - begin) / NS
+        message = crank(0.0, stamp=begin + round(seconds * NS))
+        message.name = names
+        message.position = array(
+            'd', [s + v * seconds for s, v in zip(starts, speeds, strict=True)]
+        )
+        message.velocity = array('d', speeds)
+        publisher.publish(message)
+        return len(motions) > 50
+
+    wait_for(publish, 'motions')
+    assert node.end() == 0
+    for message in motions:
+        seconds = (stamp_of(message) - begin) / NS
+        left, right = 0.5 - 0.3 * seconds, 2.0 + 0.5 * seconds
+        (point,) = message.points
+        assert message.joint_names == ['upper_joint', 'lower_joint']
+        assert abs(five_bar_gap(*point.positions, left, right)) < 1e-9
+        # The gap stays closed where rates and accelerations are right: p + v·t + a·t²/2.
+        for t in (-1e-3, 1e-3):
+            upper, lower = (
+                p + v * t + a * t * t / 2
+                for p, v, a in zip(
+                    point.positions, point.velocities, point.accelerations, strict=True
+                )
+            )
+            # What is left is of the third order, and the joints' third derivatives are below 10.
+            assert abs(five_bar_gap(upper, lower, left - 0.3 * t, right + 0.5 * t)) < 1e-9
+    assert 'crank left_crank, right_crank from /crank_states' in node.log
+
+
+def test_half_of_two_inputs_is_not_used(graph, write_scene, start, publisher, motions):
+    node = start(write_scene('half', 'rate: 200\neffects: {acceleration: {}}', FIVE_BAR))
+    wait_for(publisher.get_subscription_count, 'the node')
+
+    def told():
+        publisher.publish(crank(1.0, name='left_crank'))
+        return 'none with left_crank, right_crank' in node.log
+
+    wait_for(told, 'the warning')
+    wait_for(
+        lambda: int(graph.value('crank', 'Messages without the crank') or 0) > 0, 'the diagnostics'
+    )
+    assert motions == []
+    assert node.end() == 0
+
+
+def test_at_a_toggle_positions_alone_and_where_it_is_open_silence(
+    graph, write_scene, start, publisher, motions
+):
+    text = 'rate: 100\ndrive: {topic: {carry_forward: false}}\neffects: {acceleration: {}}'
+    node = start(write_scene('motion_toggle', text, ONE_ANGLE))
+    wait_for(lambda: publisher.publish(crank(0.0, 1.0)) or len(motions) > 5, 'motions')
+    for message in motions.copy():
+        (point,) = message.points
+        assert len(point.positions) == 2
+        assert list(point.velocities) == list(point.accelerations) == []
+
+    def open_for(diagnoses):
+        graph.diagnostics.clear()
+        wait_for(
+            lambda: publisher.publish(crank(1.0, 1.0)) or len(graph.diagnostics) > diagnoses,
+            'diagnostics',
+        )
+        assert graph.status('loop closure').level == ERROR
+
+    open_for(3)
+    motions.clear()
+    open_for(3)
+    assert motions == []
+    assert node.end() == 0
+
+
+def test_the_bag_holds_it_and_replays_it(folder, write_scene, start, publisher, motions):
+    text = f'rate: 200\neffects: {{acceleration: {{}}}}\nrecord: {{directory: {folder}, name: m}}'
+    node = start(write_scene('motion_bag', text))
+    turn(publisher, 1.0, time.time_ns())
+    wait_for(lambda: len(motions) > 50, 'motions')
+    assert node.end() == 0
+
+    with AnyReader([folder / 'm']) as reader:
+        (connection,) = (c for c in reader.connections if c.topic == MOTION)
+        assert connection.msgtype == 'trajectory_msgs/msg/JointTrajectory'
+        bagged = [
+            reader.deserialize(data, connection.msgtype)
+            for _, _, data in reader.messages([connection])
+        ]
+        assert connection.digest == reader.typestore.hash_rihs01(connection.msgtype)
+    recorded = {stamp_of(message): message.points[0] for message in bagged}
+    for message in motions:
+        (heard,), kept = message.points, recorded[stamp_of(message)]
+        assert list(kept.positions) == list(heard.positions)
+        assert list(kept.velocities) == list(heard.velocities)
+        assert list(kept.accelerations) == list(heard.accelerations)
+
+    bag = read_bag(folder / 'm')
+    again = list(replay(bag, recorded_scene(bag)))
+    assert len(again) == len(bagged)
+    assert all(each.recorded == each.tick.message for each in again)
+    assert all(each.recorded_extras == each.tick.extras for each in again)
+
+
+def topics(graph):
+    return dict(graph.node.get_topic_names_and_types())
+
+
+def test_without_the_effect_there_is_no_topic(graph, write_scene, start):
+    node = start(write_scene('no_motion', 'rate: 100\neffects: {velocity: {}}'))
+    wait_for(lambda: '/joint_states' in topics(graph), 'joint states')
+    assert MOTION not in topics(graph)
+    assert node.end() == 0
+    assert MOTION not in node.log
+
+
+def test_it_comes_and_goes_with_the_scene(graph, folder, write_scene, start, publisher, motions):
+    def change(transition):
+        request = ChangeState.Request()
+        request.transition.id = transition
+        return graph.call(ChangeState, '/linkage_node/change_state', request).success
+
+    def publishers():
+        return graph.node.get_publishers_info_by_topic(MOTION)
+
+    scene = write_scene('comes', 'rate: 100\neffects: {acceleration: {}}')
+    node = start(scene, '-p', 'autostart:=false', ready='')
+    for _ in range(2):
+        assert not publishers()
+        assert change(Transition.TRANSITION_CONFIGURE)
+        wait_for(publishers, 'the topic')
+        assert change(Transition.TRANSITION_ACTIVATE)
+        motions.clear()
+        wait_for(lambda: publisher.publish(crank(0.5, 1.0)) or motions, 'a motion')
+        assert change(Transition.TRANSITION_DEACTIVATE)
+        assert change(Transition.TRANSITION_CLEANUP)
+        wait_for(lambda: not publishers(), 'no topic')
+    scene.write_text(scene.read_text().replace('acceleration', 'velocity'))
+    assert change(Transition.TRANSITION_CONFIGURE)
+    assert change(Transition.TRANSITION_ACTIVATE)
+    assert not publishers()
+    assert node.end() == 0
+
+
+PROGRAM = """
+import sys
+import rclpy
+from rclpy.parameter import Parameter
+from linkage_ros.node.node import LinkageNode
+
+rclpy.init()
+node = LinkageNode(parameter_overrides=[Parameter('scene', value=sys.argv[1])])
+node.trigger_configure()
+node.trigger_activate()
+node.end()
+print('trajectory_msgs' in sys.modules)
+node.destroy_node()
+rclpy.shutdown()
+"""
+
+
+@pytest.mark.parametrize(('effect', 'imported'), [('velocity', False), ('acceleration', True)])
+def test_its_message_is_imported_only_where_it_is_published(domain, write_scene, effect, imported):
+    scene = write_scene(f'imports_{effect}', f'effects: {{{effect}: {{}}}}')
+    done = subprocess.run(
+        [sys.executable, '-c', PROGRAM, str(scene)],
+        cwd=ROOT,
+        env=os.environ | {'ROS_DOMAIN_ID': str(domain), 'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    assert done.stdout.split() == [str(imported)], done.stderr
+
+
+def test_where_its_message_is_not_installed_one_line_says_so(domain, write_scene):
+    program = (
+        'import sys; sys.modules["trajectory_msgs"] = None; from threading import Event; '
+        'from linkage_ros.node.run import run_linkage_node; '
+        'sys.exit(run_linkage_node(Event(), [], {"scene": sys.argv[1]}))'
+    )
+    scene = write_scene('not_installed', 'effects: {acceleration: {}}')
+    done = subprocess.run(
+        [sys.executable, '-c', program, str(scene)],
+        cwd=ROOT,
+        env=os.environ | {'ROS_DOMAIN_ID': str(domain), 'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == 2
+    (line,) = [line for line in done.stderr.splitlines() if 'ERROR' in line]
+    assert 'effects.acceleration: the ROS package trajectory_msgs is not installed' in line

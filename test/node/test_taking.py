@@ -1,0 +1,196 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+What a tick takes from its queue: each sample judged when it is taken, all of them accounted for.
+
+The queue is the test's, and its clock goes on by a step with every look at it.
+"""
+
+from functools import partial
+from itertools import count
+
+from linkage_ros.messages.joint_state import JointStateWriter, Rejection
+from linkage_ros.messages.layout import NANOSECONDS
+from linkage_ros.node.tick_loop import TickLoop
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.replay import own_joint_states
+from linkage_ros.scene.load import parse_scene
+import pytest
+
+MS = 1_000_000
+BEGIN = 1_700_000_000 * NANOSECONDS
+FOUR_BAR = b'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1}'
+ONE = 'linkage: l.yaml\n'
+TWO = 'linkages: [{name: left, linkage: l.yaml}, {name: right, linkage: l.yaml}]\n'
+TWO_FILES = {'scene.yaml': TWO.encode(), 'linkage_1.yaml': FOUR_BAR, 'linkage_2.yaml': FOUR_BAR}
+
+
+class Rig:
+    """A tick loop behind a queue of the test's; a clock that goes on by 1 ms with every look."""
+
+    def __init__(self, text=ONE, rate=50, **options):
+        text += f'rate: {rate}\ndrive: {{topic: {{max_lead: 0.0}}}}\n'
+        of = ['linkage.yaml'] if 'linkages' not in text else ['linkage_1.yaml', 'linkage_2.yaml']
+        files = {'scene.yaml': text.encode(), **dict.fromkeys(of, FOUR_BAR)}
+        scene = parse_scene('t', 't', files)
+        self.queue, self.published = [], []
+        self.loop = TickLoop(
+            partial(Pipeline, scene), self._take, self.published.append, **options
+        )
+        self.tick = self.loop.tick_at if rate else self.loop.tick_samples
+        self._numbers = count(1)
+        self.now = BEGIN
+
+    def _take(self):
+        return self.queue.pop(0) if self.queue else None
+
+    def clock(self):
+        self.now += MS
+        return self.now
+
+    def send(self, stamp=BEGIN, angle=1.0, names=('crank_joint',), number=None):
+        message = JointStateWriter(names).write(stamp, [angle] * len(names), [0.0] * len(names))
+        number = next(self._numbers) if number is None else number
+        info = {'source_timestamp': stamp, 'publication_sequence_number': number}
+        self.queue.append((message, info))
+
+    def counts(self):
+        """Return received, used, superseded, ignored and rejected, which must close."""
+        c = self.loop.counts
+        rejected = sum(c.rejected.values())
+        assert c.received == c.used + c.superseded + c.ignored + rejected
+        return c.received, c.used, c.superseded, c.ignored, rejected
+
+
+@pytest.mark.parametrize('rate', [50, 0])
+def test_a_sample_that_comes_while_others_are_taken_is_not_of_the_future(rate):
+    rig = Rig(rate=rate)
+    for number in range(33):
+        rig.send(BEGIN + (number + 1) * MS)  # stamped at the instant at which it is taken
+    rig.tick(BEGIN, rig.clock)
+    assert rig.loop.counts.rejected[Rejection.STAMP_FUTURE] == 0
+    assert rig.counts() == ((33, 33, 0, 0, 0) if rate == 0 else (33, 1, 32, 0, 0))
+
+
+def test_the_tick_keeps_the_time_at_which_it_began():
+    rig = Rig()
+    rig.send(BEGIN + MS)
+    rig.tick(BEGIN, rig.clock)
+    (state,) = rig.published
+    assert int.from_bytes(state[4:8], 'little') * NANOSECONDS == BEGIN
+    rig.tick(BEGIN + 2 * MS, rig.clock)
+    assert rig.loop.counts.clock_jumps == 0
+
+
+def test_a_clock_that_goes_back_while_messages_are_taken_is_seen_by_the_next_tick():
+    rig = Rig()
+    rig.send(BEGIN - 5 * MS)
+    rig.tick(BEGIN, lambda: BEGIN - 50 * MS)
+    assert rig.counts() == (1, 1, 0, 0, 0)
+    rig.tick(BEGIN - 49 * MS)
+    assert rig.loop.counts.clock_jumps == 1
+
+
+TAKEN = {
+    'one': ([('crank_joint',)], (1, 1, 0, 0, 0)),
+    'a newer one': ([('crank_joint',)] * 3, (3, 1, 2, 0, 0)),
+    'of another joint': ([('elbow',)], (1, 0, 0, 1, 0)),
+    'among others': ([('elbow', 'crank_joint')], (1, 1, 0, 0, 0)),
+    'mixed': ([('elbow',), ('crank_joint',), ('wrist',)], (3, 1, 0, 2, 0)),
+    'twice in one': ([('crank_joint', 'crank_joint')], (1, 0, 0, 0, 1)),
+    'nothing': ([], (0, 0, 0, 0, 0)),
+}
+
+
+@pytest.mark.parametrize('kind', TAKEN)
+def test_the_counts_close(kind):
+    messages, counts = TAKEN[kind]
+    rig = Rig()
+    for names in messages:
+        rig.send(names=names)
+    rig.tick(BEGIN)
+    assert rig.counts() == counts
+
+
+def test_of_two_linkages_each_uses_its_newest():
+    left, right = ('left_crank_joint',), ('right_crank_joint',)
+    rig = Rig(TWO)
+    for names in (left, left, right, ('elbow',), left + right, right):
+        rig.send(names=names)
+    rig.tick(BEGIN)
+    # The last two are used, one by each; the first three are not.
+    assert rig.counts() == (6, 2, 3, 1, 0)
+    rig.tick(BEGIN + MS)
+    assert rig.counts() == (6, 2, 3, 1, 0)
+
+
+def test_its_own_messages_are_told_also_where_a_linkage_is_not_in_them():
+    rig = Rig(TWO, own=own_joint_states(parse_scene('t', 't', TWO_FILES)))
+    rig.send(names=('left_crank_joint',))
+    rig.tick(BEGIN)
+    rig.send(BEGIN + MS, names=('right_crank_joint',))
+    rig.tick(BEGIN + MS)
+    counts = rig.counts()
+    alone, both = rig.published
+    assert (b'left' in alone, b'right' in alone) == (True, False)
+    for message in (alone, both):
+        rig.queue.append((message, {'source_timestamp': BEGIN}))
+    rig.tick(BEGIN + 2 * MS)
+    assert rig.counts() == counts == (2, 2, 0, 0, 0)
+
+
+def test_a_tick_takes_no_more_than_the_queue_holds():
+    # One that sends faster than messages are read would hold up the tick for ever.
+    rig = Rig(depth=10)
+    rig.queue = Endless(rig.send)
+    for tick in range(1, 4):
+        rig.tick(BEGIN + tick * MS)
+        assert (rig.loop.counts.ticks, rig.loop.counts.received) == (tick, 10 * tick)
+
+
+class Endless(list):
+    """A queue in which another message stands whenever one looks."""
+
+    def __init__(self, send):
+        super().__init__()
+        self._send = send
+
+    def __bool__(self):
+        if not len(self):
+            self._send()
+        return True
+
+
+NUMBERED = {
+    'all': ([1, 2, 3], 0),
+    'from the middle on': ([7, 8], 0),
+    'two gaps': ([1, 4, 5, 7], 3),
+    'a publisher that begins anew': ([8, 9, 1, 2], 0),
+    'none that is numbered': ([0, 0], None),
+}
+
+
+@pytest.mark.parametrize('kind', NUMBERED)
+def test_what_the_middleware_lost_is_told_by_the_numbers_that_are_missing(kind):
+    numbers, missed = NUMBERED[kind]
+    rig = Rig()
+    for number in numbers:
+        rig.send(number=number)
+    rig.tick(BEGIN)
+    assert rig.loop.missed == missed
+    assert ('lost before' in rig.loop.samples) == bool(missed)
+    rig.loop.several_publishers = True
+    assert rig.loop.missed is None, 'their numbers go apart'

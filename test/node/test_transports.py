@@ -1,0 +1,186 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Fast DDS goes without shared memory unless the user says otherwise; where it has it, that is told.
+
+A publisher that opens a subscriber's shared-memory port may stand still for 0.33 s (Fast-DDS issue
+6535); `python -m bench --only comers` shows it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+
+from linkage_ros.node.transports import leave_out_shared_memory
+from linkage_ros.resources import shipped
+import pytest
+from sensor_msgs.msg import JointState
+
+from .graph import PATIENCE, wait_for
+
+SAID = (
+    'FASTDDS_BUILTIN_TRANSPORTS',
+    'FASTRTPS_DEFAULT_PROFILES_FILE',
+    'FASTDDS_DEFAULT_PROFILES_FILE',
+    'RMW_FASTRTPS_PUBLICATION_MODE',
+)
+TURNING = 'drive: {constant_rate: {rate: 1.0}}\nrate: 1000'
+OWN_NETWORK = [shutil.which('unshare') or 'unshare', '--map-root-user', '--net']
+
+# As a process that holds the node among others: rclpy is up before the node is made.
+COMPONENT = """
+import rclpy
+rclpy.init()
+from linkage_ros.node.node import LinkageNode
+from linkage_ros.signals import stop_on_signals
+from rclpy.executors import SingleThreadedExecutor
+stop = stop_on_signals()
+node = LinkageNode()
+executor = SingleThreadedExecutor()
+executor.add_node(node)
+node.trigger_configure()
+node.trigger_activate()
+while not stop.is_set():
+    executor.spin_once(timeout_sec=0.1)
+node.end()
+"""
+
+
+def own_network_is_allowed():
+    try:
+        return subprocess.run([*OWN_NETWORK, 'true'], check=False).returncode == 0
+    except OSError:
+        return False
+
+
+@pytest.fixture
+def unsaid(monkeypatch, tmp_path):
+    """Let the environment say nothing of how messages are carried."""
+    monkeypatch.chdir(tmp_path)
+    for name in SAID:
+        # First set, so that what is set meanwhile is taken back too.
+        monkeypatch.setenv(name, '')
+        monkeypatch.delenv(name)
+
+
+def test_by_default_shared_memory_is_left_out(unsaid):
+    leave_out_shared_memory()
+    assert os.environ['FASTDDS_BUILTIN_TRANSPORTS'] == 'UDPv4'
+
+
+@pytest.mark.parametrize(
+    ('name', 'value'),
+    [
+        ('FASTDDS_BUILTIN_TRANSPORTS', 'DEFAULT'),
+        ('FASTRTPS_DEFAULT_PROFILES_FILE', 'mine.xml'),
+        ('FASTDDS_DEFAULT_PROFILES_FILE', 'mine.xml'),
+        ('RMW_FASTRTPS_PUBLICATION_MODE', 'ASYNCHRONOUS'),
+    ],
+)
+def test_what_the_user_says_stays(unsaid, monkeypatch, name, value):
+    monkeypatch.setenv(name, value)
+    leave_out_shared_memory()
+    assert {said: os.environ[said] for said in SAID if said in os.environ} == {name: value}
+
+
+def test_a_profile_in_the_working_folder_stays_in_force(unsaid):
+    Path('DEFAULT_FASTRTPS_PROFILES.xml').touch()
+    leave_out_shared_memory()
+    assert 'FASTDDS_BUILTIN_TRANSPORTS' not in os.environ
+
+
+@pytest.fixture
+def meet(domain, write_scene, folder):
+    """Return a function by which a node and a client on defaults meet, on a network alone."""
+    if not own_network_is_allowed():
+        pytest.skip('no network of its own without user namespaces')
+    scene = write_scene('turning', TURNING)
+
+    def meet(*program, **own):
+        environment = {k: v for k, v in os.environ.items() if k not in SAID} | {
+            'ROS_DOMAIN_ID': str(domain),
+            'ROS_LOG_DIR': str(folder),
+            **{f'NODE_{name}': value for name, value in own.items()},
+        }
+        environment.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
+        script = Path(__file__).with_name('on_own_network.py')
+        command = [*OWN_NETWORK, sys.executable, str(script), str(scene)]
+        done = subprocess.run(
+            command + list(program or ('-m', 'linkage_ros.node.linkage_node')),
+            cwd=folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=4 * PATIENCE,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        return {**json.loads(done.stdout), 'log': done.stderr}
+
+    return meet
+
+
+def heard_all(numbers):
+    return len(numbers) > 1 and numbers == list(range(numbers[0], numbers[-1] + 1))
+
+
+def test_a_client_with_shared_memory_hears_every_message_of_a_node_without(meet):
+    found = meet()
+    assert found['client']
+    assert not found['node']
+    assert heard_all(found['numbers'])
+    assert 'Middleware' not in found['tick']
+    assert 'shared memory' not in found['log']
+
+
+def test_a_user_can_have_shared_memory_and_is_told_what_it_costs(meet):
+    found = meet(FASTDDS_BUILTIN_TRANSPORTS='DEFAULT')
+    assert found['node']
+    assert heard_all(found['numbers'])
+    assert 'stand still' in found['tick']['Middleware']
+    assert found['log'].count('Fast DDS uses shared memory') == 1
+
+
+def test_a_node_in_the_process_of_another_tells_that_it_could_not_choose(meet):
+    found = meet('-c', COMPONENT)
+    assert found['node']
+    assert 'FASTDDS_BUILTIN_TRANSPORTS=UDPv4' in found['tick']['Middleware']
+    assert found['log'].count('Fast DDS uses shared memory') == 1
+
+
+def test_where_discovery_is_local_shared_memory_comes_all_the_same_and_is_told(
+    graph, start, write_scene
+):
+    node = start(write_scene('local', TURNING))
+    assert 'Fast DDS uses shared memory' in node.log
+    graph.next_status('tick')
+    assert 'config/fastdds/local.xml' in graph.value('tick', 'Middleware')
+
+
+def test_the_profile_that_comes_with_the_package_has_discovery_local_without_shared_memory(
+    graph, start, write_scene, monkeypatch
+):
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SYSTEM_DEFAULT')
+    monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', str(shipped('fastdds/local.xml')))
+    heard = graph.listen(JointState, 'joint_states')
+    node = start(write_scene('profile', TURNING))
+    wait_for(lambda: len(heard) > 100, 'joint states')
+    assert 'shared memory' not in node.log
+    assert '/fastrtps_port' not in Path(f'/proc/{node.process.pid}/maps').read_text()

@@ -1,0 +1,110 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The node's own tick loop, with its recorder and without DDS: its messages come from a list."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+from linkage_ros.bag.reader import Bag, read_bag
+from linkage_ros.bag.recorder import Recorder
+from linkage_ros.bag.topic import Topic
+from linkage_ros.bag.writer import BagWriter
+from linkage_ros.messages.single_values import text_message
+from linkage_ros.node.tick_loop import TickLoop
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.replay import change_text
+from linkage_ros.scene.load import load_scene
+
+
+class Moment(NamedTuple):
+    """
+    A tick, and what comes before it.
+
+    Attributes
+    ----------
+    time
+        The clock's, in [ns].
+    messages
+        What has come on the crank's topic.
+    reset
+        Whether somebody has asked for a reset.
+    asked
+        Faults by name, and whether they shall begin.
+
+    """
+
+    time: int
+    messages: tuple[bytes, ...] = ()
+    reset: bool = False
+    asked: tuple[tuple[str, bool], ...] = ()
+
+
+class Run(NamedTuple):
+    """A run: its bag, the joint states and the extras that it published, and what was counted."""
+
+    bag: Bag
+    published: list[bytes]
+    extras: list[bytes]
+    loop: TickLoop
+
+
+def run(folder: Path, scene_file: Path, moments: Iterable[Moment]) -> Run:
+    """Run a scene through these moments, into a bag in the folder."""
+    scene = load_scene(scene_file)
+    pipeline = Pipeline(scene)
+    closures, injection = pipeline.closures, pipeline.injection
+    waiting: list[tuple[bytes, dict[str, int]]] = []
+    published: list[bytes] = []
+    extras: list[bytes] = []
+    loop = TickLoop(
+        partial(Pipeline, scene, closures, injection),
+        (lambda: waiting.pop(0) if waiting else None) if pipeline.topic else None,
+        published.append,
+        publish_extras=[extras.append] * len(pipeline.extras),
+        publish_change=lambda c: text_message(change_text(c, scene.faults[c.name].kind)),
+    )
+    others = [f'/extra_{number}' for number in range(len(pipeline.extras))]
+    names = {
+        'joint_states_topic': '/joint_states',
+        'diagnostics_topic': '/diagnostics',
+        **({'crank_topic': '/crank'} if pipeline.topic else {}),
+        **({'faults_topic': '/faults'} if injection else {}),
+        **({'withheld_topic': '/withheld'} if pipeline.withholds else {}),
+        **{name: name for name in others},
+        'resets_topic': '/resets',
+    }
+    folder_of_scene = str(scene_file.parent)
+    said = {'scene': 's', 'scene_folder': folder_of_scene, 'seed': scene.seed}
+    said |= {'extra_topics': others, **names}
+    files = {name: ('application/yaml', data) for name, data in scene.files.items()}
+    topics = [Topic(name, 'sensor_msgs/msg/JointState', '', '') for name in names.values()]
+    attached = {**files, 'run.json': ('application/json', json.dumps(said).encode())}
+    recorder = Recorder(BagWriter(folder, topics, attached), capacity=1_000_000)
+    loop.recorder = recorder
+    tick = loop.tick_at if scene.rate else loop.tick_samples
+    for time, messages, reset, asked in moments:
+        waiting += [(message, {'source_timestamp': time}) for message in messages]
+        loop.reset_requested |= reset
+        for name, on in asked:
+            injection.ask(name, on)
+        tick(time)
+    recorder.stop()
+    return Run(read_bag(folder), published, extras, loop)

@@ -1,0 +1,100 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A robot model walked by yourdfpy, and what the node says while a linkage moves."""
+
+from __future__ import annotations
+
+import io
+
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.scene.load import load_scene, parse_scene
+import yourdfpy
+
+from ..support.messages import read_joint_state
+from ..support.scenes import pipeline_of
+
+BEGIN = 1_700_000_000_000_000_000
+MS = 1_000_000
+
+
+class Walked:
+    """A model; each link is where its joints put it."""
+
+    def __init__(self, data):
+        self.model = yourdfpy.URDF.load(
+            io.BytesIO(data), build_scene_graph=True, load_meshes=False
+        )
+        self.joints = set(self.model.actuated_joint_names)
+
+    def pose(self, names, positions):
+        """Take a joint state."""
+        assert self.joints <= set(names), 'a joint that nobody publishes'
+        self.model.update_cfg(dict(zip(names, positions, strict=True)))
+
+    def place(self, frame):
+        """Return where a frame is, as x + iy, and that it lies in the plane."""
+        there = self.model.get_transform(frame)
+        assert there[2, 3] == 0.0
+        assert abs(there[2, 2] - 1.0) < 1e-12
+        return complex(there[0, 3], there[1, 3])
+
+    def facing(self, frame):
+        """Return e^{i·angle} of a frame."""
+        there = self.model.get_transform(frame)
+        return complex(there[0, 0], there[1, 0])
+
+
+def said(pipeline, every=50 * MS, count=126):
+    """Yield names and positions of the joint states that ticks come to."""
+    for number in range(count):
+        message = pipeline.tick(BEGIN + number * every).message
+        if message:
+            yield heard(message)
+
+
+def heard(message):
+    """Return names and positions of a joint state, read by rosbags."""
+    state = read_joint_state(message)
+    return list(state.name), list(state.position)
+
+
+def moving(file):
+    """Return the pipeline of a linkage file; what has several inputs is turned by hand."""
+    return Pipeline(load_scene(file))
+
+
+def moving_text(text):
+    """Return the pipeline of a linkage that is the text of a file, driven as a file alone is."""
+    from linkage_ros.files.linkage_file import read_closure
+    from linkage_ros.files.linkage_text import scene_text_for
+    from linkage_ros.files.yaml_file import parse_yaml
+
+    scene = scene_text_for(read_closure(parse_yaml(text.encode(), 'it')), 'linkage.yaml')
+    files = {'scene.yaml': scene.encode(), 'linkage.yaml': text.encode()}
+    return Pipeline(parse_scene('it', 'it', files))
+
+
+def several_inputs(text, names, values):
+    """Yield what is said where several inputs come in messages."""
+    pipeline = pipeline_of('rate: 0\npublish_input: true\n', text)
+    writer = JointStateWriter(names)
+    for number, inputs in enumerate(values):
+        now = BEGIN + number * 50 * MS
+        assert pipeline.offer(writer.write(now, inputs, [0.0] * len(names)), now) is None
+        message = pipeline.tick(now).message
+        if message:
+            yield heard(message)
