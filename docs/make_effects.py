@@ -30,7 +30,7 @@ import re
 import sys
 from typing import NamedTuple
 
-from linkage_ros.cli.parameter_tables import REGISTRIES, table_of
+from linkage_ros.cli.scene import REGISTRIES, table_of
 from linkage_ros.effects.stage import EFFECTS, NEEDS, PUBLISHED_WITH
 from linkage_ros.errors import FileError
 from linkage_ros.files.parameters import summary

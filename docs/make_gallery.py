@@ -31,13 +31,13 @@ from linkage_ros.cli.check import describe_group
 from linkage_ros.drawing.figure import picture, view
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.structure import Driven
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,
     transmission_angles,
     usual_inputs,
     Way,
 )
+from linkage_ros.kinematics.topology import Driven
 from PIL import Image
 
 DOCS = Path(__file__).resolve().parent

@@ -44,7 +44,7 @@ DECIMALS = range(3, 17)
 
 def main() -> int:
     """Write page and pictures; return 1 where a picture is too large."""
-    from linkage_ros.drawing.design_part import draw_design
+    from linkage_ros.drawing.design import draw_design
 
     from .pictures.digits import digits_picture
 

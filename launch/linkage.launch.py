@@ -28,7 +28,7 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
-from linkage_ros.cli.model_file import model_of
+from linkage_ros.cli.arguments import model_of
 from linkage_ros.errors import LinkageError, quoted
 from linkage_ros.robot_models.urdf import urdf as write_urdf
 

@@ -22,7 +22,7 @@ from pkgutil import walk_packages
 
 import linkage_ros
 from linkage_ros.errors import FileError, LinkageError, listed
-from linkage_ros.robot_models.part_part import PartError
+from linkage_ros.robot_models.part import PartError
 import pytest
 
 from .support.scenes import linkage_of

@@ -108,7 +108,7 @@ def answer_to(kind: Kind) -> Answer:
 
 def chapter(folder: Path) -> Iterator[str]:
     """Draw every kind of task, and yield the lines on them."""
-    from linkage_ros.drawing.design_part import draw_design
+    from linkage_ros.drawing.design import draw_design
 
     yield from prose("""
         ## Four-bars by kind of task

@@ -34,7 +34,7 @@ import re
 from typing import Any
 
 from linkage_ros.cli.main import COMMANDS, module_of
-from linkage_ros.cli.parameter_tables import REGISTRIES, table_of
+from linkage_ros.cli.scene import REGISTRIES, table_of
 from linkage_ros.files.schema import linkage_schema, scene_schema
 from linkage_ros.pages.markdown import table_lines
 

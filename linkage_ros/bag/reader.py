@@ -43,9 +43,9 @@ from linkage_ros.bag.mcap_records import (
 from linkage_ros.bag.metadata import METADATA_FILE, ROOT_KEY
 from linkage_ros.bag.recording_stats import STATS_RECORD, UNFINISHED
 from linkage_ros.bag.topic import CHANNELS_FILE, QosProfile, Topic
-from linkage_ros.bounded_yaml import bounded_yaml
 from linkage_ros.errors import BagError, quoted
 from linkage_ros.files.regular_file import read_regular
+from linkage_ros.files.yaml_file import bounded_yaml
 from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 

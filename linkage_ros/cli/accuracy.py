@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 Show what accuracy costs in time, on a scene and on this machine: tables here, a page in a folder.
 
@@ -30,10 +29,39 @@ from threading import Event
 
 from linkage_ros.accuracy.measure import measure_accuracy, PARTS
 from linkage_ros.accuracy.page.files import check_folder, PAGE, write_page
-from linkage_ros.cli.accuracy_tables import print_results
-from linkage_ros.cli.progress import progress, Told
+from linkage_ros.accuracy.page.numbers import cell_text, numeric_columns
+from linkage_ros.accuracy.results import Results
+from linkage_ros.accuracy.results import Table as Measured
+from linkage_ros.cli.terminal import progress, show, Table, Told
 from linkage_ros.errors import did_you_mean, LinkageError, listed
 from linkage_ros.scene.load import load_scene
+
+# What accuracy costs, printed: the tables of its parts, and what to take.
+
+
+def print_results(results: Results) -> None:
+    """Print all tables, each part under its title, and the advice of all parts at the end."""
+    for part in results.parts:
+        print(f'{part.title}\n')
+        for table in part.tables:
+            show(printed(table))
+            print()
+    for part in results.parts:
+        if part.advice:
+            print(part.title)
+            for advice in part.advice:
+                print(f'  {advice}')
+
+
+def printed(table: Measured) -> Table:
+    """Return a table as texts; columns of numbers are set right."""
+    columns = zip(table.columns, numeric_columns(table), strict=True)
+    return Table(
+        table.title,
+        [f'>{name}' if number else name for name, number in columns],
+        [[cell_text(cell) for cell in row] for row in table.rows],
+    )
+
 
 _REFERENCE = 'mpmath'
 """Of the extra `report`: what the reference is worked out with."""

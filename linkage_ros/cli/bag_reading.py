@@ -12,28 +12,39 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The messages of a bag for a command: with a word on how far it is, up to damage or Ctrl-C."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import datetime
 from itertools import count
+from math import isfinite
 from pathlib import Path
 import sys
 from threading import Event
+from typing import Any
 
-from linkage_ros.bag.contents import layout_of, TOLD_EVERY
-from linkage_ros.bag.reader import Bag, BagMessage, MOST_ATTACHED, read_bag
-from linkage_ros.bag.recording_stats import counts_in
+from linkage_ros.bag.contents import Contents, Layout, layout_of, TOLD_EVERY
+from linkage_ros.bag.reader import (
+    Bag,
+    BagMessage,
+    information_of,
+    MOST_ATTACHED,
+    read_bag,
+    serialized_metadata,
+)
+from linkage_ros.bag.recording_stats import counts_in, FAILURE
 from linkage_ros.bag.recover import NOTHING_LOST, RECOVERED
-from linkage_ros.bag.run_events import run_account, run_said, RunAccount
-from linkage_ros.cli.progress import progress
+from linkage_ros.bag.run_events import lost_beginning, run_account, run_said, RunAccount
+from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import BagError, clean, listed
+from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.replay.replay import recorded_scene
-from linkage_ros.scene.scene import Scene
+from linkage_ros.replay.worst_residuals import Examined, WorstStates
+from linkage_ros.scene.scene import Member, Scene
 from linkage_ros.signals import heeded, StoppedError
 
 _MIB = 2**20
@@ -189,3 +200,155 @@ class BagReading:
                 if self._stop.is_set():
                     self.stopped = True
                     return
+
+
+# What there is to say of a bag, as JSON has it: numbers in SI units or [ns], and named so.
+
+
+def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, Any]:
+    """Return what any bag says of itself, ours or not."""
+    begin, end = contents.begin, contents.end
+    said: Mapping[str, Any] = information_of(bag.path) if bag.path.is_dir() else {}
+    within = next((layout.rosbag2 for layout in layouts if layout.rosbag2), None)
+    if not said and within is not None:
+        said = serialized_metadata(within)
+    run = run_said(bag)
+    # What is let go of is only told where there is some.
+    let_go = counts_in(bag.custom, 'let_go')
+    counted = {word: counts_in(bag.custom, word) for word in ('received', 'dropped')}
+    return {
+        'bag': str(bag.path),
+        'duration_ns': None if begin is None or end is None else end - begin,
+        'begin_ns': begin,
+        'begin': local(begin),
+        'end_ns': end,
+        'end': local(end),
+        'size_bytes': sum(file.stat().st_size for file in bag.files),
+        'files': [{'name': file.name, 'size_bytes': file.stat().st_size} for file in bag.files],
+        'compressions': _compressions(layouts),
+        'truncated': bag.truncated,
+        'unfinished': unfinished_text(bag) if bag.truncated else None,
+        'beginning_missing': lost_beginning(bag, run_or_blank(bag)) or None,
+        'damage': contents.damage or None,
+        'stopped': contents.stopped,
+        'recording_failure': bag.custom.get(FAILURE),
+        'messages': sum(topic.messages for topic in contents.topics),
+        'topics': [
+            {
+                'name': topic.name,
+                'type': topic.type,
+                'messages': messages,
+                'rate_hz': each.rate,
+                'size_bytes': size,
+                'reliability': topic.qos.reliability,
+                'durability': topic.qos.durability,
+                'qos_understood': topic.qos.understood,
+                'received': counted['received'].get(topic.name),
+                'dropped': counted['dropped'].get(topic.name),
+                'let_go': let_go.get(topic.name, 0) if let_go or counted['received'] else None,
+            }
+            for each in contents.topics
+            for topic, messages, size, _, _ in [each]
+        ],
+        'versions': {
+            'linkage_ros': _text(run.get('linkage_ros')),
+            'python': _text(run.get('python')),
+            'machine': _text(run.get('machine')),
+            'ros_distro': _text(said.get('ros_distro')),
+            'rosbag2_metadata': _whole(said.get('version')),
+            'written_by': ', '.join(dict.fromkeys(layout.library for layout in layouts)) or None,
+        },
+    }
+
+
+def scene_account(scene: Scene) -> dict[str, Any]:
+    """Return what there is to say of the scene that a bag carries."""
+    return {
+        'name': scene.name,
+        'rate_hz': scene.rate,
+        'seed': scene.seed,
+        'faults': list(scene.faults),
+        'linkages': [_linkage(member) for member in scene.members],
+    }
+
+
+def worst_account(worst: WorstStates) -> dict[str, Any]:
+    """Return what there is to say of a linkage's states, to stand beside what its scene says."""
+    account: dict[str, Any] = {
+        'four_bars': [
+            {'kind': bar.kind.name, 'lengths_m': list(bar.lengths)}
+            for bar in four_bars(worst.closure.structure)
+        ],
+        'states': worst.states,
+        'toggles': worst.toggles,
+        'limited': worst.limited,
+        'worst_residual': None,
+        'nearest_to_toggle': None,
+    }
+    if worst.residual is not None:
+        residual, place = worst.residual
+        account['worst_residual'] = {
+            'residual_m': residual, 'time_ns': place.time, 'inputs': list(place.inputs)
+        }  # fmt: skip
+    if worst.nearest is not None:
+        near, place = worst.nearest
+        distance = near.toggle_distance
+        account['nearest_to_toggle'] = {
+            'conditioning': near.conditioning,
+            'transmission_angle_rad': near.transmission_angle,
+            'input_to_toggle': distance if isfinite(distance) else None,
+            'time_ns': place.time,
+            'inputs': list(place.inputs),
+        }
+    return account
+
+
+def replay_account(examined: Examined) -> dict[str, Any]:
+    """Return how the scene, run once more, agrees with the bag."""
+    return {'joint_states': examined.joint_states, 'same_bytes': examined.same}
+
+
+def local(time: int | None) -> str | None:
+    """Return a time in [ns] as date and time of this machine's zone, to the nanosecond."""
+    if time is None:
+        return None
+    seconds, rest = divmod(time, 1_000_000_000)
+    there = datetime.fromtimestamp(seconds).astimezone()
+    return f'{there:%Y-%m-%d %H:%M:%S}.{rest:09d}{there:%z}'
+
+
+def _linkage(member: Member) -> dict[str, Any]:
+    linkage = member.linkage
+    return {
+        'name': member.name,
+        'links': len(linkage.links),
+        'inputs': [
+            {'joint': name, 'unit': 'm' if given.slider else 'rad'}
+            for name, given in zip(member.inputs, linkage.inputs, strict=True)
+        ],
+        'joints': list(member.joints),
+        'drive': member.drive[0],
+        'effects': list(member.effects),
+        'effects_not_imported': list(member.not_imported),
+    }
+
+
+def _compressions(layouts: list[Layout]) -> list[dict[str, Any]]:
+    sums: dict[str, tuple[int, int]] = {}
+    for layout in layouts:
+        for name, (stored, content) in layout.compressions.items():
+            before = sums.get(name, (0, 0))
+            sums[name] = before[0] + stored, before[1] + content
+    return [
+        {'name': name, 'stored_bytes': stored, 'content_bytes': content}
+        for name, (stored, content) in sums.items()
+    ]
+
+
+def _text(value: Any) -> str | None:
+    # Not of lists: in YAML, aliases make a small file's text as long as memory.
+    return str(value) if isinstance(value, str | int | float) else None
+
+
+def _whole(value: Any) -> int | None:
+    return value if isinstance(value, int) else None

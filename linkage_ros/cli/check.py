@@ -26,11 +26,10 @@ from linkage_ros.cli.arguments import angle_text, value_text
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.four_bars import four_bars
+from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.kinematics.linkage import Limits
 from linkage_ros.kinematics.ranges import InputRange
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.structure import Driven, Dyad, Group, Iterated
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,
     Extreme,
@@ -39,6 +38,7 @@ from linkage_ros.kinematics.sweep_analysis import (
     Way,
     worst_residual,
 )
+from linkage_ros.kinematics.topology import Driven, Dyad, Group, Iterated
 
 _SINGULAR = (
     ('toggles', Status.TOGGLE),

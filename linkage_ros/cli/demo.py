@@ -33,7 +33,7 @@ import sys
 from threading import Event
 
 from linkage_ros.cli.plot import draw
-from linkage_ros.cli.run_part import add_run_arguments, run_scene
+from linkage_ros.cli.run import add_run_arguments, run_scene
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import did_you_mean, LinkageError, listed
 from linkage_ros.resources import shipped

@@ -27,7 +27,7 @@ from pathlib import Path
 import sys
 from threading import Event
 
-from linkage_ros.cli.model_file import add_output, put
+from linkage_ros.cli.arguments import add_output, put
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.linkage_text import linkage_text

@@ -36,15 +36,16 @@ from typing import Any
 from linkage_ros.bag.contents import contents_of, layout_of
 from linkage_ros.bag.reader import Bag
 from linkage_ros.cli.arguments import value_text, wrapped
-from linkage_ros.cli.bag_account import (
+from linkage_ros.cli.bag_reading import (
     account_of,
+    add_trust,
+    opened,
     replay_account,
     scene_account,
+    scene_of,
     worst_account,
 )
-from linkage_ros.cli.bag_reading import add_trust, opened, scene_of
-from linkage_ros.cli.progress import progress
-from linkage_ros.cli.terminal import show, Table
+from linkage_ros.cli.terminal import progress, show, Table
 from linkage_ros.errors import clean, LinkageError
 from linkage_ros.replay.worst_residuals import examine
 from linkage_ros.signals import heeded

@@ -23,7 +23,7 @@ import sys
 from threading import Event
 
 from linkage_ros import __version__
-from linkage_ros.cli.outlet import clean_output
+from linkage_ros.cli.terminal import clean_output
 from linkage_ros.errors import LinkageError, missing_packages_reported
 from linkage_ros.signals import end_soon, raising, stop_on_signals, StoppedError
 

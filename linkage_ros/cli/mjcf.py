@@ -20,8 +20,8 @@ from __future__ import annotations
 import argparse
 from threading import Event
 
-from linkage_ros.cli.model_file import add_files, model_of, put
-from linkage_ros.robot_models.mjcf_part import mjcf
+from linkage_ros.cli.arguments import add_files, model_of, put
+from linkage_ros.robot_models.mjcf import mjcf
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

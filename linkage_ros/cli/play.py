@@ -34,7 +34,7 @@ from linkage_ros.bag.order import LogTimeOrder
 from linkage_ros.bag.reader import Bag, is_in_use
 from linkage_ros.bag.topic import Topic
 from linkage_ros.cli.bag_reading import opened
-from linkage_ros.cli.progress import progress, Told
+from linkage_ros.cli.terminal import progress, Told
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.bag_topics import offer

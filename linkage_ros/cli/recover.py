@@ -23,8 +23,7 @@ import sys
 from threading import Event
 
 from linkage_ros.bag.recover import recover, Recovery
-from linkage_ros.cli.progress import progress
-from linkage_ros.cli.terminal import show, Table
+from linkage_ros.cli.terminal import progress, show, Table
 from linkage_ros.errors import clean
 
 WHOLE, STOPPED, LOSS = 0, 1, 3

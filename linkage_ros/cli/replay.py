@@ -12,22 +12,52 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """How a replay is told: as JSON has it, and as text. Times are in [ns], and named so."""
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+import json
 from math import isfinite
+from pathlib import Path
+import sys
+from threading import Event
 from typing import Any
 
-from linkage_ros.bag.reader import Bag
-from linkage_ros.cli.bag_reading import BagReading, gaps, unfinished_text
-from linkage_ros.cli.terminal import Table
-from linkage_ros.errors import clean
-from linkage_ros.messages.joint_values import UNITS
+from linkage_ros.bag.reader import Bag, RUN_FILE
+from linkage_ros.bag.run_events import recorded_events, run_account, RunAccount
+from linkage_ros.cli.bag_reading import (
+    add_trust,
+    BagReading,
+    gaps,
+    opened,
+    scene_of,
+    unfinished_text,
+)
+from linkage_ros.cli.new_bag import Names, names_for, NewBag, Source
+from linkage_ros.cli.terminal import show, Table
+from linkage_ros.errors import BagError, clean, LinkageError, listed
+from linkage_ros.messages.joint_values import JOINT_STATE, UNITS
 from linkage_ros.replay.compare import At, Comparison, First, TopicComparison, ulps
-from linkage_ros.replay.verify import beginning_text, Proof
+from linkage_ros.replay.counterfactual import check_drives, find_crank_topic, Remade, WhatIf
+from linkage_ros.replay.replay import (
+    own_effects_here,
+    own_joint_states,
+    recorded_scene,
+    ReplayedTick,
+    versions_here,
+)
+from linkage_ros.replay.verify import (
+    beginning_text,
+    DIFFERENT,
+    IDENTICAL,
+    Proof,
+    prove,
+    turning_joints,
+)
+from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
 
 
@@ -249,3 +279,262 @@ def _number(value: float | None) -> str:
 
 def _finite(value: float) -> float | None:
     return value if isfinite(value) else None
+
+
+# Another scene over the samples of a bag: compared with the recorded run, written anew.
+
+
+def replayed_with(
+    bag: Bag, reading: BagReading, scene: Scene, crank_topic: str | None, output: Path | None
+) -> dict[str, Any]:
+    """
+    Run another scene over a bag's samples; return what came of it.
+
+    Parameters
+    ----------
+    bag, reading
+        The bag.
+    scene
+        The scene.
+    crank_topic
+        As typed.
+    output
+        Where a new bag goes; nothing for none.
+
+    Raises
+    ------
+    LinkageError
+        Where the scene cannot be run over the bag, there is nothing to compare and none to write,
+        or the new bag cannot be written.
+
+    """
+    check_drives(scene, scene.members[0].content.file)
+    run, recorded = _own_account(bag)
+    topic = find_crank_topic(bag, reading.glance(), scene, run, recorded, crank_topic)
+    source = Source(bag, run, recorded, topic)
+    what_if = WhatIf(scene, recorded)
+    names = names_for(source, scene, what_if)
+    _check_joints(bag, scene, recorded, output)
+    kinds = {run.joint_states_topic: JOINT_STATE}
+    kinds |= dict(zip(names.extras, (extra.message for extra in what_if.extras), strict=True))
+    shared = [name for name in (run.joint_states_topic, *run.extras) if name and name in kinds]
+    comparison = Comparison([(name, kinds[name]) for name in shared])
+    new_bag = NewBag(output, source, scene, what_if, names) if output is not None else None
+    own = own_joint_states(recorded) if recorded is not None else bool
+    begin: list[int] = []
+    published = 0
+    try:
+        with reading.told() as messages:
+            for event in what_if.run(recorded_events(run, own, messages, topic)):
+                if new_bag is not None:
+                    new_bag.add(event)
+                if isinstance(event, Remade):
+                    if event.tick is not None and event.tick.message:
+                        published += 1
+                    then, now = _side_by_side(event, run, names, shared)
+                    if any(then) or any(now):
+                        begin = begin or [event.time]
+                        comparison.add(At(comparison.ticks + 1, event.time), then, now)
+    finally:
+        if new_bag is not None:
+            new_bag.close()
+    comparison.settle()
+    turning = turning_joints(scene) | (turning_joints(recorded) if recorded else {})
+    recorded_joints = recorded.joints if recorded is not None else ()
+    return bag_account(bag, scene, reading, begin) | {
+        'crank_topic': topic,
+        'joint_states': published,
+        'topics': [topic_account(each) for each in comparison.topics],
+        'joints': joints_account(comparison, turning),
+        'joints_only_recorded': [name for name in recorded_joints if name not in scene.joints],
+        'joints_only_now': [name for name in scene.joints if name not in recorded_joints],
+        'new_bag': str(output) if new_bag is not None else None,
+        'written': new_bag.counts if new_bag is not None else {},
+    }
+
+
+def _own_account(bag: Bag) -> tuple[RunAccount, Scene | None]:
+    """Return what a bag says of its run; blank and nothing where it does not."""
+    try:
+        return run_account(bag), recorded_scene(bag)
+    except LinkageError as error:
+        print(
+            f'linkage replay: nothing to compare with: {error.where}: {error.reason}',
+            file=sys.stderr,
+        )
+        return RunAccount(), None
+
+
+def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path | None) -> None:
+    """Refuse where nothing would come of it."""
+    if output is not None or recorded is None or set(recorded.joints) & set(scene.joints):
+        return
+    raise LinkageError(
+        scene.members[0].content.file,
+        f'publishes {listed(scene.joints)}, and {bag.path} holds {listed(recorded.joints)}: '
+        'nothing to compare',
+        'write a new bag with -o',
+    )
+
+
+def _side_by_side(
+    event: Remade, run: RunAccount, names: Names, shared: list[str]
+) -> tuple[list[bytes], list[bytes]]:
+    """Return what a tick has made on each topic that both runs have, then and now."""
+    then = dict(zip((run.joint_states_topic, *run.extras), event.recorded, strict=False))
+    now: dict[str, bytes] = {}
+    if event.tick is not None:
+        now = dict(zip(names.extras, event.tick.extras, strict=False))
+        now[run.joint_states_topic] = event.tick.message
+    return [then.get(name, b'') for name in shared], [now.get(name, b'') for name in shared]
+
+
+# Run the scene of a bag once more over its samples, and compare.
+#
+# Every joint state, and what else was published, is made anew and held against the recorded bytes.
+# Exit code 0: all are the same; 3: some differ; 1: it could not be told, was stopped, or the bag
+# is damaged and what lies before the damage is the same.
+#
+# With --scene another scene is run, and its joints are compared with the recorded ones; -o writes
+# it to a new bag, which replays by itself. Then a difference is no failure.
+
+EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('bag', type=Path, help="the bag's folder or its .mcap file")
+    parser.add_argument('--scene', type=Path, help='another scene to run, or a linkage')
+    parser.add_argument(
+        '-o', '--output', type=Path, metavar='NEWBAG', help='folder of a new bag; with --scene'
+    )
+    parser.add_argument(
+        '--crank-topic',
+        help="the samples' topic, with --scene; absent, the run's own, /crank_states, or the only "
+        'one that has the input joints',
+    )
+    parser.add_argument('--json', action='store_true', help='the same as JSON')
+    add_trust(parser)
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Replay the bag; the module says what is returned."""
+    for option, value in (('-o', arguments.output), ('--crank-topic', arguments.crank_topic)):
+        if value is not None and arguments.scene is None:
+            raise LinkageError(option, 'is for another scene', 'name it with --scene')
+    bag = opened(arguments.bag, stop)
+    reading = BagReading(bag, stop)
+    if arguments.scene is None:
+        account = replayed(bag, reading, trust_effects=arguments.trust_effects)
+        code = {IDENTICAL: 0, DIFFERENT: EXIT_DIFFERENT}.get(account['verdict'], EXIT_INCOMPLETE)
+    else:
+        scene = load_scene(arguments.scene)
+        if RUN_FILE in bag.attachments and 'seed' not in scene.members[0].content:
+            # What differs is the scene, and not the noise.
+            scene = replace(scene, seed=run_account(bag).seed)
+        account = replayed_with(bag, reading, scene, arguments.crank_topic, arguments.output)
+        code = 0
+    if arguments.json:
+        print(json.dumps(account, indent=1, allow_nan=False))
+    elif arguments.scene is None:
+        _show_proof(account)
+    else:
+        _show_what_if(account)
+    for line in _shortcomings(account):
+        print(f'linkage replay: {line}', file=sys.stderr)
+    return code or (EXIT_INCOMPLETE if reading.damage or reading.stopped else 0)
+
+
+def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> dict[str, Any]:
+    """
+    Run a bag's own scene once more; return what came of it.
+
+    Raises
+    ------
+    LinkageError
+        Where the bag carries no scene that can be run, or nothing to compare.
+
+    """
+    try:
+        scene = scene_of(bag, trust_effects=trust_effects)
+    except BagError as error:
+        raise BagError(error.where, error.reason, 'name a scene to run with --scene') from None
+    begin: list[int] = []
+
+    def look(tick: ReplayedTick) -> None:
+        if not begin:
+            begin.append(tick.time)
+
+    with reading.told() as messages:
+        proof = prove(bag, scene, messages, look)
+    if not begin and not reading.damage and not reading.stopped:
+        raise BagError(bag.path, 'holds no joint states', 'record a run with a crank')
+    run = run_account(bag)
+    versions = {
+        'bag': {**run.versions, **run.own_effects},
+        'here': {**versions_here(), **own_effects_here(scene)},
+    }
+    account = proof_account(proof, turning_joints(scene), versions)
+    return bag_account(bag, scene, reading, begin) | account
+
+
+def _show_proof(account: dict[str, Any]) -> None:
+    begin = account['begin_ns'] or 0
+    differ, ticks = account['different_ticks'], account['compared_ticks']
+    verdict = account['verdict']
+    if verdict == IDENTICAL:
+        text = f'identical: what {ticks} ticks have made comes to the same again'
+    else:
+        text = f'{verdict}: {differ} of {ticks} ticks differ' if ticks else verdict
+    print(f'{account["bag"]}: {text}')
+    if account['beginning_missing']:
+        print(account['beginning_missing'])
+    for gap in account['gaps'] if differ else ():
+        print(clean(gap))
+    first = account['first_difference']
+    if first and differ:
+        print(clean(f'first: {first_text(first, begin)}'))
+        last = account['last_different_tick']['tick']
+        if last < account['ticks'] and last != first['tick']:
+            print(f'from tick {last + 1} on all are the same')
+    elif first:
+        print(clean(f'not told, first: {first_text(first, begin)}'))
+    if account['withheld_ticks']:
+        print(f'{account["withheld_ticks"]} ticks are without a message, then and now')
+    for line in versions_text(account['versions']):
+        print(line)
+    print()
+    show(topics_table(account))
+    if account['greatest']:
+        print()
+        show(greatest_table(account, begin))
+
+
+def _show_what_if(account: dict[str, Any]) -> None:
+    print(
+        f'{account["bag"]}, as {account["scene"]}: {account["joint_states"]} joint states, '
+        f'from {clean(account["crank_topic"])}'
+    )
+    for key, when in (('joints_only_recorded', 'recorded'), ('joints_only_now', 'now')):
+        if account[key] and account['topics']:
+            print(f'only {when}: {", ".join(account[key])}')
+    if account['topics']:
+        print()
+        show(topics_table(account))
+    if account['joints']:
+        print()
+        show(joints_table(account, account['begin_ns'] or 0))
+    if account['new_bag']:
+        print()
+        counts = ', '.join(f'{count} of {name}' for name, count in account['written'].items())
+        print(f'{account["new_bag"]}: {counts}')
+
+
+def _shortcomings(account: dict[str, Any]) -> Iterator[str]:
+    """Yield why not all of the bag was replayed."""
+    if account['truncated']:
+        yield f'{account["bag"]}: unfinished: {account["unfinished"]}; what it holds was replayed'
+    if account['damage']:
+        yield f'{account["damage"]}; what lies before was replayed'
+    if account['stopped']:
+        yield 'stopped; the rest of the bag was not replayed'

@@ -35,10 +35,17 @@ from typing import Any
 
 from linkage_ros.bag.contents import layout_of
 from linkage_ros.bag.reader import Bag
-from linkage_ros.cli.bag_account import account_of, scene_account
-from linkage_ros.cli.bag_reading import add_trust, beside, gaps, opened, scene_of
+from linkage_ros.cli.bag_reading import (
+    account_of,
+    add_trust,
+    beside,
+    gaps,
+    opened,
+    scene_account,
+    scene_of,
+)
 from linkage_ros.cli.info import tables
-from linkage_ros.cli.progress import progress
+from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.atomic_write import replace_whole
 from linkage_ros.report.blocks import Progress

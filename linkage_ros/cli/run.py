@@ -12,19 +12,31 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """A run as it goes: a table that renews itself with rich, a line a second without."""
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Sequence
 from importlib.util import find_spec
+from math import inf
+from pathlib import Path
 import sys
+from threading import Event
 from time import monotonic
 from typing import Any
 
+from linkage_ros.bag.reader import read_bag
+from linkage_ros.cli.bag_reading import gaps
+from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.node.node import LinkageNode
+from linkage_ros.node.run import run_linkage_node
 from linkage_ros.node.tick_loop import TickLoop
+from linkage_ros.pipeline.pipeline import Pipeline
+from linkage_ros.replay.replay import recorded_scene, ReplayedTick
+from linkage_ros.replay.verify import beginning_text, DIFFERENT, prove, UNTOLD
+from linkage_ros.signals import heeded
 
 _RICH = find_spec('rich') is not None
 if _RICH:
@@ -134,3 +146,148 @@ def _table(loop: TickLoop, rate: float) -> Any:
     for name, value, speed in values:
         table.add_row(name, f'{value:+.6f}', '' if speed is None else f'{speed:+.5f}')
     return Group(status, table)
+
+
+# What a run came to, in a few lines.
+
+
+def summary(node: LinkageNode) -> str:
+    """Return the summary of a node's last run."""
+    loop = node.loop
+    if loop is None:
+        return 'nothing ran'
+    counts = loop.counts
+    per_second = counts.ticks / loop.seconds
+    rows = [('ticks', f'{counts.ticks} in {loop.seconds:.2f} s, {per_second:.1f} a second')]
+    if counts.lateness.count:
+        p50, p99 = (counts.lateness.percentile(p) / 1e3 for p in (50, 99))
+        longest = counts.lateness.longest / 1e3
+        rows += [
+            ('', f'{counts.late} late by more than a period, {counts.lost} lost'),
+            ('lateness', f'p50 {p50:.0f} µs, p99 {p99:.0f} µs, max {longest:.0f} µs'),
+        ]
+    rows += [
+        ('published', f'{counts.published} joint states; {counts.silent} ticks without a crank'),
+    ]
+    if counts.withheld:
+        rows.append(('withheld', f'{counts.withheld} readings, by what the scene does to sensors'))
+    if node.crank_topic:
+        rows.append(('samples', loop.samples))
+    rows += [
+        (status.value, f'{counts.unclosed[status]} ticks')
+        for status in Status
+        if counts.unclosed[status]
+    ]
+    for memory in node.recording.memories:
+        rows += [
+            (
+                'memory',
+                f'{t.name}: {t.received} received, {t.kept} in it at the end, {t.let_go} let go'
+                + (f', {t.dropped} dropped' if t.dropped else ''),
+            )
+            for t in memory.topics
+        ]
+        rows.append(('snapshots', memory.snapshots))
+    for recording in node.recording.ended:
+        rows += [
+            (
+                'recorded',
+                f'{t.name}: {t.recorded} of {t.received}, {t.dropped} dropped'
+                + (f', {t.let_go} let go with the oldest files' if t.let_go else ''),
+            )
+            for t in recording.topics
+        ]
+        rows += [('bag', str(recording.folder)), ('proof', _proof(recording.folder))]
+    if node.recording.failure:
+        rows.append(('FAILED', node.recording.failure))
+    return '\n'.join(f'{name:<14}{text}' for name, text in rows)
+
+
+def _proof(folder: Path) -> str:
+    """Replay a bag: whether it gives the same bytes, and how well its loop closed."""
+    worst = 0.0
+
+    def look(replayed: ReplayedTick) -> None:
+        nonlocal worst
+        for closure, seen in zip(closures, replayed.tick.looks, strict=True):
+            if seen.position is not None and seen.position.joints:
+                worst = max(worst, closure.residual(seen.position))
+
+    try:
+        bag = read_bag(folder)
+        # The run was the user's own, and has imported them.
+        scene = recorded_scene(bag, trust_effects=True)
+        pipeline = Pipeline(scene)
+        closures = pipeline.closures
+        proof = prove(bag, scene, bag.messages(), look)
+    except LinkageError as error:
+        return str(error)
+    if proof.verdict == UNTOLD:
+        return f'{UNTOLD}: {beginning_text(proof)}'
+    names = ['joint states', *(extra.topic.removeprefix('~/') for extra in pipeline.extras)]
+    same = ' and '.join(
+        f'{topic.same} of {topic.recorded} {name}'
+        for name, topic in zip(names, proof.comparison.topics, strict=True)
+    )
+    notes = [beginning_text(proof)] if proof.beginning else []
+    if proof.verdict == DIFFERENT:
+        notes += gaps(bag)
+    notes.append(f'worst loop residual {worst:.1e} m')
+    return f'{same} replay to the same bytes; {"; ".join(notes)}'
+
+
+# Run a scene as a ROS 2 node, with a live display and a summary at the end.
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('scene', help='the scene file; or a linkage file, which it moves')
+    add_run_arguments(parser)
+    parser.add_argument(
+        '--ros-args', nargs=argparse.REMAINDER, default=[], help='remappings, parameters, QoS'
+    )
+
+
+def add_run_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments that every run has."""
+    parser.add_argument(
+        '--seconds', type=_seconds, default=inf, help='how long; without it, until Ctrl-C'
+    )
+    parser.add_argument('--runs', default='', metavar='FOLDER', help="folder of the bags' folders")
+    parser.add_argument('--plain', action='store_true', help='a line a second, no live display')
+
+
+def run(arguments: argparse.Namespace, stop: Event) -> int:
+    """Run the scene."""
+    ros = ['--ros-args', *arguments.ros_args] if arguments.ros_args else []
+    code, _ = run_scene(arguments.scene, arguments, stop, ros)
+    return code
+
+
+def run_scene(
+    scene: str, arguments: argparse.Namespace, stop: Event, ros: Sequence[str] = ()
+) -> tuple[int, Path | None]:
+    """Run a scene; return the exit code and the bag."""
+    bags: list[Path] = []
+
+    def at_end(node: LinkageNode) -> None:
+        bags.extend(recording.folder for recording in node.recording.ended)
+        print(summary(node))
+
+    with heeded():
+        code = run_linkage_node(
+            stop,
+            ros,
+            {'scene': scene, 'runs_directory': arguments.runs},
+            seconds=arguments.seconds,
+            view=Display(plain=arguments.plain),
+            at_end=at_end,
+        )
+    return code, bags[-1] if bags else None
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0.0 < seconds < 1e9:
+        raise argparse.ArgumentTypeError(f'{text} is not a time; write seconds, more than 0')
+    return seconds

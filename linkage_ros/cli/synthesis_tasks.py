@@ -23,9 +23,9 @@ from collections.abc import Iterator, Sequence
 from math import degrees, hypot, isfinite, pi, radians, remainder
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.cli.progress import Told
-from linkage_ros.cli.typed_numbers import numbers_of
+from linkage_ros.cli.terminal import Told
 from linkage_ros.errors import LinkageError, listed
+from linkage_ros.files.tables import numbers_of
 from linkage_ros.synthesis.defects import assess, Assessment, misses, Needs
 from linkage_ros.synthesis.design import Design
 from linkage_ros.synthesis.pairs.freudenstein import exact, fit_equation, ThreePairs

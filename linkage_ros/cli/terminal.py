@@ -12,15 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """Tables for a terminal: drawn by rich where it is there, aligned with spaces elsewhere."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 import sys
-from typing import NamedTuple
+from time import monotonic
+from typing import Any, NamedTuple, TextIO
 
 from linkage_ros.errors import clean, shortened
 
@@ -111,3 +112,73 @@ def _drawn(table: Table) -> object:
     for row in table.rows:
         drawn.add_row(*(Text(cell) for cell in row))
     return drawn
+
+
+# How far something long has come: a bar by rich on a terminal, a line now and then elsewhere.
+
+Told = Callable[[int, int], None]
+"""Takes how much is done, and of how much."""
+
+_EVERY = 5.0
+"""Seconds between two lines."""
+
+
+@contextmanager
+def progress(what: str) -> Iterator[Told]:
+    """Give a function to tell progress to; what is told goes to standard error."""
+    if sys.stderr.isatty() and find_spec('rich') is not None:
+        from rich.console import Console
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+
+        columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=Console(file=sys.__stderr__), transient=True) as bars:
+            task = bars.add_task(what, total=None)
+            yield lambda done, of: bars.update(task, completed=done, total=of)
+        return
+    told = monotonic()
+
+    def line(done: int, of: int) -> None:
+        nonlocal told
+        if monotonic() - told >= _EVERY:
+            told = monotonic()
+            print(f'{what}: {done} of {of}', file=sys.stderr, flush=True)
+
+    yield line
+
+
+# Where lines go out: what a terminal would obey does not, whatever a file calls its topics.
+
+
+class Outlet:
+    """
+    A stream of text whose lines are printable; all else is that of the stream.
+
+    Parameters
+    ----------
+    stream
+        Standard output, say.
+
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write a text, of one line or several."""
+        if not text.isprintable():
+            text = '\n'.join(map(clean, text.split('\n')))
+        return self._stream.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def clean_output() -> None:
+    """Let standard output and standard error be clean; rich draws on what was there before."""
+    sys.stdout, sys.stderr = Outlet(sys.stdout), Outlet(sys.stderr)

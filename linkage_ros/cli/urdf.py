@@ -20,7 +20,7 @@ from __future__ import annotations
 import argparse
 from threading import Event
 
-from linkage_ros.cli.model_file import add_files, model_of, put
+from linkage_ros.cli.arguments import add_files, model_of, put
 from linkage_ros.robot_models.urdf import urdf
 
 

@@ -41,7 +41,7 @@ from linkage_ros.effects.stage import Motion, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.files.parameters import each, Number
 from linkage_ros.kinematics.arithmetic import facing
-from linkage_ros.kinematics.structure import Joint
+from linkage_ros.kinematics.topology import Joint
 
 _STIFFEST = 1e15
 

@@ -25,7 +25,7 @@ t′ being the time of the last message: nothing but the ticks' times decides, s
 the same messages. What does not move comes with the first of each second. A marker goes by itself
 after its lifetime, so that what is silent is not seen standing.
 
-Forces are arrows; see `linkage_ros.effects.marker_arrows`.
+Forces are arrows; see `linkage_ros.effects.marker_shapes`.
 
 Links are red while the conditioning of the group that they belong to (see
 `linkage_ros.kinematics.singularity_margin`) is below √2·sin(μ/2), μ being the threshold: of a
@@ -40,15 +40,14 @@ from dataclasses import dataclass
 from math import pi, radians, sin, sqrt
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.marker_arrows import Arrows
-from linkage_ros.effects.marker_shapes import ALARM, Key, marker_shapes
+from linkage_ros.effects.marker_shapes import ALARM, Arrows, Key, marker_shapes
 from linkage_ros.effects.stage import Motion, Reading, Writer
 from linkage_ros.files.parameters import number, text
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.structure import Driven, Dyad, Group
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.kinematics.topology import Driven, Dyad, Group
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.messages.marker_array import DELETE, MarkerArrayWriter
 

@@ -25,7 +25,6 @@ from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.files.section import Section
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.limit_checks import check_limits
 from linkage_ros.kinematics.linkage import (
     GROUND,
     Input,
@@ -37,6 +36,7 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
+from linkage_ros.kinematics.sweep_analysis import check_limits
 from linkage_ros.resources import named_file
 
 _KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose', 'masses')

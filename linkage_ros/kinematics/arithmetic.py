@@ -24,6 +24,8 @@ from __future__ import annotations
 import cmath
 from collections.abc import Callable, Sequence
 import math
+from math import pi
+from math import remainder as math_remainder
 from typing import Any
 
 
@@ -148,3 +150,22 @@ def _real(symbol: Any, name: str, *arguments: Any) -> float:
 def _complex(symbol: Any, name: str, *arguments: Any) -> complex:
     found: complex = symbol.apply(name, *(arguments or (symbol,)))
     return found
+
+
+# Vectors and lines of the plane.
+
+
+def cross(one: complex, other: complex) -> float:
+    """Return the z component of the cross product of two vectors."""
+    return one.real * other.imag - one.imag * other.real
+
+
+def resolved(vector: complex, unit: complex) -> tuple[float, float]:
+    """Return a vector's parts along a unit vector and to the left of it."""
+    turned = vector * unit.conjugate()
+    return turned.real, turned.imag
+
+
+def folded(angle: float) -> float:
+    """Return the acute angle between two lines, of an angle between them, in [rad]."""
+    return abs(math_remainder(angle, pi))

@@ -28,7 +28,7 @@ from math import tau
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.newton_group import Iteration
-from linkage_ros.kinematics.structure import Iterated
+from linkage_ros.kinematics.topology import Iterated
 import numpy as np
 
 if TYPE_CHECKING:

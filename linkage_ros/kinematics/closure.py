@@ -32,12 +32,10 @@ from typing import Any, ClassVar, NamedTuple, TYPE_CHECKING
 from linkage_ros.errors import clean, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.checks import check
-from linkage_ros.kinematics.cylinder import without_mirrored, zero_length
-from linkage_ros.kinematics.limits import Bounds, limited
+from linkage_ros.kinematics.limits import Bounds, limited, without_mirrored, zero_length
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.machine_ranges import input_ranges
 from linkage_ros.kinematics.plan import Planner
-from linkage_ros.kinematics.ranges import closing_ranges, InputRange
+from linkage_ros.kinematics.ranges import closing_ranges, input_ranges, InputRange
 from linkage_ros.kinematics.singularity_margin import (
     Nearness,
     nearness,
@@ -46,8 +44,7 @@ from linkage_ros.kinematics.singularity_margin import (
 )
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import Pose, State
-from linkage_ros.kinematics.structure import Structure
-from linkage_ros.kinematics.topology import find_groups
+from linkage_ros.kinematics.topology import find_groups, Structure
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Batch

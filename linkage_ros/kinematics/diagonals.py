@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The diagonal between two links that are pinned together: crank pin to ground pivot."""
 
 from __future__ import annotations
@@ -20,12 +19,114 @@ from __future__ import annotations
 from fractions import Fraction
 import math
 from math import fsum, inf, pi
+from typing import NamedTuple, Protocol
 
-from linkage_ros.kinematics.arithmetic import atan2, cos, sin, sqrt, where
-from linkage_ros.kinematics.diagonal import Diagonal, Growth, GrowthChange
+from linkage_ros.kinematics.arithmetic import atan2, cos, phase, sin, sqrt, where
 from linkage_ros.kinematics.rounding import passes_zero, reach, Root, root_of, SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
+
+# The diagonal of a dyad: from its first outer pin A to its second outer pin D.
+#
+# Two pins that lie on links which are themselves pinned together, at O, are as crank pin and
+# ground pivot of a four-bar: `CrankDiagonal`. Its half-angle form loses nothing where OA lies
+# along OD (a change point), where the coordinates of A and D cancel. For all others there are the
+# coordinates: `FreeDiagonal`.
+
+
+class Diagonal(NamedTuple):
+    """
+    The vector from A to D at one state of the linkage.
+
+    Attributes
+    ----------
+    square
+        s² = |AD|²; 0 where no direction can be told.
+    direction
+        Of AD, in [rad].
+    fold, stretch
+        √(s² − lower²) and √(upper² − s²): how far the dyad is from its limits. Signed at a change
+        point; the latter is 1 where the dyad has no upper limit.
+    gap
+        What A and D are too near or too far by; 0 where the dyad closes.
+    near, far
+        2·√(ad)·sin(φ/2) and 2·√(ad)·cos(φ/2) of a `CrankDiagonal`, else 0.
+    excess
+        What s² has beyond the diagonal's ``least``, its constant part.
+    status
+        Of the dyad, as far as the diagonal decides it.
+
+    """
+
+    square: float
+    direction: float
+    fold: float
+    stretch: float
+    gap: float
+    near: float
+    far: float
+    excess: float
+    status: Status
+
+
+class Growth(NamedTuple):
+    """
+    The rates of a diagonal: ṡ/s = swing·growth, and its direction's rate is base + swing·turn.
+
+    Growth and turn may be huge where A is next to D. What they are multiplied by in a dyad is as
+    small then: that product comes first. ``lean`` is the growth by fold and stretch: at a change
+    point all three are 0, and it is not.
+    """
+
+    growth: float
+    turn: float
+    swing: float
+    base: float
+    lean: float
+
+
+class GrowthChange(NamedTuple):
+    """
+    The derivative of a `Growth`, ṡ²/s² added to that of ṡ/s.
+
+    That is s̈/s = change·growth + swing²·pull, which is no difference of large numbers where A is
+    next to D; and the direction's is base + change·turn + swing²·swirl.
+
+    The bend is what the pull leaves of a dyad's own second derivative (each dyad says what), by
+    fold and stretch: near a change point a difference of large numbers, so a `CrankDiagonal` tells
+    it in the place of the pull, where all others leave it to the dyad.
+    """
+
+    pull: float
+    swirl: float
+    change: float
+    base: float
+    bend: float | None
+
+
+class AnyDiagonal(Protocol):
+    """
+    What a dyad asks of a diagonal.
+
+    Attributes
+    ----------
+    least
+        A constant that s² is never below.
+
+    """
+
+    least: Fraction
+
+    def at(self, known: State, /) -> Diagonal:
+        """Return the diagonal."""
+
+    def rates(self, diagonal: Diagonal, known: State, speeds: State, /) -> Growth:
+        """Return how the diagonal grows and turns."""
+
+    def accelerations(
+        self, diagonal: Diagonal, growth: Growth, known: State, speeds: State, changes: State, /
+    ) -> GrowthChange:
+        """Return the derivative of `rates`."""
 
 
 class CrankDiagonal:
@@ -262,3 +363,90 @@ class UnsignedDiagonal(CrankDiagonal):
     def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
         """Return near by fold and far by stretch."""
         return diagonal.near / diagonal.fold, diagonal.far / diagonal.stretch
+
+
+# The diagonal between any two pins, from their coordinates.
+
+
+class FreeDiagonal:
+    """
+    The diagonal between two pins, from their coordinates.
+
+    Parameters
+    ----------
+    ends
+        Indices of A and D among the pins.
+    limits
+        lower and upper of s, and upper² − lower², as of a `CrankDiagonal`.
+
+    """
+
+    __slots__ = ('_ends', '_limits')
+
+    least = Fraction(0)
+
+    def __init__(self, ends: tuple[int, int], limits: tuple[float, float, float]) -> None:
+        self._ends = ends
+        self._limits = (*limits, limits[1] != inf)
+
+    def at(self, known: State) -> Diagonal:
+        """Return the diagonal."""
+        start, end = (known.pins[i] for i in self._ends)
+        return free_diagonal(end - start, abs(start) + abs(end), *self._limits)
+
+    def rates(self, diagonal: Diagonal, known: State, speeds: State) -> Growth:
+        """Return the velocity of D against A, divided by AD."""
+        first, second = self._ends
+        vector = known.pins[second] - known.pins[first]
+        return free_growth(diagonal, vector, speeds.pins[second] - speeds.pins[first])
+
+    def accelerations(
+        self, _diagonal: Diagonal, growth: Growth, known: State, _speeds: State, changes: State
+    ) -> GrowthChange:
+        """Return the derivative of `rates`."""
+        first, second = self._ends
+        vector = known.pins[second] - known.pins[first]
+        return free_growth_change(growth, vector, changes.pins[second] - changes.pins[first])
+
+
+def free_diagonal(
+    vector: complex, size: float, lower: float, upper: float, span: float, bounded: bool = True
+) -> Diagonal:
+    """Return the diagonal of a vector whose ends have coordinates of a size."""
+    s = abs(vector)
+    square = s * s
+    if square < SMALLEST:
+        status = Status.OPEN if lower else Status.INDETERMINATE
+        return Diagonal(0.0, 0.0, 0.0, 0.0, lower, 0.0, 0.0, 0.0, status)
+    folding, stretching = (s - lower) * (s + lower), 1.0
+    fold, stretch = root_of(folding, (size + lower) * (s + lower)), Root(1.0)
+    if fold.status is Status.OPEN:
+        gap = fold.missing / (s + lower)
+        return Diagonal(square, 0.0, 0.0, 0.0, gap, 0.0, 0.0, 0.0, Status.OPEN)
+    if bounded:
+        stretching = (upper - s) * (upper + s)
+        stretch = root_of(stretching, (size + upper) * (upper + s))
+    if stretch.status is Status.OPEN:
+        gap = stretch.missing / (upper + s)
+        return Diagonal(square, 0.0, 0.0, 0.0, gap, 0.0, 0.0, 0.0, Status.OPEN)
+    root_fold, root_stretch, status = fold.root, stretch.root, Status.CLOSED
+    if Status.TOGGLE in (fold.status, stretch.status):
+        status = Status.TOGGLE
+    elif bounded:
+        folds = folding < stretching
+        root_fold = sqrt(where(folds, folding, span - stretching))
+        root_stretch = sqrt(where(folds, span - folding, stretching))
+    return Diagonal(square, phase(vector), root_fold, root_stretch, 0.0, 0.0, 0.0, square, status)
+
+
+def free_growth(diagonal: Diagonal, vector: complex, velocity: complex) -> Growth:
+    """Return how a diagonal grows that changes at a velocity."""
+    unit = velocity / vector
+    return Growth(unit.real, unit.imag, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch)
+
+
+def free_growth_change(growth: Growth, vector: complex, pull: complex) -> GrowthChange:
+    """Return the derivative of `free_growth`, of a diagonal that changes at an acceleration."""
+    square = pull / vector
+    square += growth.turn * (growth.turn - 2j * growth.growth)
+    return GrowthChange(square.real, square.imag, 0.0, 0.0, None)

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The links that are known so far, where they lie, and the steps that place their points.
 
@@ -22,16 +21,82 @@ scaling rounds nothing. A point is placed by a step of its own, and only when it
 
 from __future__ import annotations
 
-from cmath import rect
+from cmath import phase, rect
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from math import frexp, hypot, ldexp
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
 from linkage_ros.kinematics.linkage import GROUND, Linkage, Point
 from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail
 from linkage_ros.kinematics.step import Step
-from linkage_ros.kinematics.structure import Joint, Structure
+from linkage_ros.kinematics.topology import Joint, Structure
+
+# Where links and sliders are, in terms of the coordinates of a solution.
+
+
+@dataclass(frozen=True, slots=True)
+class Angle:
+    """
+    A link's angle: a coordinate and a constant, in [rad].
+
+    ``unit`` is e^{i·constant}, made from lengths where they are known: an axis stays one, and no
+    angle is rounded at the size of a sum.
+    """
+
+    coordinate: int
+    constant: float
+    unit: complex
+
+    def plus(self, angle: float, unit: complex | None = None) -> Angle:
+        """Return the angle of what stands at a constant angle to the link."""
+        turned = rect(1.0, angle) if unit is None else unit
+        return Angle(self.coordinate, self.constant + angle, self.unit * turned)
+
+    def along(self, vector: complex) -> Angle:
+        """Return the angle of a vector of the link."""
+        return self.plus(phase(vector), vector / abs(vector))
+
+
+@dataclass(frozen=True, slots=True)
+class Slide:
+    """A slide: ± a coordinate, and a constant, in the unit of the lengths."""
+
+    coordinate: int
+    sign: float
+    constant: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """
+    Where a link is held: its ``point``, in its own frame, lies where ``at`` of ``link`` does.
+
+    With a ``slide``, it lies that far along a line from there, whose ``direction`` is a unit
+    vector in the frame of ``link``. A ``pin`` is the number of a pin that an iteration has placed.
+    """
+
+    point: complex
+    link: str
+    at: complex = 0j
+    slide: Slide | None = None
+    direction: complex = 1 + 0j
+    pin: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """
+    The way of a point of one link along a slider, in the frame of the link that it slides on.
+
+    The point lies at start + sign·(slide of the slider)·direction, a unit vector; ``angle`` is
+    that of the moving link less that of the other one.
+    """
+
+    start: complex
+    direction: complex
+    angle: float
+    sign: float
 
 
 class KnownLinks:

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The limits of a linkage's joints: which states are beyond them.
 
@@ -22,19 +21,23 @@ that of its turns which lies nearest to the middle of its limits, since it is th
 
 from __future__ import annotations
 
+from cmath import rect
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from math import inf, pi, remainder, tau
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.linkage import Limits, Linkage, RevoluteJoint
-from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
+from linkage_ros.kinematics.linkage import GROUND, Limits, Linkage, RevoluteJoint
+from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array, Mask
     from linkage_ros.kinematics.closure import Position
+    from linkage_ros.kinematics.ranges import InputRange
+    from linkage_ros.kinematics.topology import Structure
+
 
 _UNDISTURBED = (Status.CLOSED, Status.CHANGE_POINT)
 """What a state beyond the limits would be without them; a toggle stays one, without rates."""
@@ -170,3 +173,86 @@ def _bound(name: str, number: int, limits: Limits, *, turning: bool = False) -> 
         return Bound(name, number, low - slack, high + slack, None)
     slack += _ROUNDINGS * UNIT_ROUNDOFF * pi
     return Bound(name, number, low - slack, high + slack, 0.5 * (low + high))
+
+
+# Cylinders: driven slides whose length has a mirror image below zero.
+#
+# A rod that slides in a tube, each pinned to the rest by one pin that lies on the line, holds the
+# two pins apart by a length. With the tube turned about, minus that length holds them just so, and
+# nothing else of the linkage moves: every pose has a second one that no machine has.
+
+
+def zero_length(linkage: Linkage, structure: Structure, index: int) -> float | None:
+    """
+    Return at which slide the two pins of a cylinder meet.
+
+    Parameters
+    ----------
+    linkage, structure
+        The linkage.
+    index
+        Number of the input.
+
+    Returns
+    -------
+    zero : float or None
+        In [m]; None where the input is not a cylinder.
+
+    """
+    name = linkage.inputs[index].slider
+    if not name:
+        return None
+    slider = linkage.sliders[name]
+    tube, rod = slider.along, structure.blocks[name]
+    turned = {link for given in linkage.inputs for link in (given.parent, given.child)}
+    if GROUND in (tube, rod) or not turned.isdisjoint((tube, rod)):
+        return None
+    places = []
+    for link in (tube, rod):
+        joints = [joint for joint in structure.joints if link in (joint.link, joint.to)]
+        pins = {joint.name for joint in joints if joint.kind == 'R'}
+        if len(pins) != 1 or sum(joint.kind == 'P' for joint in joints) != 1:
+            return None
+        places.append(complex(*structure.links[link][pins.pop()]))
+    at_tube, at_rod = places
+    through = complex(*structure.links[tube][slider.through])
+    along = complex(*slider.direction) / abs(complex(*slider.direction))
+    arm = at_rod - complex(*structure.links[rod][slider.point])
+    angle = slider.angle if slider.block else 0.0
+    # From pin to pin where the slide is 0, along the line and across it.
+    between = (through - at_tube + rect(1.0, angle) * arm) * along.conjugate()
+    size = abs(through) + abs(at_tube) + abs(arm)
+    return -between.real if abs(between.imag) <= ROUNDING * size else None
+
+
+def without_mirrored(
+    linkage: Linkage, structure: Structure, index: int, ranges: tuple[InputRange, ...]
+) -> tuple[InputRange, ...]:
+    """
+    Return the ranges of an input, of a cylinder those in which its length is positive.
+
+    They are the others where its pose or its limits say so, and where there are no such ones.
+
+    Parameters
+    ----------
+    linkage, structure
+        The linkage.
+    index
+        Number of the input.
+    ranges
+        All ranges.
+
+    """
+    zero = zero_length(linkage, structure, index)
+    if zero is None:
+        return ranges
+    positive = tuple(
+        one._replace(lowest=max(one.lowest, zero)) for one in ranges if one.highest > zero
+    )
+    negative = tuple(
+        one._replace(highest=min(one.highest, zero)) for one in ranges if one.lowest < zero
+    )
+    pose, limits = linkage.pose, linkage.inputs[index].limits
+    if limits.high <= zero or (pose and pose.inputs[index] < zero):
+        return negative or positive
+    return positive or negative

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 Links that no dyad covers (class III and higher), by Newton's method on their constraints.
 
@@ -30,29 +29,40 @@ inputs is followed anew for each state, with the same proof that no other assemb
 
 from __future__ import annotations
 
+from cmath import phase
 from collections.abc import Sequence
 from math import hypot, inf, isnan, nan
 from operator import add, sub
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TYPE_CHECKING
 
+from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.arithmetic import called, is_found
-from linkage_ros.kinematics.branch import Continuation
-from linkage_ros.kinematics.branch_part import Branch, Start
-from linkage_ros.kinematics.compiling.function import straight
+from linkage_ros.kinematics.branch import Branch, Continuation, Start
+from linkage_ros.kinematics.compiling.python import straight
 from linkage_ros.kinematics.equations import (
     along,
     Array,
     Constraint,
     derivative,
+    End,
     equations,
+    Facing,
     line_motion,
+    Meeting,
     OnLine,
+    Parallel,
 )
-from linkage_ros.kinematics.initial_guess import StartingPose
+from linkage_ros.kinematics.initial_guess import starting_pose, StartingPose
+from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State, Step
+from linkage_ros.kinematics.topology import Joint
 import numpy as np
+
+if TYPE_CHECKING:
+    from linkage_ros.kinematics.plan import Planner
+
 
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
 """Of the size of the coordinates: what a constraint may be off by at a solution."""
@@ -487,3 +497,113 @@ def _solved(pose: IteratedPose, drift: Sequence[float]) -> list[float]:
 def _solve(jacobian: Array, *drift: float) -> list[float]:
     found: list[float] = np.linalg.solve(jacobian, np.negative(drift)).tolist()
     return found
+
+
+# The joints of links that no dyad covers, as constraints of an `Iteration`.
+
+
+class Constraints:
+    """
+    What holds a group of links.
+
+    Parameters
+    ----------
+    linkage
+        The linkage.
+    joints
+        Those of the group.
+    links
+        The links of the group.
+    planner
+        Knows and places what comes before the group.
+
+    Attributes
+    ----------
+    slides
+        The sliders of the group, by name.
+
+    """
+
+    def __init__(
+        self, linkage: Linkage, joints: Sequence[Joint], links: Sequence[str], planner: Planner
+    ) -> None:
+        self._linkage = linkage
+        self._planner = planner
+        self._links = links
+        self._bodies = {link: i for i, link in enumerate(links)}
+        self._constraints: list[Constraint] = []
+        self._known_pins: dict[str, int] = {}
+        self.slides: dict[str, OnLine] = {}
+        for joint in joints:
+            self._add_joint(joint)
+        self._add_drives()
+
+    def iteration(self, before: tuple[Step, ...]) -> Iteration:
+        """Return the step that solves the group, given those before it."""
+        planner = self._planner
+
+        def place_known(
+            inputs: Sequence[float],
+        ) -> tuple[dict[str, complex], dict[str, float]]:
+            known = State([0.0, *inputs], [])
+            for step in before:
+                if not step.close(known).status.has_pose:
+                    raise DefinitionError(
+                        'pose.inputs',
+                        'what comes before the iterated links does not close there',
+                        'give inputs that the linkage can have',
+                    )
+            x, pins = known
+            return (
+                {name: pins[i] for name, i in self._known_pins.items()},
+                {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()},
+            )
+
+        start = starting_pose(
+            self._linkage, self._links, planner.blocks, planner.points, planner.scale, place_known
+        )
+        sliding = tuple(bool(given.slider) for given in self._linkage.inputs)
+        far = sum(
+            max(abs(one - other) for one in points.values() for other in points.values())
+            for points in planner.points.values()
+        )
+        return Iteration(
+            tuple(self._constraints), tuple(self.slides.values()), start, before, sliding, far
+        )
+
+    def _add_joint(self, joint: Joint) -> None:
+        if joint.kind == 'R':
+            self._constraints.append(
+                Meeting(self._end(joint.link, joint.name), self._end(joint.to, joint.name))
+            )
+            return
+        slider = self._linkage.sliders[joint.name]
+        block, rail = self._facing(joint.link, 0.0), self._facing(joint.to, 0.0)
+        self._constraints.append(Parallel(block, rail, slider.angle))
+        self.slides[joint.name] = OnLine(
+            self._end(joint.link, slider.point),
+            self._end(joint.to, slider.through),
+            self._facing(joint.to, phase(complex(*slider.direction))),
+        )
+        self._constraints.append(self.slides[joint.name])
+
+    def _add_drives(self) -> None:
+        for i, given in enumerate(self._linkage.inputs, 1):
+            if given.slider in self.slides:
+                self._constraints.append(self.slides[given.slider]._replace(slide=i))
+            elif given.child in self._bodies or given.parent in self._bodies:
+                child, parent = (self._facing(end, 0.0) for end in (given.child, given.parent))
+                self._constraints.append(Parallel(child, parent, 0.0, i))
+
+    def _end(self, link: str, name: str) -> End:
+        points = self._planner.points[link]
+        if link in self._bodies:
+            return End(self._bodies[link], points[name] - next(iter(points.values())))
+        self._known_pins[name] = self._planner.place(link, points[name])
+        return End(-1, 0j, self._known_pins[name])
+
+    def _facing(self, link: str, direction: float) -> Facing:
+        if link in self._bodies:
+            return Facing(self._bodies[link], 0, direction)
+        angle = self._planner.angles[link].plus(direction)
+        return Facing(-1, angle.coordinate, angle.constant)

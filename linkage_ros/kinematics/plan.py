@@ -23,25 +23,31 @@ from math import inf
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, listed, quoted
-from linkage_ros.kinematics.diagonal import AnyDiagonal
-from linkage_ros.kinematics.diagonals import CrankDiagonal, UnsignedDiagonal
-from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
-from linkage_ros.kinematics.dyads.driven_rrr import Carry, DrivenRRRDyad, Side
-from linkage_ros.kinematics.dyads.folding_rrr import FoldingRRRDyad
-from linkage_ros.kinematics.dyads.prp import PRPDyad
+from linkage_ros.kinematics.arithmetic import cross, resolved
+from linkage_ros.kinematics.diagonals import (
+    AnyDiagonal,
+    CrankDiagonal,
+    FreeDiagonal,
+    UnsignedDiagonal,
+)
+from linkage_ros.kinematics.dyads.prp import CrankPRPDyad, PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad, swivel_diagonal
 from linkage_ros.kinematics.dyads.rrp import RRPDyad
-from linkage_ros.kinematics.dyads.rrr import crank_diagonal, RRRDyad
-from linkage_ros.kinematics.free_diagonal import FreeDiagonal
-from linkage_ros.kinematics.known_links import KnownLinks
-from linkage_ros.kinematics.layout import Angle, Held, Line, Slide
+from linkage_ros.kinematics.dyads.rrr import (
+    Carry,
+    crank_diagonal,
+    DrivenRRRDyad,
+    FoldingRRRDyad,
+    RRRDyad,
+    Side,
+)
+from linkage_ros.kinematics.known_links import Angle, Held, KnownLinks, Line, Slide
 from linkage_ros.kinematics.linkage import Input, Linkage
-from linkage_ros.kinematics.plane import cross, resolved
 from linkage_ros.kinematics.point_steps import Turned
 from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
 from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
-from linkage_ros.kinematics.structure import Driven, Dyad, Iterated, Structure
+from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Structure
 
 _SIDES = {'RRR': {'left': 1, 'right': -1}, 'RRP': {'ahead': 1, 'behind': -1}}
 _SIDES['RPR'] = _SIDES['RRP']
@@ -325,7 +331,7 @@ class Planner(KnownLinks):
             self.pin_to(outer.link, outer)
 
     def _iterate(self, group: Iterated) -> None:
-        from linkage_ros.kinematics.constraints import Constraints  # local import: it loads numpy
+        from linkage_ros.kinematics.newton_group import Constraints  # local import: it loads numpy
 
         joints = self._structure.joints_of(group)
         constraints = Constraints(self._linkage, joints, group.links, self)

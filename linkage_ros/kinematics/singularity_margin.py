@@ -23,8 +23,7 @@ from math import atan, inf, pi, remainder, sin, sqrt, tau
 from operator import attrgetter
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.dyads.crank_prp import CrankPRPDyad
-from linkage_ros.kinematics.dyads.prp import PRPDyad
+from linkage_ros.kinematics.dyads.prp import CrankPRPDyad, PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad
 from linkage_ros.kinematics.status import Status

@@ -12,24 +12,98 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """What an input does to a linkage as it goes through its range: ways, samples, extremes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property
 from itertools import product
 from math import cos, inf, isfinite, nan, pi, remainder, tau
 from typing import NamedTuple
 
-from linkage_ros.kinematics.alone import pose_alone
+from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.closure import Closure, Position
-from linkage_ros.kinematics.cylinder import without_mirrored
-from linkage_ros.kinematics.golden import golden
-from linkage_ros.kinematics.machine_ranges import repeats, turns
-from linkage_ros.kinematics.ranges import InputRange, reach, search
+from linkage_ros.kinematics.limits import Bound, without_mirrored
+from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.ranges import (
+    describe,
+    golden,
+    InputRange,
+    reach,
+    repeats,
+    search,
+    turns,
+    within_own,
+    within_published,
+)
 from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import PLACED, Pose, State
+from linkage_ros.kinematics.topology import Driven, Dyad, links_of
+
+# The pose of one step of a solution, from the steps that it starts from and no others.
+
+
+def pose_alone(closure: Closure, number: int, *inputs: float) -> Callable[..., Pose]:
+    """
+    Return what gives the pose of a step, by the inputs, in [rad] and [m].
+
+    Of a hundred loops that hang side by side on a crank it closes one.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    number
+        Of the step.
+    *inputs
+        Where the linkage closes: where each step appends what it finds is looked up there.
+
+    """
+    needed = _needed(closure, closure.step_groups[number])
+    walked = closure.known(*inputs)
+    plan: list[tuple[Callable[[State], Pose], int, int]] = []
+    for step, group in zip(closure.steps[: number + 1], closure.step_groups, strict=False):
+        start = len(walked.coordinates), len(walked.pins)
+        # A pin is placed for the first group that asks for it, and serves others.
+        if step.close(walked) is PLACED or group in needed:
+            plan.append((step.close, *start))
+
+    def pose(*values: float) -> Pose:
+        state = closure.known(*values)
+        found: Pose = PLACED
+        for close, coordinates, pins in plan:
+            # What is left out has its places all the same, which nobody asks for.
+            state.coordinates.extend([0.0] * (coordinates - len(state.coordinates)))
+            state.pins.extend([0j] * (pins - len(state.pins)))
+            found = close(state)
+            if not found.status.has_pose:
+                break
+        return found
+
+    return pose
+
+
+def _needed(closure: Closure, number: int) -> set[int]:
+    """Return the groups that one starts from, and it."""
+    groups = closure.structure.groups
+    owner = {link: i for i, group in enumerate(groups) for link in links_of(group)}
+    needed: set[int] = set()
+    asked = [number]
+    while asked:
+        i = asked.pop()
+        if i not in needed:
+            needed.add(i)
+            group = groups[i]
+            if isinstance(group, Driven):
+                starts = [group.joint.to]
+            elif isinstance(group, Dyad):
+                starts = [joint.to for joint in group.outer]
+            else:
+                return set(range(number + 1))
+            asked += [owner[link] for link in starts if link != GROUND]
+    return needed
+
 
 _SAMPLES = 720
 _GRID = 24
@@ -454,3 +528,91 @@ def worst_residual(closure: Closure) -> tuple[float, tuple[float, ...], int] | N
         if position.status.has_pose
     ]
     return (*max(found), len(found)) if found else None
+
+
+# Limits that no state of a linkage meets, refused.
+
+
+def check_limits(closure: Closure) -> None:
+    """
+    Refuse limits between which a linkage cannot be.
+
+    Raises
+    ------
+    DefinitionError
+        Where the pose is beyond limits, the range of an input never meets its limits, or none of
+        the states in it brings a published joint within its own.
+
+    """
+    bounds, linkage = closure.bounds, closure.linkage
+    if not bounds:
+        return
+    if linkage.pose:
+        joints = closure.position(*linkage.pose.inputs).joints
+        bound = bounds.exceeded(linkage.pose.inputs, joints) if joints else None
+        if bound is not None:
+            raise DefinitionError(
+                'pose.inputs',
+                f'bring {quoted(bound.name)} to {bound.turned(joints[bound.number]):.6g}, '
+                f'beyond its limits {_limits(closure, bound)}',
+                'start within the limits, or widen them',
+            )
+    if len(linkage.inputs) == 1:
+        _check_single(closure)
+    elif not (linkage.pose and joints) and not _met_on_grid(closure):
+        names = listed(map(quoted, linkage.limits))
+        raise DefinitionError(
+            'input.limits',
+            f'no state was found within the limits of {names}',
+            'widen them, or name a pose within them',
+        )
+
+
+def _check_single(closure: Closure) -> None:
+    ranges, bounds = closure.closing_ranges, closure.bounds
+    if bounds.inputs:
+        (bound,) = bounds.inputs
+        ranges = within_own(closure, ranges)
+        if not ranges:
+            raise DefinitionError(
+                'input.limits',
+                f'{_limits(closure, bound)} of {quoted(bound.name)} never meet its range, '
+                f'{describe(closure.closing_ranges)}',
+                'widen them',
+            )
+    for bound in bounds.joints:
+        if not within_published(closure, ranges, [bound]):
+            low, high = _extent(closure, ranges, bound)
+            raise DefinitionError(
+                f'joints.{bound.name}.limits',
+                f'{_limits(closure, bound)} of {quoted(bound.name)} are never met: it goes from '
+                f'{low:.6g} to {high:.6g}',
+                'widen them',
+            )
+    if bounds.joints and not within_published(closure, ranges, bounds.joints):
+        names = listed(quoted(bound.name) for bound in bounds.joints)
+        raise DefinitionError(
+            'joints',
+            f'the limits of {names} are met, but never together',
+            'widen them',
+        )
+
+
+def _extent(closure: Closure, ranges: Iterable[InputRange], bound: Bound) -> tuple[float, float]:
+    """Return between which values a published joint goes, as near to its limits as turns let."""
+    values = [value for one in ranges for value in samples(one)]
+    found = [closure.position(value).joints for value in values]
+    turned = [bound.turned(joints[bound.number]) for joints in found if joints]
+    return min(turned), max(turned)
+
+
+def _met_on_grid(closure: Closure) -> bool:
+    return any(
+        position.joints and closure.bounds.exceeded(inputs, position.joints) is None
+        for inputs, position in grid(closure)
+    )
+
+
+def _limits(closure: Closure, bound: Bound) -> str:
+    limits = closure.linkage.limits[bound.name]
+    return str(limits)

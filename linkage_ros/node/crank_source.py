@@ -27,7 +27,7 @@ def main() -> int:
     """Run the source and return the exit code."""
     # First of all, as in `linkage_node`.
     stop = stop_on_signals()
-    crank_node = import_module('linkage_ros.node.crank_node')
+    crank_node = import_module('linkage_ros.node.demo_nodes')
     return int(crank_node.run_crank_source(stop))
 
 

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 A PD controller of one joint, for demos and tests: plain rclpy, as a user's own would be.
 
@@ -26,14 +25,83 @@ to hold against them. Where it hears nothing it commands nothing.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import cos, inf, sin, tau
+import sys
 from threading import Event
-from time import monotonic
+from time import monotonic, monotonic_ns, sleep, time_ns
+from typing import TypeVar
 
-from linkage_ros.node.companion import Companion, run_companion
+from linkage_ros.messages.joint_state import JointStateWriter
+from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.simulated_time import ClockGuard
+from linkage_ros.node.transports import leave_out_shared_memory
+from linkage_ros.signals import bounded_end
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
+
+# What the small nodes have in common that run beside the linkage's own, for demos and tests.
+
+
+class Companion(Node):
+    """A node whose parameters are numbers within bounds, and the name of a joint."""
+
+    def joint(self) -> str:
+        """Declare and return the name of the joint."""
+        descriptor = ParameterDescriptor(description='Name of the joint', read_only=True)
+        return str(self.declare_parameter('joint', 'crank_joint', descriptor).value)
+
+    def number(
+        self, name: str, default: float, description: str, least: float, most: float
+    ) -> float:
+        """Declare and return a number; rclpy itself refuses one that is out of bounds."""
+        bounds = FloatingPointRange(from_value=least, to_value=most)
+        descriptor = ParameterDescriptor(
+            description=description, read_only=True, floating_point_range=[bounds]
+        )
+        return float(self.declare_parameter(name, default, descriptor).value)
+
+
+AnyNode = TypeVar('AnyNode', bound=Node)
+
+
+def run_companion(
+    name: str, make: Callable[[], AnyNode], run: Callable[[AnyNode, Event], None], stop: Event
+) -> int:
+    """
+    Run a node of its own process, and return the exit code.
+
+    Parameters
+    ----------
+    name
+        What messages call it.
+    make
+        Makes the node.
+    run
+        Runs it until the event.
+    stop
+        Ends the run.
+
+    """
+    leave_out_shared_memory()
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        node = make()
+    except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
+        print(f'{name}: {str(error).splitlines()[0]}; see the README', file=sys.stderr)
+        rclpy.try_shutdown()
+        return 2
+    run(node, stop)
+    with bounded_end():
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
 
 _LOOK = 0.1
 _OLDEST = 0.1
@@ -102,3 +170,51 @@ class PDController(Companion):
 def run_pd_controller(stop: Event) -> int:
     """Control until the event, or for the time that was set, and return the exit code."""
     return run_companion('pd_controller', PDController, PDController.run, stop)
+
+
+# A crank that turns, for demos and tests.
+#
+# It publishes angle and rate of one joint as ``sensor_msgs/JointState`` on ``crank_states``. The
+# speed swings about its mean, as that of a machine under a load that varies with the angle does:
+# angle(t) = start + speed·t + (ripple·speed/2π)·sin(2πt).
+
+
+class CrankSource(Companion):
+    """Publishes a turning crank."""
+
+    def __init__(self) -> None:
+        super().__init__('crank_source')
+        joint = self.joint()
+        self._rate = self.number('rate', 500.0, 'Messages a second [Hz]', 0.1, 20_000.0)
+        self._speed = self.number('speed', tau, 'Mean speed [rad/s]', -1e4, 1e4)
+        self._ripple = self.number('ripple', 0.3, 'Swing of the speed, of its mean', 0.0, 1.0)
+        self._start = self.number('start', 0.0, 'First angle [rad]', -1e6, 1e6)
+        self._seconds = self.number('seconds', 0.0, 'How long [s]; 0 for ever', 0.0, 1e9)
+        self._writer = JointStateWriter([joint])
+        self._publisher = self.create_publisher(
+            JointState, 'crank_states', qos_profile_sensor_data
+        )
+
+    def run(self, stop: Event) -> None:
+        """Publish until the event, or for the time that was set."""
+        period = NANOSECONDS / self._rate
+        swing = self._ripple * self._speed
+        begin = monotonic_ns()
+        number = 0
+        while not stop.is_set():
+            number += 1
+            wait = begin + round(number * period) - monotonic_ns()
+            if wait > 0:
+                sleep(wait * 1e-9)
+            stamp = time_ns()
+            t = (monotonic_ns() - begin) * 1e-9
+            if 0.0 < self._seconds < t:
+                return
+            angle = self._start + self._speed * t + swing / tau * sin(tau * t)
+            message = self._writer.write(stamp, (angle,), (self._speed + swing * cos(tau * t),))
+            self._publisher.publish(message)
+
+
+def run_crank_source(stop: Event) -> int:
+    """Publish a turning crank until the event, and return the exit code."""
+    return run_companion('crank_source', CrankSource, CrankSource.run, stop)

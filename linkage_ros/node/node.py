@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The node: crank samples in, joint states of the dependent joints out.
 
@@ -28,7 +27,7 @@ from functools import partial, wraps
 from math import inf
 from sys import maxsize
 import time
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from linkage_ros.bag.topic import Topic
@@ -38,7 +37,6 @@ from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node import pacing
 from linkage_ros.node.bag_topics import bag_topic
 from linkage_ros.node.diagnostics import CLOCK_PATIENCE, Health, no_clock, Snapshot
-from linkage_ros.node.late_answers import LateAnswers
 from linkage_ros.node.parameters import declare_parameters, nearness_limits
 from linkage_ros.node.real_time import RealTime
 from linkage_ros.node.run_recording import RunRecording
@@ -63,8 +61,46 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
-if TYPE_CHECKING:
-    pass
+# A service whose answer comes when it is known, without an executor that waits for it.
+
+
+class LateAnswers:
+    """
+    Lets the callback of a service return before it knows the answer.
+
+    A callback that is a coroutine would do so too, but rclpy's executor then asks it again and
+    again, and each of its rounds costs as much as five ticks.
+
+    Parameters
+    ----------
+    service
+        The service, an rclpy ``Service``; one answer at a time is late.
+
+    """
+
+    def __init__(self, service: Any) -> None:
+        self._send = service.send_response
+        self._late: Any = None
+        self._to: Any = None
+        service.send_response = self._send_or_keep
+
+    def defer(self, response: Any) -> Any:
+        """Return the response, to be returned by the callback, which is not sent yet."""
+        self._late = response
+        return response
+
+    def answer(self, success: bool, message: str) -> None:
+        """Send the response that was deferred; on the executor's thread, or when it has ended."""
+        response, self._late = self._late, None
+        response.success, response.message = success, message
+        self._send(response, self._to)
+
+    def _send_or_keep(self, response: Any, to: Any) -> None:
+        if response is self._late:
+            self._to = to
+        else:
+            self._send(response, to)
+
 
 _CLOCK_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 _DIAGNOSTICS_QOS = QoSProfile(depth=1)

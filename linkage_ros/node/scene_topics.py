@@ -24,9 +24,8 @@ from typing import Any, TYPE_CHECKING
 from linkage_ros.bag.topic import Topic
 from linkage_ros.messages.single_values import text_message
 from linkage_ros.node.bag_topics import bag_topic, message_type
-from linkage_ros.node.recorded_topics import RecordedTopics
 from linkage_ros.node.run_recording import DESCRIPTION, EXTRA
-from linkage_ros.node.tick_loop import Take
+from linkage_ros.node.tick_loop import RecordedTopics, Take
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import change_text
 from linkage_ros.scene.scene import Scene

@@ -40,7 +40,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.companion import Companion, run_companion
+from linkage_ros.node.demo_nodes import Companion, run_companion
 from linkage_ros.node.scene_topics import OUTPUT_QOS
 from linkage_ros.scene.load import load_scene
 from linkage_ros.signals import stop_on_signals

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The tick, from the newest crank sample to the published bytes.
 
@@ -25,21 +24,119 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+import itertools
 from threading import Event, Thread
 from time import monotonic_ns
-from typing import Any, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.bag.recorder import Recorder
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.messages.single_values import time_message
-from linkage_ros.node.duration_histogram import DurationHistogram
-from linkage_ros.node.recorded_topics import recorded_topics
 from linkage_ros.pipeline.pipeline import Look, Pipeline, Tick
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Change, Injection
+
+
+# A histogram of durations of constant size, fit for a hot loop and for days.
+
+_STEPS = 5
+"""Bits that are kept of a duration: a bin is at most 1/32 wide of its value."""
+
+
+class DurationHistogram:
+    """Counts durations, in [ns], in bins that grow with the duration."""
+
+    __slots__ = ('_bins', 'count', 'longest')
+
+    def __init__(self) -> None:
+        self._bins = [0] * (64 << _STEPS)
+        self.count = 0
+        self.longest = 0
+
+    def add(self, duration: int) -> None:
+        """Count a duration, in [ns]; a negative one counts as 0."""
+        if duration > self.longest:
+            self.longest = duration
+        elif duration < 0:
+            duration = 0
+        shift = duration.bit_length() - _STEPS - 1
+        self._bins[duration if shift <= 0 else (shift << _STEPS) + (duration >> shift)] += 1
+        self.count += 1
+
+    def percentile(self, percent: float) -> int:
+        """Return the duration, in [ns], that so many per cent do not exceed; 0 of nothing."""
+        wanted = self.count * percent / 100.0
+        seen = 0
+        for index, count in enumerate(self._bins):
+            seen += count
+            if count and seen >= wanted:
+                return min(_upper_edge(index), self.longest)
+        return 0
+
+
+def _upper_edge(index: int) -> int:
+    shift = (index >> _STEPS) - 1
+    if shift <= 0:
+        return index
+    return ((index - (shift << _STEPS) + 1) << shift) - 1
+
+
+# The topics that a run records, each by its handle: its number in the bag.
+#
+# They are numbered here alone. The tick offers messages to the recorder by handle, and the bag's
+# topics are described by handle.
+
+
+class RecordedTopics(NamedTuple):
+    """
+    The handles; None of a topic that a run does not have.
+
+    Attributes
+    ----------
+    joint_states, diagnostics
+        What every run publishes.
+    crank
+        What the drives listen to.
+    faults
+        When faults begin and end.
+    withheld
+        Ticks without a message of which a replay has to know.
+    extras
+        The pipeline's further topics.
+    resets
+        When the pipeline was built anew.
+    description
+        The robot model. No tick publishes it.
+
+    """
+
+    joint_states: int
+    diagnostics: int
+    crank: int | None
+    faults: int | None
+    withheld: int | None
+    extras: tuple[int, ...]
+    resets: int
+    description: int
+
+
+def recorded_topics(pipeline: Pipeline) -> RecordedTopics:
+    """Return the handles of the topics that a run of a pipeline records."""
+    handles = itertools.count()
+    return RecordedTopics(
+        joint_states=next(handles),
+        diagnostics=next(handles),
+        crank=next(handles) if pipeline.topic else None,
+        faults=next(handles) if pipeline.injection is not None else None,
+        withheld=next(handles) if pipeline.withholds else None,
+        extras=tuple(next(handles) for _ in pipeline.extras),
+        resets=next(handles),
+        description=next(handles),
+    )
+
 
 _LONGEST_DRAIN = 20_000_000
 """How long a tick takes messages at most, in [ns]: huge ones, each read for the first time."""

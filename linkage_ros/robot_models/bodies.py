@@ -32,8 +32,7 @@ from linkage_ros.drawing.shapes import hull
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, SlideJoint
 from linkage_ros.kinematics.ranges import reach
-from linkage_ros.robot_models.orientation import Span
-from linkage_ros.robot_models.orientation_part import named_joints
+from linkage_ros.robot_models.orientation import named_joints, Span
 
 _COLOURS = (
     (0.30, 0.47, 0.66, 1.0),

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """A linkage out of a URDF and the pins that close it."""
 
 from __future__ import annotations
@@ -20,23 +19,128 @@ from __future__ import annotations
 from cmath import rect
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import hypot, inf, tau
+from itertools import product
+from math import hypot, inf, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, did_you_mean, FileError, listed
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import (
     GROUND,
     Input,
     Limits,
     Linkage,
     NO_LIMITS,
+    Point,
+    Pose,
     RevoluteJoint,
+    Side,
 )
-from linkage_ros.robot_models.closings import find_closings, find_loops
-from linkage_ros.robot_models.planar import lay_flat, Planar
-from linkage_ros.robot_models.sides import assembled
-from linkage_ros.robot_models.urdf_robot import MOVING, UrdfFile
+from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.kinematics.topology import Dyad, find_groups, Iterated
+from linkage_ros.robot_models.planar import find_closings, find_loops, lay_flat, Planar
+from linkage_ros.robot_models.urdf_file import MOVING, UrdfFile
 from linkage_ros.robot_models.urdf_topology import Skeleton, skeleton
+
+# On which sides the dyads of a linkage close, from a pose of its links.
+#
+# A URDF does not say it. Each combination of sides is closed at the pose's inputs, and the one
+# that leads to the pose is taken: so no convention of the dyads stands here a second time.
+
+Poses = Mapping[str, tuple[complex, float]]
+"""Of each link the origin of its frame, in [m], and its angle, in [rad]."""
+
+_SIDED = ('RRR', 'RRP', 'RPR')
+"""Dyads that close in two ways."""
+
+_MANY = 10
+"""Dyads whose sides are tried all together; each more doubles the time."""
+
+_FOUND = 0.05
+"""What the links of a pose may be turned by from where the linkage closes, in [rad]."""
+
+_SAME = 1e-6
+"""What the poses of two assemblies may differ by and be one, in [rad]; inputs likewise."""
+
+_REMEDY = 'give a pose in which it is closed, off its toggles: --at JOINT=VALUE, for each joint'
+
+
+def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: str) -> Linkage:
+    """
+    Return a linkage with the sides that lead to a pose.
+
+    Parameters
+    ----------
+    linkage
+        The linkage, without sides.
+    inputs
+        Of the pose, in [rad] or [m].
+    poses
+        Where its links are then.
+    where
+        The pose in words, for messages.
+
+    Raises
+    ------
+    DefinitionError
+        Where it is no linkage; where no sides lead to the pose, or several do.
+
+    """
+    groups = find_groups(linkage).groups
+    if any(isinstance(group, Iterated) for group in groups):
+        linkage = replace(linkage, pose=Pose(inputs, _points(linkage, poses)))
+    keys = [_key(each) for each in groups if isinstance(each, Dyad) and each.kind in _SIDED]
+    if len(keys) > _MANY:
+        reason = f'{len(keys)} dyads are too many to try all their sides'
+        raise DefinitionError('assembly', reason, 'import it in parts')
+    found = []
+    choices = [
+        ('ahead', 'behind') if key in linkage.sliders else ('left', 'right') for key in keys
+    ]
+    for sides in product(*choices):
+        assembly: dict[str, Side] = dict(zip(keys, sides, strict=True))  # type: ignore[arg-type]
+        closure = Closure(replace(linkage, assembly=assembly))
+        found.append((_off(closure, inputs, poses), closure))
+    found.sort(key=lambda each: each[0])
+    least, closure = found[0]
+    if least > _FOUND:
+        raise DefinitionError('assembly', f'no way to close it leads to the pose {where}', _REMEDY)
+    if len(found) > 1 and found[1][0] < least + _SAME:
+        raise DefinitionError('assembly', f'two ways to close it meet {where}', _REMEDY)
+    if closure.linkage.pose is None and not _near(usual_inputs(closure), inputs):
+        return replace(closure.linkage, pose=Pose(inputs, {}))
+    return closure.linkage
+
+
+def _key(dyad: Dyad) -> str:
+    """Return what names the side of a dyad: its slider, or the pin between its links."""
+    joints = (dyad.inner, *dyad.outer)
+    return next((joint.name for joint in joints if joint.kind == 'P'), dyad.inner.name)
+
+
+def _points(linkage: Linkage, poses: Poses) -> dict[str, Point]:
+    """Return where all points are in the pose, in the frame of the ground."""
+    found: dict[str, Point] = {}
+    for link, points in linkage.links.items():
+        place, angle = poses[link]
+        for name, at in points.items():
+            there = place + rect(1.0, angle) * complex(*at)
+            found.setdefault(name, (there.real, there.imag))
+    return found
+
+
+def _off(closure: Closure, inputs: tuple[float, ...], poses: Poses) -> float:
+    """Return how far links are turned from the pose, at most, in [rad]."""
+    position = closure.position(*inputs)
+    if not position.joints:
+        return pi
+    angles = closure.link_angles(position)
+    return max(abs(remainder(angles[link] - poses[link][1], tau)) for link in poses)
+
+
+def _near(one: Sequence[float], other: Sequence[float]) -> bool:
+    return all(abs(p - q) < _SAME for p, q in zip(one, other, strict=True))
+
 
 _MET = 1e-3
 """How far pins may be apart in a pose and meet in it, of the size."""

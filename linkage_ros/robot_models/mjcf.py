@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The bodies of a linkage in MJCF: nested as the linkage hangs together, with joints, masses, shapes.
 
@@ -23,18 +22,159 @@ hangs by.
 from __future__ import annotations
 
 from cmath import phase, rect
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
 from math import inf, prod, remainder, tau
+from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.linkage import GROUND, Limits, Mass, NO_LIMITS
+from linkage_ros.kinematics.linkage import (
+    GROUND,
+    Limits,
+    Mass,
+    NO_LIMITS,
+    RevoluteJoint,
+    SlideJoint,
+)
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.robot_models.bodies import bar_width, bodies, Body, Solid
-from linkage_ros.robot_models.orientation import spans
-from linkage_ros.robot_models.part import PrefixedNames
-from linkage_ros.robot_models.part_part import Part
-from linkage_ros.robot_models.physical_tree import Branch, physical_tree
-from linkage_ros.robot_models.xml import number, numbers, rough
+from linkage_ros.robot_models.orientation import named_joints, spans
+from linkage_ros.robot_models.part import Part, PartError, prefixed, PrefixedNames
+from linkage_ros.robot_models.xml import comment, document, number, numbers, rough
+
+# A linkage as a tree of its pins and sliders themselves, whatever is published, and the pins cut.
+#
+# Inputs and sliders stay in the tree, since a pin alone is easily closed again by an engine; of
+# the pins those that are published joints come first. A pin in a slot has a block of its own,
+# which slides.
+
+
+class Branch(NamedTuple):
+    """
+    A joint of the tree.
+
+    Attributes
+    ----------
+    kind
+        ``R`` for a pin, ``P`` for a slider.
+    name
+        Of the pin or slider.
+    parent, child
+        The links; a block is named as in the closure's structure.
+    joint
+        As messages name it; '' where none does.
+    sign
+        −1 where the joint counts the other way round.
+
+    """
+
+    kind: str
+    name: str
+    parent: str
+    child: str
+    joint: str
+    sign: int
+
+
+class PhysicalTree(NamedTuple):
+    """
+    A linkage as a tree.
+
+    Attributes
+    ----------
+    branches
+        Each after the one that its parent hangs by.
+    cuts
+        Pins that are cut: the point, and the two links that it joins.
+
+    """
+
+    branches: tuple[Branch, ...]
+    cuts: tuple[tuple[str, str, str], ...]
+
+
+class _Edge(NamedTuple):
+    rank: int
+    kind: str
+    name: str
+    ends: tuple[str, str]
+
+
+def physical_tree(closure: Closure) -> PhysicalTree:
+    """
+    Return a linkage as a tree of pins and sliders.
+
+    Every loop has a pin that is no input, and is cut there: a loop of sliders holds an angle twice
+    over, one whose pins are all driven cannot move, and neither is a linkage.
+    """
+    links = closure.structure.links
+    part_of = {link: link for link in links}
+    kept: list[_Edge] = []
+    for edge in sorted(_edges(closure), key=lambda edge: edge.rank):
+        one, other = (part_of[end] for end in edge.ends)
+        if one != other:
+            kept.append(edge)
+            part_of = {link: one if part == other else part for link, part in part_of.items()}
+    branches: list[Branch] = []
+    reached = [GROUND]
+    for link in reached:
+        for edge in kept:
+            if link in edge.ends:
+                child = edge.ends[0] if edge.ends[1] == link else edge.ends[1]
+                if child not in reached:
+                    reached.append(child)
+                    joint, sign = _named(closure, edge, link, child)
+                    branches.append(Branch(edge.kind, edge.name, link, child, joint, sign))
+    return PhysicalTree(tuple(branches), tuple(_cuts(closure, kept)))
+
+
+def _edges(closure: Closure) -> Iterator[_Edge]:
+    """Yield pins between any two links, and sliders; what is to stay in the tree ranks first."""
+    linkage, links = closure.linkage, closure.structure.links
+    driven = {frozenset((given.parent, given.child)) for given in linkage.inputs}
+    for name, slider in linkage.sliders.items():
+        is_input = any(given.slider == name for given in linkage.inputs)
+        ends = (slider.along, closure.structure.blocks[name])
+        yield _Edge(0 if is_input else 1, 'P', name, ends)
+    published = {
+        frozenset((joint.parent, joint.child))
+        for joint in named_joints(linkage).values()
+        if isinstance(joint, RevoluteJoint)
+    }
+    for one, other in combinations(links, 2):
+        for pin in links[one]:
+            if pin in links[other]:
+                pair = frozenset((one, other))
+                rank = 0 if pair in driven else 2 if pair in published else 3
+                yield _Edge(rank, 'R', pin, (one, other))
+
+
+def _cuts(closure: Closure, kept: list[_Edge]) -> Iterator[tuple[str, str, str]]:
+    carriers: dict[str, list[str]] = {}
+    for link, points in closure.structure.links.items():
+        for point in points:
+            carriers.setdefault(point, []).append(link)
+    for point, carried in carriers.items():
+        part_of = {link: link for link in carried}
+        for edge in kept:
+            if edge.kind == 'R' and edge.name == point:
+                one, other = (part_of[end] for end in edge.ends)
+                part_of = {link: one if p == other else p for link, p in part_of.items()}
+        first, *others = dict.fromkeys(part_of[link] for link in carried)
+        yield from ((point, first, other) for other in others)
+
+
+def _named(closure: Closure, edge: _Edge, parent: str, child: str) -> tuple[str, int]:
+    """Return the name under which messages have a joint, and with which sign."""
+    for name, joint in named_joints(closure.linkage).items():
+        if isinstance(joint, SlideJoint):
+            if edge.kind == 'P' and joint.slider == edge.name:
+                return name, 1
+        elif edge.kind == 'R' and {joint.parent, joint.child} == {parent, child}:
+            return name, 1 if joint.parent == parent else -1
+    return '', 1
+
 
 DENSITY = 7850.0
 """Of links whose mass nobody gives: steel, in [kg/m³]."""
@@ -268,3 +408,134 @@ def _geoms(element: ET.Element, body: Body, origin: complex) -> None:
         if solid.kind == 'slot':
             where['density'] = number(LIGHT)
         ET.SubElement(element, 'geom', where, type='box', size=size)
+
+
+# A linkage as MJCF, MuJoCo's format: nested bodies, and equality constraints where pins are cut.
+#
+# The axes of a body are parallel to its link's own; its origin lies at the pin or slider that it
+# hangs by. Springs are spatial tendons, which pull as those of `linkage_ros.dynamics` do.
+
+_STEP = 5e-4
+"""Of the integration, in [s]."""
+
+_STIFF = {'solref': f'{number(4.0 * _STEP)} 1', 'solimp': '0.9999 0.9999 0.001 0.5 2'}
+"""How cut pins are held: errors die away within 2 ms, and loads open them next to nothing."""
+
+_PACE = 30.0
+"""Of the position servo of an input, in [rad/s]."""
+
+_HEAD = f"""\
+A planar linkage in the plane z = 0. Bodies hang by their pins and sliders; pins that close loops
+are equality constraints between sites. A hinge or slide that is a published joint has its name,
+sign and zero; others are CHILD_at_PIN. Lengths in [m], angles in [rad].
+Links with a mass are thin plates; others are steel bars of {DENSITY:g} kg/m3, as they are drawn. A
+pin in a slot has a block of {LIGHT:g} kg/m3. Inputs have position servos. Nothing collides.
+Friction, tolerances and other effects of a scene are not here; its gravity and springs are."""
+
+
+def mjcf(name: str, parts: Sequence[Part]) -> bytes:
+    """
+    Return a model for MuJoCo.
+
+    Parameters
+    ----------
+    name
+        Of the model.
+    parts
+        Its linkages.
+
+    Raises
+    ------
+    PartError
+        Where one has another gravity than the first, or names that are taken.
+
+    """
+    model = ET.Element('mujoco', model=name)
+    model.append(comment(_HEAD.splitlines()))
+    ET.SubElement(model, 'compiler', angle='radian', autolimits='true')
+    gravity = numbers(*_gravity(parts), 0.0)
+    option = {'timestep': number(_STEP), 'gravity': gravity, 'integrator': 'implicitfast'}
+    ET.SubElement(model, 'option', option, solver='Newton', iterations='200', tolerance='1e-12')
+    default = ET.SubElement(model, 'default')
+    ET.SubElement(default, 'geom', contype='0', conaffinity='0', density=number(DENSITY))
+    ET.SubElement(default, 'equality', _STIFF)
+    width = max(bar_width(part.closure) for part in parts)
+    ET.SubElement(default, 'site', size=rough(0.2 * width), group='4')
+    sections = {
+        key: ET.SubElement(model, key)
+        for key in ('worldbody', 'equality', 'tendon', 'actuator', 'keyframe')
+    }
+    start: list[float] = []
+    commands: list[float] = []
+    layers = 0
+    _, names = prefixed([(part.prefix, part.closure.linkage) for part in parts])
+    for part, own in zip(parts, names, strict=True):
+        bodies = Bodies(sections['worldbody'], part, own, layers)
+        _close(sections, part, bodies)
+        _drive(sections['actuator'], part, bodies)
+        start += bodies.start
+        commands += bodies.inputs
+        layers += len(part.closure.linkage.links)
+    values = {'qpos': numbers(*start), 'ctrl': numbers(*commands)}
+    ET.SubElement(sections['keyframe'], 'key', attrib={'name': 'start', **values})
+    for key, section in sections.items():
+        if not len(section) and key != 'worldbody':
+            model.remove(section)
+    return document(model)
+
+
+def _gravity(parts: Sequence[Part]) -> tuple[float, float]:
+    found = [part.loads.gravity if part.loads else (0.0, 0.0) for part in parts]
+    for count, gravity in enumerate(found):
+        if gravity != found[0]:
+            raise PartError(
+                count,
+                'loads.gravity',
+                f'[{numbers(*gravity)}] is another than that of the first linkage',
+                'give all linkages one gravity: MuJoCo has one',
+                of_linkage=False,
+            )
+    return found[0]
+
+
+def _close(sections: Mapping[str, ET.Element], part: Part, bodies: Bodies) -> None:
+    """Write what joins bodies beside their joints: cut pins, and springs."""
+    linkage = part.closure.linkage
+    for point in linkage.traced:
+        bodies.site(next(a for a, points in linkage.links.items() if point in points), point)
+    for point, one, other in bodies.cuts:
+        ends = {'site1': bodies.site(one, point), 'site2': bodies.site(other, point)}
+        name = f'{ends["site1"]} = {ends["site2"]}'
+        ET.SubElement(sections['equality'], 'connect', {'name': name, **ends})
+    for spring in part.loads.springs if part.loads else ():
+        tendon = ET.SubElement(
+            sections['tendon'],
+            'spatial',
+            name=part.prefix + spring.name,
+            stiffness=number(spring.stiffness),
+            springlength=number(spring.free_length),
+            damping=number(spring.damping),
+            width=rough(0.15 * bar_width(part.closure)),
+        )
+        for end in spring.ends:
+            ET.SubElement(tendon, 'site', site=bodies.site(*end))
+
+
+def _drive(actuators: ET.Element, part: Part, bodies: Bodies) -> None:
+    """Drive the inputs by servos, as stiff as what they move asks for."""
+    motor = part.loads.drive_inertia if part.loads else 0.0
+    for count, given in enumerate(part.closure.linkage.inputs):
+        inertia = bodies.inertia(count) + motor
+        joint = bodies.joints[given.joint]
+        if motor:
+            joint.set('armature', number(motor))
+        servo = ET.SubElement(
+            actuators,
+            'position',
+            name=joint.get('name', ''),
+            joint=joint.get('name', ''),
+            kp=rough(inertia * _PACE * _PACE),
+            kv=rough(2.0 * inertia * _PACE),
+        )
+        if given.limits.bounded:
+            servo.set('ctrlrange', joint.get('range', ''))

@@ -12,17 +12,66 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """Names of frames and joints in a robot model: those of links and messages, and free ones."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
-from linkage_ros.errors import quoted
+from linkage_ros.dynamics.loads import Loads
+from linkage_ros.errors import DefinitionError, quoted
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.robot_models.orientation_part import named_joints
-from linkage_ros.robot_models.part_part import PartError
+from linkage_ros.robot_models.orientation import named_joints
+
+# A linkage that is to stand in a robot model.
+
+
+class Part(NamedTuple):
+    """
+    A linkage of a model.
+
+    Attributes
+    ----------
+    closure
+        The linkage.
+    prefix
+        What its links and joints have before their names.
+    loads
+        What acts on it; nothing where nobody says.
+    wrapped
+        Whether its angles are published in (−π, π].
+
+    """
+
+    closure: Closure
+    prefix: str = ''
+    loads: Loads | None = None
+    wrapped: bool = False
+
+
+class PartError(DefinitionError):
+    """
+    A linkage of which no model can be made.
+
+    Parameters
+    ----------
+    number
+        Of the linkage, from 0.
+    where, reason, remedy
+        As in `DefinitionError`.
+    of_linkage
+        Whether its own file is at fault, and not that of the scene.
+
+    """
+
+    def __init__(
+        self, number: int, where: str, reason: str, remedy: str, *, of_linkage: bool = True
+    ) -> None:
+        self.number = number
+        self.of_linkage = of_linkage
+        super().__init__(where, reason, remedy)
 
 
 class Names:

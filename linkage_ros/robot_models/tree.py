@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 A linkage as a tree of frames whose joints are those that messages name.
 
@@ -32,9 +31,41 @@ from typing import Literal, NamedTuple
 
 from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.robot_models.orientation_part import named_joints, Orientations, Turn
+from linkage_ros.robot_models.orientation import named_joints, Orientations, Turn
 from linkage_ros.robot_models.part import free_name, Names, PrefixedNames
-from linkage_ros.robot_models.untold import joint_text, remedy
+
+# What would have to be published, where the joints that are do not tell where a link stands.
+
+
+def remedy(
+    linkage: Linkage, placed: Collection[str]
+) -> tuple[str, str, RevoluteJoint | SlideJoint]:
+    """Return a link that is joined to placed ones, and the joint that would tell of it."""
+    known = {*Orientations(linkage).known_from(GROUND)}
+    links = linkage.links
+    for link in links:
+        if link in placed:
+            continue
+        pinned = [on for on in placed if {*links[on]} & {*links[link]}]
+        for on in pinned:
+            if link not in known:
+                return link, f'{link}_joint', RevoluteJoint(on, link)
+        for name, slider in linkage.sliders.items():
+            ends = (slider.along, *(each for each in links if slider.point in links[each]))
+            held = [end for end in ends if end in placed]
+            if link in ends and held and (link == slider.along or slider.along in placed):
+                if link not in known:
+                    return link, f'{link}_joint', RevoluteJoint(held[0], link)
+                return link, f'{name}_slide', SlideJoint(name)
+    raise AssertionError('every link is joined to the ground')
+
+
+def joint_text(name: str, joint: RevoluteJoint | SlideJoint) -> str:
+    """Return a joint as a linkage file says it."""
+    if isinstance(joint, SlideJoint):
+        return f'{name}: {{slider: {joint.slider}}}'
+    return f'{name}: {{parent: {joint.parent}, child: {joint.child}}}'
+
 
 Kind = Literal['revolute', 'prismatic', 'fixed']
 

@@ -12,25 +12,122 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """A URDF as it stands: links and joints by name, each joint checked for what URDF asks of it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import inf, isfinite
+from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from linkage_ros.errors import FileError, listed, quoted
 from linkage_ros.kinematics.linkage import Limits, NO_LIMITS
-from linkage_ros.robot_models.urdf_robot import (
-    Inertial,
-    MOVING,
-    UrdfFile,
-    UrdfJoint,
-    UrdfLink,
-    Vector,
-)
+
+# What a URDF says: links and joints by name.
+
+Vector = tuple[float, float, float]
+
+MOVING = ('revolute', 'continuous', 'prismatic')
+
+
+class Inertial(NamedTuple):
+    """Mass [kg], its centre and the turn of its axes [m, rad], and ixx ixy ixz iyy iyz izz."""
+
+    mass: float
+    xyz: Vector
+    rpy: Vector
+    tensor: tuple[float, float, float, float, float, float]
+
+
+class UrdfLink(NamedTuple):
+    """
+    A link.
+
+    Attributes
+    ----------
+    inertial
+        Its mass, if it has one.
+    bodied
+        Whether anything is to be seen of it, or to be weighed.
+    marks
+        Names of what is to be seen, with their places, in [m].
+
+    """
+
+    inertial: Inertial | None
+    bodied: bool
+    marks: tuple[tuple[str, Vector], ...]
+
+
+class UrdfJoint(NamedTuple):
+    """
+    A joint.
+
+    Attributes
+    ----------
+    name, kind
+        As the file has them.
+    parent, child
+        Links.
+    xyz, rpy
+        Of the child's frame in the parent's where the joint is at 0, in [m] and [rad].
+    axis
+        In the child's frame, of any length but 0.
+    mimics, multiplier, offset
+        The joint that it follows, '' for none, and how.
+    limits
+        As ``<limit>`` has them, but for those that ``linkage urdf`` has made up.
+
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    xyz: Vector
+    rpy: Vector
+    axis: Vector
+    mimics: str
+    multiplier: float
+    offset: float
+    limits: Limits
+
+
+class UrdfFile(NamedTuple):
+    """
+    A robot.
+
+    Attributes
+    ----------
+    file
+        Name of the file, for messages.
+    name
+        Of the robot.
+    root
+        The link that no joint leads to.
+    links
+        By name.
+    joints
+        By name; in an order in which parents come before what hangs on them.
+    order
+        Names of the joints as they stand in the file.
+    inputs
+        Of joints that are driven, where the file is one of ours.
+    start
+        Likewise the values of joints in a pose in which all loops close.
+
+    """
+
+    file: str
+    name: str
+    root: str
+    links: Mapping[str, UrdfLink]
+    joints: Mapping[str, UrdfJoint]
+    order: tuple[str, ...]
+    inputs: tuple[str, ...]
+    start: Mapping[str, float]
+
 
 _KINDS = (*MOVING, 'fixed', 'floating', 'planar')
 _FARTHEST = 1e9

@@ -12,22 +12,180 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """A URDF, and what closes it, as links, pins, sliders and joints."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from re import fullmatch
 from typing import NamedTuple
 
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint, SlideJoint, Slider
-from linkage_ros.robot_models.chains import Chain, chains, plus, Symbol, symbols
-from linkage_ros.robot_models.closings import Closing
-from linkage_ros.robot_models.planar import Frame, Planar
-from linkage_ros.robot_models.points import Points
-from linkage_ros.robot_models.urdf_robot import UrdfFile
+from linkage_ros.robot_models.part import free_name
+from linkage_ros.robot_models.planar import Closing, Frame, Planar, PlanarJoint
+from linkage_ros.robot_models.urdf_file import UrdfFile
+
+# What holds two bodies of a URDF together: the joints between them, through frames without a body.
+#
+# URDF gives a frame to whatever a joint leads to. Joints that follow each other at one place, with
+# nothing between them that can be seen or weighed, are one pin, or a pin in a slot::
+#
+#     R+  a pin      P  a block on its line      P R+  a pin in a slot      R+ P  a rod in a swivel
+
+Symbol = tuple[tuple[tuple[str, float], ...], float]
+"""An angle as a sum of joints with their factors, and a constant, in [rad]."""
+
+_PATTERNS = 'R+|P|PR+|R+P'
+
+
+class Chain(NamedTuple):
+    """Joints from a body to another, with nothing between them."""
+
+    parent: str
+    child: str
+    joints: tuple[PlanarJoint, ...]
+
+    @property
+    def kinds(self) -> str:
+        """R for each turn, P for each slide."""
+        return ''.join(joint.kind for joint in self.joints)
+
+    @property
+    def slide(self) -> PlanarJoint | None:
+        """Return the slide of the chain, if it has one."""
+        return next((joint for joint in self.joints if joint.kind == 'P'), None)
+
+
+def chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
+    """
+    Return what holds the bodies together.
+
+    Parameters
+    ----------
+    planar
+        The URDF.
+    marked
+        Bodies with something at which a loop closes: they stay.
+    near
+        What places may be apart by and be one, in [m].
+
+    """
+    hung: dict[str, list[PlanarJoint]] = {}
+    for joint in planar.joints:
+        hung.setdefault(joint.parent, []).append(joint)
+
+    def grown(start: PlanarJoint) -> Iterator[tuple[PlanarJoint, ...]]:
+        """Yield the chain from a joint on, longer and longer."""
+        found = [start]
+        yield tuple(found)
+        while True:
+            body = found[-1].child
+            onward = hung.get(body, [])
+            if body in planar.bodied or body in marked or len(onward) != 1:
+                return
+            if abs(onward[0].place) > near:
+                return
+            found.append(onward[0])
+            yield tuple(found)
+
+    made, ahead = [], [planar.root]
+    for body in ahead:
+        for joint in hung.get(body, []):
+            whole = [
+                found
+                for found in grown(joint)
+                if fullmatch(_PATTERNS, ''.join(each.kind for each in found))
+            ]
+            made.append(Chain(body, whole[-1][-1].child, whole[-1]))
+            ahead.append(made[-1].child)
+    return made
+
+
+def symbols(planar: Planar) -> dict[str, Symbol]:
+    """Return the angle of every body as a sum of joints."""
+    found: dict[str, Symbol] = {planar.root: ((), 0.0)}
+    for joint in planar.joints:
+        found[joint.child] = found[joint.parent]
+        if joint.kind == 'R':
+            found[joint.child] = plus(found[joint.parent], joint)
+    return found
+
+
+def plus(symbol: Symbol, joint: PlanarJoint) -> Symbol:
+    """Return the angle behind a joint that turns."""
+    terms: Mapping[str, float] = dict(symbol[0])
+    sign = joint.axis.real
+    factor = sign * (joint.multiplier if joint.mimics else 1.0)
+    name = joint.mimics or joint.name
+    more = {**terms, name: terms.get(name, 0.0) + factor}
+    constant = symbol[1] + (sign * joint.offset if joint.mimics else 0.0)
+    return tuple(sorted((each, of) for each, of in more.items() if of)), constant
+
+
+# Points of bodies, by where they are: a pin is one point that several bodies have.
+
+
+class Points:
+    """
+    Points as they are found, one after the other.
+
+    Parameters
+    ----------
+    near
+        Places on a body that are nearer to each other are one, in [m].
+
+    """
+
+    def __init__(self, near: float) -> None:
+        self._near = near
+        self._same: list[int] = []
+        self._found: list[tuple[str, complex]] = []
+        self._hints: list[tuple[int, int, str]] = []
+
+    def at(self, body: str, place: complex, hint: str = '', rank: int = 9) -> int:
+        """Return the number of the point of a body at a place; a hint may become its name."""
+        number = self.there(body, place)
+        if number is None:
+            number = len(self._found)
+            self._found.append((body, place))
+            self._same.append(number)
+        if hint:
+            self._hints.append((rank, number, hint))
+        return number
+
+    def there(self, body: str, place: complex) -> int | None:
+        """Return the number of a point, if there is one."""
+        for number, (other, there) in enumerate(self._found):
+            if other == body and abs(there - place) <= self._near:
+                return number
+        return None
+
+    def hint(self, number: int, name: str, rank: int) -> None:
+        """Say what a point may be called; the lowest rank wins."""
+        self._hints.append((rank, number, name))
+
+    def join(self, one: int, other: int) -> int:
+        """Make two points one pin."""
+        kept, gone = self._same[one], self._same[other]
+        self._same = [kept if of == gone else of for of in self._same]
+        return one
+
+    def named(self, bodies: Collection[str]) -> tuple[dict[str, dict[str, complex]], list[str]]:
+        """Return the points of each body by name, and for each number the name."""
+        taken: dict[int, str] = {}
+        for _, number, hint in sorted(self._hints, key=lambda hint: hint[:2]):
+            point = self._same[number]
+            if point not in taken:
+                taken[point] = free_name(hint, taken.values())
+        names = [taken.setdefault(number, f'point_{number + 1}') for number in self._same]
+        links: dict[str, dict[str, complex]] = {body: {} for body in bodies}
+        for name, (body, place) in zip(names, self._found, strict=True):
+            if body in links:
+                links[body][name] = place
+        return links, names
+
 
 NEAR = 1e-9
 """Of the size, what places may be apart by and be one."""

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.robot_models.part_part import Part, PartError
+from linkage_ros.robot_models.part import Part, PartError
 from linkage_ros.scene.scene import Scene
 
 Write = Callable[[str, Sequence[Part]], bytes]

@@ -39,8 +39,8 @@ from typing import Any
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.structure import Dyad, Iterated
 from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
+from linkage_ros.kinematics.topology import Dyad, Iterated
 from linkage_ros.solvers.newton import LEAST_SINE, NewtonClosure
 from linkage_ros.solvers.solver import Choice, Solver
 from linkage_ros.solvers.table import TableClosure

@@ -29,10 +29,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from linkage_ros.kinematics.known_links import KnownLinks
-from linkage_ros.kinematics.layout import Angle
+from linkage_ros.kinematics.known_links import Angle, KnownLinks
 from linkage_ros.kinematics.linkage import GROUND, Linkage
-from linkage_ros.kinematics.structure import Driven, Dyad, Iterated, Joint, Structure
+from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Joint, Structure
 
 Turns = tuple[tuple[int, float], ...]
 """Coordinates and their signs, which add up to an angle."""

@@ -45,15 +45,15 @@ from math import copysign, tau
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.files.parameters import number
+from linkage_ros.kinematics.arithmetic import cross
 from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.plane import cross
 from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, Turned
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import PLACED, State, Step
-from linkage_ros.kinematics.structure import Dyad, Iterated
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
+from linkage_ros.kinematics.topology import Dyad, Iterated
 from linkage_ros.solvers.loops import LoopFinder, Loops, Vector
 from linkage_ros.solvers.solver import Solver
 

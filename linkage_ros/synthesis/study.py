@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 A search over random candidates: here, or by the workers of a Dask scheduler.
 
@@ -28,15 +27,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Generator, Iterator
-from concurrent.futures import (
-    CancelledError,
-    FIRST_COMPLETED,
-    Future,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent.futures import CancelledError, FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import closing, contextmanager
 from functools import partial
+from importlib import import_module
 from itertools import islice
 from logging import CRITICAL, getLogger
 from pkgutil import resolve_name
@@ -44,9 +38,30 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import linkage_ros
 from linkage_ros.errors import LinkageError
-from linkage_ros.synthesis.extras import distributed
 import numpy as np
 from numpy.typing import NDArray
+
+# Libraries that only some kinds of synthesis need, and what to install where one is missing.
+
+
+def scipy_optimize() -> Any:
+    """Return scipy.optimize, for all that is fitted."""
+    return _library('scipy.optimize', 'design')
+
+
+def distributed() -> Any:
+    """Return dask.distributed, for studies that outgrow one machine."""
+    return _library('distributed', 'dask')
+
+
+def _library(name: str, extra: str) -> Any:
+    try:
+        return import_module(name)
+    except ModuleNotFoundError:
+        raise LinkageError(
+            name.partition('.')[0], 'is not installed', f"pip install 'linkage_ros[{extra}]'"
+        ) from None
+
 
 Part = TypeVar('Part')
 Result = TypeVar('Result')

@@ -36,7 +36,7 @@ from linkage_ros.accuracy.reference import Reference
 from linkage_ros.accuracy.solving import judge, KNOTS, Measured, true_states
 from linkage_ros.accuracy.solving_results import advice, part_of
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.structure import Dyad
+from linkage_ros.kinematics.topology import Dyad
 from linkage_ros.measuring import Spread
 from mpmath import mp, mpf
 import pytest

@@ -22,7 +22,7 @@ from threading import Event
 from linkage_ros.accuracy.measure import PARTS
 from linkage_ros.accuracy.results import Part, Results, Table
 from linkage_ros.cli import accuracy as command
-from linkage_ros.cli.accuracy_tables import print_results
+from linkage_ros.cli.accuracy import print_results
 from linkage_ros.errors import LinkageError
 from linkage_ros.measuring import Spread
 from linkage_ros.resources import shipped

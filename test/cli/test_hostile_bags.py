@@ -30,10 +30,10 @@ from typing import Any
 from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli import export, info, plot, replay_part, report
+from linkage_ros.cli import export, info, plot, replay, report
 from linkage_ros.cli.main import COMMANDS as ALL_COMMANDS
 from linkage_ros.cli.main import module_of
-from linkage_ros.cli.outlet import Outlet
+from linkage_ros.cli.terminal import Outlet
 from linkage_ros.errors import BagError, clean, FileError, LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import text_message
@@ -109,7 +109,7 @@ def rewritten(
 def tried(bag: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> Iterator[str]:
     """Try every command on a bag; yield what each refuses it for, and look at what it prints."""
     commands: tuple[tuple[ModuleType, list[Any]], ...] = (
-        (replay_part, []),
+        (replay, []),
         (info, []),
         (info, ['--json']),
         (export, ['-o', folder / 'x.csv']),
@@ -185,7 +185,7 @@ def test_a_tick_beyond_all_stamps_is_told_in_a_line(tmp_path, capsys, time) -> N
     lines = list(tried(odd, tmp_path, capsys))
     assert lines[0].startswith(f'{odd}: holds what was made at {time} ns, beyond ')
     with pytest.raises(BagError, match='beyond'):
-        answer(replay_part, odd)
+        answer(replay, odd)
 
 
 # A bag calls its topics, types, joints and files what it likes: what is shown is printable.

@@ -31,7 +31,7 @@ from hypothesis import strategies as st
 from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
 from linkage_ros.bag.storage import Storage
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli import replay_part
+from linkage_ros.cli import replay
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.node.run_recording import RunRecording
@@ -130,7 +130,7 @@ def rewritten(
 def told(capsys: pytest.CaptureFixture[str], *typed: object) -> tuple[int, dict[str, Any]]:
     """Return exit code and account of ``linkage replay --json``."""
     capsys.readouterr()
-    code = answer(replay_part, *typed, '--json')
+    code = answer(replay, *typed, '--json')
     return code, json.loads(capsys.readouterr().out)
 
 
@@ -147,7 +147,7 @@ def test_a_run_comes_to_the_same_bytes(tmp_path, capsys, name):
     assert account['withheld_ticks'] == len(times)
     assert account['greatest'] == []
     assert account['first_difference'] is None
-    assert answer(replay_part, bag) == 0
+    assert answer(replay, bag) == 0
     assert 'identical' in capsys.readouterr().out
 
 
@@ -218,7 +218,7 @@ def test_one_bit_of_one_position_is_named(tmp_path, capsys):
         'quantity': 'position', 'unit': 'rad', 'difference': apart, 'difference_at': at,
         'ulp': 1, 'ulp_at': at,
     }  # fmt: skip
-    assert answer(replay_part, tmp_path / 'spoilt') == 3
+    assert answer(replay, tmp_path / 'spoilt') == 3
     text = capsys.readouterr().out
     assert f'{found["after"]!r} recorded, {found["before"]!r} now' in text
     assert 'tick 123, at +0.122000 s' in text
@@ -326,7 +326,7 @@ def test_a_bag_that_was_begun_in_mid_run(tmp_path, capsys, name):
     assert account['compared_ticks'] + account['untold_ticks'] == account['ticks']
     if verdict == 'identical':
         assert states['same'] + states['same_but_for_turns'] == states['recorded'] > 100
-    answer(replay_part, bag)
+    answer(replay, bag)
     assert ('could not be told' in capsys.readouterr().out) == (begun == 'mid-run')
 
 
@@ -339,7 +339,7 @@ def test_whole_turns_before_the_bag_are_no_difference(tmp_path, capsys):
     states, motions = account['topics']
     assert states['same_but_for_turns'] == states['recorded'] == 1310
     assert motions['same_but_for_turns'] == motions['recorded'] == 1310
-    assert answer(replay_part, rewritten(bag, 'whole', from_tick(690), begun='with the run')) == 3
+    assert answer(replay, rewritten(bag, 'whole', from_tick(690), begun='with the run')) == 3
 
 
 def test_a_bit_is_found_in_a_bag_of_mid_run_too(tmp_path, capsys):
@@ -374,7 +374,7 @@ def test_a_truncated_bag_is_replayed_as_far_as_it_goes(tmp_path, capsys):
     whole = (bag / 'bag_0.mcap').read_bytes()
     part = tmp_path / 'part.mcap'
     part.write_bytes(whole[: len(whole) * 2 // 3])
-    assert answer(replay_part, part, '--json') == 0
+    assert answer(replay, part, '--json') == 0
     out, err = capsys.readouterr()
     account = json.loads(out)
     assert account['truncated']
@@ -392,7 +392,7 @@ def test_a_damaged_bag_is_replayed_up_to_the_damage(tmp_path, capsys):
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 1
     file.write_bytes(data)
-    assert answer(replay_part, bag, '--json') == 1
+    assert answer(replay, bag, '--json') == 1
     out, err = capsys.readouterr()
     account = json.loads(out)
     assert account['verdict'] == 'identical'
@@ -405,7 +405,7 @@ def test_a_wish_to_stop_is_heard(tmp_path, capsys):
     bag = recorded(tmp_path, '', 6000)
     stop = Event()
     stop.set()
-    assert answer(replay_part, bag, stop=stop) == 1
+    assert answer(replay, bag, stop=stop) == 1
     out, err = capsys.readouterr()
     assert 'identical' in out
     assert err == 'linkage replay: stopped; the rest of the bag was not replayed\n'
@@ -426,7 +426,7 @@ def test_a_bag_that_does_not_say_what_ran_is_answered_with_what_is_missing(tmp_p
     with BagWriterOf(tmp_path / 'foreign') as write:
         write(0)
     with pytest.raises(LinkageError) as raised:
-        answer(replay_part, tmp_path / 'foreign')
+        answer(replay, tmp_path / 'foreign')
     assert str(raised.value) == (
         f'{tmp_path}/foreign: carries no run.json, scene.yaml; name a scene to run with --scene'
     )
@@ -437,14 +437,14 @@ def test_a_bag_of_no_joint_states_is_refused(tmp_path):
         recorded(tmp_path, ''), 'silent', lambda _, m: m if m.topic == '/crank_states' else None
     )
     with pytest.raises(LinkageError, match='holds no joint states'):
-        answer(replay_part, bag)
+        answer(replay, bag)
 
 
 @pytest.mark.parametrize('typed', [['-o', 'new'], ['--crank-topic', '/c']])
 def test_options_of_another_scene_need_one(tmp_path, typed):
     bag = recorded(tmp_path, '')
     with pytest.raises(LinkageError, match='name it with --scene'):
-        answer(replay_part, bag, *typed)
+        answer(replay, bag, *typed)
 
 
 class BagWriterOf:

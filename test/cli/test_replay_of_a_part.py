@@ -24,7 +24,7 @@ from typing import Any
 from linkage_ros.bag.reader import BagMessage, read_bag
 from linkage_ros.bag.recover import recover
 from linkage_ros.bag.storage import Storage
-from linkage_ros.cli import info, replay_part
+from linkage_ros.cli import info, replay
 import pytest
 
 from .recorded import answer, BEGIN, MS
@@ -62,7 +62,7 @@ def test_a_ring_says_that_its_beginning_is_gone(tmp_path, capsys, name) -> None:
     why = account['beginning_missing']
     assert why.startswith(f'its first {gone} messages have made way for newer ones: ')
     assert why.endswith(f'{lost} cannot come to the same again') == bool(lost)
-    assert answer(replay_part, ring) == code
+    assert answer(replay, ring) == code
     assert f'\n{why}\n' in capsys.readouterr().out
 
 
@@ -112,12 +112,12 @@ def test_what_had_to_be_dropped_is_told_where_something_differs(tmp_path, capsys
     assert (code, account['verdict']) == (3, 'different')
     line = '1 messages had to be dropped when it was recorded: what depends on one that is not '
     assert account['gaps'] == [f'{line}there may differ']
-    assert answer(replay_part, part) == 3
+    assert answer(replay, part) == 3
     assert line in capsys.readouterr().out
     # A tick that nothing remembers is missed by nobody: there is nothing to explain.
     (tmp_path / 'other').mkdir()
     bag = recorded(tmp_path / 'other', '')
-    assert answer(replay_part, rewritten(bag, 'part', without_one, custom=custom, **said)) == 0
+    assert answer(replay, rewritten(bag, 'part', without_one, custom=custom, **said)) == 0
     assert 'had to be dropped when' not in capsys.readouterr().out
 
 
@@ -132,7 +132,7 @@ def test_what_recovery_has_lost_is_told_where_something_differs(tmp_path, capsys
     code, account = told(capsys, recovery.folder)
     assert code == 3
     assert account['gaps'][0].startswith('recovered from bag: ')
-    assert answer(replay_part, recovery.folder) == 3
+    assert answer(replay, recovery.folder) == 3
     assert ' bytes lost in 1 places: what depends on one' in capsys.readouterr().out
 
 

@@ -26,7 +26,7 @@ from typing import Any
 
 from linkage_ros.bag.reader import BagMessage, read_bag, RUN_FILE
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.cli import replay_part
+from linkage_ros.cli import replay
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.scene.load import load_scene
@@ -92,7 +92,7 @@ def other(folder: Path, text: str, linkage: str = FOUR_BAR) -> Path:
 
 def told(capsys: pytest.CaptureFixture[str], *typed: object) -> dict[str, Any]:
     capsys.readouterr()
-    assert answer(replay_part, *typed, '--json') == 0
+    assert answer(replay, *typed, '--json') == 0
     return json.loads(capsys.readouterr().out)
 
 
@@ -132,7 +132,7 @@ def test_another_linkage_differs_by_what_the_closed_form_says(tmp_path, capsys):
     assert found['rms'] == pytest.approx(sqrt(sum(x * x for x in apart) / TICKS), rel=1e-9)
     number = max(range(TICKS), key=lambda k: abs(apart[k]))
     assert found['greatest_at'] == {'tick': number + 1, 'time_ns': BEGIN + number * MS}
-    assert answer(replay_part, tmp_path / 'bag', '--scene', scene) == 0
+    assert answer(replay, tmp_path / 'bag', '--scene', scene) == 0
     assert f'{found["rms"]:.3g}' in capsys.readouterr().out
 
 
@@ -216,7 +216,7 @@ def test_a_wish_to_stop_is_heard_while_the_samples_are_looked_for(tmp_path):
     stop = Event()
     stop.set()
     with pytest.raises(StoppedError):
-        answer(replay_part, bag, '--scene', other(tmp_path, ''), stop=stop)
+        answer(replay, bag, '--scene', other(tmp_path, ''), stop=stop)
 
 
 def test_times_that_are_nonsense_do_not_ask_for_years_of_ticks(tmp_path, capsys):
@@ -243,7 +243,7 @@ def test_the_new_bag_says_what_it_is(tmp_path, capsys):
     bag = recorded(tmp_path, 'effects: {acceleration: {}}\n')
     text = 'effects: {acceleration: {}, dropout: {probability: 0.1}, pin_forces: {}}\nseed: 3\n'
     scene = other(tmp_path, text, GENERAL)
-    answer(replay_part, bag, '--scene', scene, '-o', tmp_path / 'new')
+    answer(replay, bag, '--scene', scene, '-o', tmp_path / 'new')
     new = read_bag(tmp_path / 'new')
     assert new.attachments['scene.yaml'] == scene.read_bytes()
     assert new.attachments['linkage.yaml'] == GENERAL.encode()
@@ -384,7 +384,7 @@ def test_a_scene_that_does_not_go_with_the_bag_is_refused_in_a_line(tmp_path, na
     text, other_text, linkage, line = BAD[name]
     scene = other(tmp_path, other_text, linkage)
     with pytest.raises(LinkageError) as raised:
-        answer(replay_part, recorded(tmp_path, text), '--scene', scene)
+        answer(replay, recorded(tmp_path, text), '--scene', scene)
     assert line in str(raised.value)
     assert '\n' not in str(raised.value)
 
@@ -401,7 +401,7 @@ def test_a_scene_that_does_not_go_with_the_bag_is_refused_in_a_line(tmp_path, na
 def test_a_foreign_bag_without_the_crank_is_refused(tmp_path, topics, joints, typed, line):
     bag = foreign(tmp_path, *topics, joints=joints)
     with pytest.raises(LinkageError) as raised:
-        answer(replay_part, bag, '--scene', other(tmp_path, ''), *typed)
+        answer(replay, bag, '--scene', other(tmp_path, ''), *typed)
     assert line in str(raised.value)
 
 
@@ -409,5 +409,5 @@ def test_a_folder_that_exists_is_not_touched(tmp_path):
     bag, scene = recorded(tmp_path), other(tmp_path, PLAIN)
     (tmp_path / 'new').mkdir()
     with pytest.raises(LinkageError, match='exists already'):
-        answer(replay_part, bag, '--scene', scene, '-o', tmp_path / 'new')
+        answer(replay, bag, '--scene', scene, '-o', tmp_path / 'new')
     assert list((tmp_path / 'new').iterdir()) == []

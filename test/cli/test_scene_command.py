@@ -22,8 +22,8 @@ from math import inf
 from pathlib import Path
 from threading import Event
 
-from linkage_ros.cli import scene_part as command
-from linkage_ros.cli.parameter_tables import REGISTRIES, table_of
+from linkage_ros.cli import scene as command
+from linkage_ros.cli.scene import REGISTRIES, table_of
 from linkage_ros.cli.terminal import text
 from linkage_ros.errors import FileError, LinkageError
 from linkage_ros.files.schema import as_text

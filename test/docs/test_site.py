@@ -25,7 +25,7 @@ from urllib.parse import unquote, urlsplit
 
 import linkage_ros as lr
 from linkage_ros.cli.main import COMMANDS
-from linkage_ros.cli.parameter_tables import REGISTRIES
+from linkage_ros.cli.scene import REGISTRIES
 from linkage_ros.files.schema import linkage_schema, scene_schema
 import pytest
 

@@ -24,9 +24,9 @@ from math import acos, cos, degrees, pi, radians, remainder, sin, tau
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from linkage_ros.drawing import design_part as drawing
+from linkage_ros.drawing import design as drawing
 from linkage_ros.drawing import painting
-from linkage_ros.drawing.design_part import draw_design
+from linkage_ros.drawing.design import draw_design
 from linkage_ros.drawing.painting import INK, OTHER, WANTED
 from linkage_ros.errors import LinkageError
 from linkage_ros.synthesis.design import Design, FourBar, Wanted

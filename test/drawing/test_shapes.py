@@ -25,7 +25,7 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drawing.curves import drawn_once, sweep, wrapped_curve
-from linkage_ros.drawing.labels import Label, place_labels
+from linkage_ros.drawing.painting import Label, place_labels
 from linkage_ros.drawing.shapes import Circle, hull, Polygon, rounded, Segment, shapes, skeleton
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml

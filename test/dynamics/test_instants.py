@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from math import cos, exp, pi
 
-from linkage_ros.dynamics.instants import last_before
+from linkage_ros.dynamics.motion import last_before
 import pytest
 
 

@@ -22,11 +22,15 @@ import random
 
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
-from linkage_ros.kinematics.alone import pose_alone
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import transmission_angles, usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import (
+    pose_alone,
+    transmission_angles,
+    usual_inputs,
+    Way,
+)
 import pytest
 
 from .linkages import four_bar_linkage, Frame, inverted_slider_crank_linkage

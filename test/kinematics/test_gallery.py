@@ -30,7 +30,7 @@ from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.structure import Dyad, Iterated
+from linkage_ros.kinematics.topology import Dyad, Iterated
 import pytest
 
 from ..support.scenes import size_of

@@ -27,9 +27,8 @@ from linkage_ros.kinematics import closure as closure_module
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Pose, RevoluteJoint, Side
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.structure import Driven, Iterated, Structure
 from linkage_ros.kinematics.sweep_analysis import Way
-from linkage_ros.kinematics.topology import find_groups
+from linkage_ros.kinematics.topology import Driven, find_groups, Iterated, Structure
 from linkage_ros.solvers.table import TableClosure
 import numpy as np
 import pytest

@@ -25,8 +25,7 @@ import random
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.four_bars import four_bars
-from linkage_ros.kinematics.grashof import four_bar_type
+from linkage_ros.kinematics.grashof import four_bar_type, four_bars
 from linkage_ros.kinematics.linkage import Input, Linkage, Pose, RevoluteJoint
 from linkage_ros.kinematics.ranges import describe, InputRange
 from linkage_ros.kinematics.status import Status

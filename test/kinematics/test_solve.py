@@ -32,7 +32,7 @@ from campaigns.topologies.families import FAMILIES
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from linkage_ros.errors import DefinitionError
-from linkage_ros.kinematics import diagonals, dyads, free_diagonal, newton_group, point_steps, rail
+from linkage_ros.kinematics import diagonals, dyads, newton_group, point_steps, rail
 from linkage_ros.kinematics.batch import Batch, CODES
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.compiling.linkage import Answer, Compiled
@@ -364,7 +364,7 @@ def test_every_kind_of_step_is_tested() -> None:
         'close', point_steps, newton_group, *kinds
     )
     parts = [getattr(step, name, None) for step in steps for name in ('diagonal', 'rail')]
-    wanted = classes_with('at', diagonals, free_diagonal, rail)
+    wanted = classes_with('at', diagonals, diagonals, rail)
     assert {type(part) for part in parts if part is not None} == wanted
 
 

@@ -27,10 +27,10 @@ from xml.etree import ElementTree as ET
 
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
-from linkage_ros.cli.model_file import model_of
+from linkage_ros.cli.arguments import model_of
 from linkage_ros.errors import FileError
-from linkage_ros.robot_models.mjcf_part import mjcf
-from linkage_ros.robot_models.part_part import Part, PartError
+from linkage_ros.robot_models.mjcf import mjcf
+from linkage_ros.robot_models.part import Part, PartError
 from linkage_ros.robot_models.urdf import urdf
 import pytest
 import yaml

@@ -27,8 +27,8 @@ from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits
 from linkage_ros.robot_models.from_urdf import imported
-from linkage_ros.robot_models.mjcf_part import mjcf
-from linkage_ros.robot_models.part_part import Part
+from linkage_ros.robot_models.mjcf import mjcf
+from linkage_ros.robot_models.part import Part
 from linkage_ros.robot_models.urdf import urdf
 from linkage_ros.robot_models.urdf_file import read_urdf
 import mujoco

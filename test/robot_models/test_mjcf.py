@@ -25,14 +25,14 @@ from __future__ import annotations
 
 from cmath import rect
 
-from linkage_ros.cli.model_file import model_of
+from linkage_ros.cli.arguments import model_of
 from linkage_ros.dynamics.loads import Loads, Spring
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.robot_models.mjcf_part import mjcf
-from linkage_ros.robot_models.part_part import Part
+from linkage_ros.robot_models.mjcf import mjcf
+from linkage_ros.robot_models.part import Part
 import numpy as np
 import pytest
 

@@ -20,7 +20,7 @@ from collections import Counter
 from math import pi, remainder, tau
 from xml.etree import ElementTree as ET
 
-from linkage_ros.cli.model_file import model_of
+from linkage_ros.cli.arguments import model_of
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import load
 from linkage_ros.files.linkage_text import linkage_text
@@ -29,7 +29,7 @@ from linkage_ros.kinematics.sweep_analysis import samples, usual_inputs, Way
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.robot_models.from_urdf import imported
-from linkage_ros.robot_models.part_part import Part, PartError
+from linkage_ros.robot_models.part import Part, PartError
 from linkage_ros.robot_models.urdf import urdf
 from linkage_ros.robot_models.urdf_file import read_urdf
 from linkage_ros.scene.load import load_scene

@@ -25,11 +25,9 @@ from __future__ import annotations
 from cmath import rect
 from math import cos, sin
 
-from linkage_ros.robot_models.cuts import add_frames
-from linkage_ros.robot_models.part import prefixed
-from linkage_ros.robot_models.part_part import Part
+from linkage_ros.robot_models.part import Part, prefixed
 from linkage_ros.robot_models.tree import grow
-from linkage_ros.robot_models.urdf import urdf
+from linkage_ros.robot_models.urdf import add_frames, urdf
 import numpy as np
 import pytest
 

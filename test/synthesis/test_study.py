@@ -22,8 +22,7 @@ import sys
 import tracemalloc
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.synthesis.extras import distributed, scipy_optimize
-from linkage_ros.synthesis.study import CHUNK, Found, search
+from linkage_ros.synthesis.study import CHUNK, distributed, Found, scipy_optimize, search
 import numpy as np
 import pytest
 

@@ -44,10 +44,9 @@ from math import atan2, cos, sin, sqrt
 from typing import Any, NamedTuple
 
 from linkage_ros.accuracy.methods import ACCELERATION, Joints, Method, Motion, RATE
-from linkage_ros.kinematics.four_bars import four_bars
+from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
-from linkage_ros.kinematics.structure import Driven
-from linkage_ros.kinematics.topology import find_groups
+from linkage_ros.kinematics.topology import Driven, find_groups
 import numpy as np
 
 

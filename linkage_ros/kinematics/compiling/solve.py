@@ -30,12 +30,10 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.batch import Array, Batch, CODES, Codes, Mask
-from linkage_ros.kinematics.compiling.blocks import BlockFunction
-from linkage_ros.kinematics.compiling.fates import Fate, fates, Fork
 from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, Number
+from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, BlockFunction, Number
 from linkage_ros.kinematics.compiling.real_program import Lowered, lowered
-from linkage_ros.kinematics.compiling.trace import joints, Wanted
+from linkage_ros.kinematics.compiling.trace import Fate, fates, Fork, joints, Wanted
 from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 import numpy as np

@@ -32,9 +32,9 @@ from typing import Any, ClassVar, NamedTuple
 from linkage_ros import __version__
 from linkage_ros.errors import clean
 from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.compiling.real_program import Branch, Program, program, Solved, Tree
 from linkage_ros.kinematics.compiling.tape import Operation
 from linkage_ros.kinematics.compiling.trace import Motion
-from linkage_ros.kinematics.compiling.tree import Branch, Program, program, Solved, Tree
 from linkage_ros.kinematics.compiling.writer import uses, Writer
 from linkage_ros.kinematics.limits import Bound
 from linkage_ros.kinematics.linkage import RevoluteJoint

@@ -17,13 +17,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.kinematics.compiling.tape import Decision, Operation, Symbol, Tape
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
+
 
 Number = Operation | float
 """What a program returns: an operation, or a constant."""
@@ -128,3 +129,71 @@ def moved(closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool 
 def number_of(found: Any) -> Number:
     """Return the operation of a symbol, or the constant that a number is."""
     return found.operation if isinstance(found, Symbol) else found
+
+
+# What becomes of a linkage where it leaves a path: which status it has there.
+
+
+class Fork(NamedTuple):
+    """A condition, and what becomes of the linkage where it holds and where it does not."""
+
+    condition: Operation
+    held: Fate
+    failed: Fate
+
+
+Fate: TypeAlias = Status | Fork | None
+"""A status; or nothing, where the steps go on in another way and only they can tell."""
+
+
+def fates(closure: Closure, path: Path) -> tuple[Fate, ...]:
+    """
+    Return for each decision of a path what becomes of the linkage where it falls otherwise.
+
+    The status is that of the first step that is not closed. Where that has a pose, as at a toggle,
+    a later step may have a worse one.
+
+    Parameters
+    ----------
+    closure
+        The linkage.
+    path
+        As it was traced, without limits.
+
+    """
+    found: list[Fate] = []
+    held: list[bool] = []
+    for decision in path.decisions:
+        if decision.condition.name == 'finite':
+            found.append(Status.INDETERMINATE)
+        else:
+            found.append(_fate(closure, path, [*held, not decision.held]))
+            held.append(decision.held)
+    return tuple(found)
+
+
+def _fate(closure: Closure, path: Path, decided: Sequence[bool]) -> Fate:
+    """Return the fate of a linkage whose first decisions fall as is said."""
+    tape = path.tape
+    tape.begin()
+    inputs = path.inputs[: len(closure.linkage.inputs)]
+    symbols: list[Any] = [Symbol(tape, given) for given in inputs]
+    known = closure.known(*symbols)
+    # The inputs are finite: what is decided begins with the first step.
+    tape.begin(decided)
+    fate: Fate = None
+    for step in closure.steps:
+        status = step.close(known).status
+        if status is not Status.CLOSED:
+            fate = status
+            break
+        if len(tape.decisions) >= len(decided):
+            break
+    count = len(decided)
+    made = tape.decisions[count:]
+    for number in reversed(range(len(made))):
+        before = [*decided, *(decision.held for decision in made[:number])]
+        other = _fate(closure, path, [*before, not made[number].held])
+        condition, held = made[number]
+        fate = Fork(condition, fate, other) if held else Fork(condition, other, fate)
+    return fate

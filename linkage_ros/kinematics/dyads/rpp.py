@@ -31,7 +31,7 @@ from __future__ import annotations
 from math import asin
 from typing import NamedTuple
 
-from linkage_ros.kinematics.plane import cross
+from linkage_ros.kinematics.arithmetic import cross
 from linkage_ros.kinematics.rail import Rail, Sight
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State

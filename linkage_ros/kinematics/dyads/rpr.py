@@ -41,8 +41,13 @@ from math import inf
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import atan2
-from linkage_ros.kinematics.diagonal import AnyDiagonal, Diagonal, Growth
-from linkage_ros.kinematics.diagonals import CrankDiagonal, UnsignedDiagonal
+from linkage_ros.kinematics.diagonals import (
+    AnyDiagonal,
+    CrankDiagonal,
+    Diagonal,
+    Growth,
+    UnsignedDiagonal,
+)
 from linkage_ros.kinematics.rounding import margin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 RRR: two links pinned together; the coupler and the rocker of a four-bar.
 
@@ -50,10 +49,18 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import NamedTuple
 
-from linkage_ros.kinematics.arithmetic import atan2
-from linkage_ros.kinematics.diagonal import AnyDiagonal, Diagonal, Growth, GrowthChange
-from linkage_ros.kinematics.diagonals import CrankDiagonal, UnsignedDiagonal
-from linkage_ros.kinematics.plane import folded
+from linkage_ros.kinematics.arithmetic import atan2, copysign, facing, folded, phase
+from linkage_ros.kinematics.diagonals import (
+    AnyDiagonal,
+    CrankDiagonal,
+    Diagonal,
+    free_diagonal,
+    free_growth,
+    free_growth_change,
+    Growth,
+    GrowthChange,
+    UnsignedDiagonal,
+)
 from linkage_ros.kinematics.rounding import margin, SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
@@ -210,4 +217,335 @@ def triangle_accelerations(
         first = part * lean + growth.turn
         changes.coordinates.append(
             change.base + change.change * first + whirl * (swirl + part * bend)
+        )
+
+
+# RRR on two links that are pinned together, with a change point where they lie folded.
+#
+# There |d − a| = |b − c|, and of `RRRDyad` over a `CrankDiagonal` one root is near itself. Where A
+# passes D closely, s is small, and of ω = (σρ·((b² − c²) ± s²) − 2a(d − a) + near²)/(2s²), with
+# ρ = far/stretch, all but a little cancels. With A = a + d, B = b + c, R = stretch and
+# N = B² − A², its bracket::
+#
+#     ρ² = (A² − s²)/(B² − s²)        B·ρ = A − s²·w        w = N/(R·(B·far + A·R))
+#
+# Put in, s² divides all but a constant, which is 0 on one side (σ = +1 where b − c = d − a)::
+#
+#     ω3 = (1 − σρ − σ·(b − c)·w)/2 − k/(2s²)
+#     ω4 = (1 + σρ − σ·(b − c)·w)/2 − k/(2s²)        k = A·((d − a) − σ·(b − c))
+#
+# and 1 − ρ = N/R²/(1 + ρ). Of a parallelogram N = 0 and ω4 = 1. By φ, of which s² has the
+# derivative near·far, and with H = B·(R² + far²)/(2R) + A·far::
+#
+#     α3 = σ·N·near/2·(+1/(2R³) − (b − c)·H/G²) + k·near·far/(2s⁴)
+#     α4 = σ·N·near/2·(−1/(2R³) − (b − c)·H/G²) + k·near·far/(2s⁴)        G = N/w
+#
+# Where far is below 0, ρ is, too: σ and near change their signs, and far is taken positive.
+# Without this 4,000 u·κ of a velocity and 10⁶ u·κ of an acceleration were lost, κ being that of
+# lengths which change together, so that the change point stays one.
+
+
+class FoldingRRRRates(NamedTuple):
+    """
+    What the accelerations start from.
+
+    Attributes
+    ----------
+    swing
+        φ̇.
+    first, second
+        ω3 and ω4 of φ̇ = 1, against OD.
+    side
+        σ, and its sign changed where far is below 0.
+    constant
+        k.
+
+    """
+
+    swing: float
+    first: float
+    second: float
+    side: float
+    constant: float
+
+
+class FoldingRRRDyad(RRRDyad):
+    """
+    Two links pinned together, on two links that are, which can lie folded along each other.
+
+    Parameters
+    ----------
+    diagonal
+        From A to D; it `fits`.
+    b, c, sign
+        As in `RRRDyad`.
+
+    """
+
+    __slots__ = ('_constants',)
+
+    diagonal: CrankDiagonal
+
+    def __init__(self, diagonal: CrankDiagonal, b: float, c: float, sign: int) -> None:
+        super().__init__(diagonal, b, c, sign)
+        a, d = diagonal.sides
+        whole = Fraction(a) + Fraction(d)
+        apart = Fraction(d) - Fraction(a)
+        left, right = (
+            float(whole * (apart - Fraction(one) + Fraction(other)))
+            if margin(d, -a, -one, other)
+            else 0.0
+            for one, other in ((b, c), (c, b))
+        )
+        self._constants = (float(whole), b + c, b - c, diagonal.brackets[1], left, right)
+
+    @staticmethod
+    def fits(diagonal: AnyDiagonal) -> bool:
+        """Return whether a diagonal passes such a change point."""
+        return isinstance(diagonal, CrankDiagonal) and not diagonal.brackets[0]
+
+    def rates(  # type: ignore[override]  # other ones
+        self, pose: RRRPose, _known: State, speeds: State
+    ) -> FoldingRRRRates:
+        """Append the rates of both links."""
+        outer, inner, apart, bracket, left, right = self._constants
+        stretch, far = pose.diagonal.stretch, pose.diagonal.far
+        fold_ratio, stretch_ratio = self.diagonal.ratios(pose.diagonal)
+        ratio = self._sign * fold_ratio * stretch_ratio
+        side = copysign(1.0, ratio)
+        # 1 on one side and 0 on the other one.
+        same, other = 0.5 + 0.5 * side, 0.5 - 0.5 * side
+        constant = same * left + other * right
+        more, less, bent = 1.0 + abs(ratio), 0.0, 0.0
+        if bracket:
+            less = bracket / stretch / stretch / more
+            bent = side * apart * (bracket / (stretch * (inner * abs(far) + outer * stretch)))
+        rest = 0.5 * bent + 0.5 * constant / pose.diagonal.square
+        v = speeds.coordinates
+        i, j = self.diagonal.arms
+        base = v[j]
+        swing = v[i] - base
+        first = 0.5 * (same * less + other * more) - rest
+        second = 0.5 * (same * more + other * less) - rest
+        v.append(base + swing * first)
+        v.append(base + swing * second)
+        return FoldingRRRRates(swing, first, second, side, constant)
+
+    def accelerations(  # type: ignore[override]  # of its own rates
+        self,
+        pose: RRRPose,
+        rates: FoldingRRRRates,
+        _known: State,
+        _speeds: State,
+        changes: State,
+    ) -> None:
+        """Append the accelerations of both links."""
+        outer, inner, apart, bracket, _, _ = self._constants
+        square, stretch = pose.diagonal.square, pose.diagonal.stretch
+        near, far = pose.diagonal.near, pose.diagonal.far
+        whirl = 0.5 * rates.constant * (near / square) * (far / square)
+        turn = 0.0
+        if bracket:
+            size = abs(far)
+            part = inner * size + outer * stretch
+            push = 0.5 * rates.side * bracket * near * copysign(1.0, far)
+            turn = 0.5 * push / stretch / stretch / stretch
+            slope = 0.5 * inner * (stretch + size * (size / stretch)) + outer * size
+            whirl -= push * apart * (slope / stretch / part) / stretch / part
+        a = changes.coordinates
+        i, j = self.diagonal.arms
+        base = a[j]
+        pull, square_rate = a[i] - base, rates.swing * rates.swing
+        a.append(base + pull * rates.first + square_rate * (whirl + turn))
+        a.append(base + pull * rates.second + square_rate * (whirl - turn))
+
+
+# RRR whose links change their length: cylinders, and links with a motor in them.
+#
+# A side of the triangle runs through links that driven joints hold together, so that its vector z
+# in the frame of its first link is a function of the inputs. At one state it is a triangle like
+# any other. For the rates, the end of a side that did not turn would move by ż·e^{iθ}: added to
+# the velocity of its outer pin, this gives the velocity equation of a dyad of constant sides.
+# Likewise (z̈ + 2i·θ̇·ż)·e^{iθ} for the accelerations.
+
+
+class Carry(NamedTuple):
+    """
+    From the frame of one link to that of the one which it is driven against.
+
+    A point z becomes origin + e^{i·(angle + sign·x[turn])}·(z − inner) + sign·x[slide]·unit; turn
+    or slide is the input, the other one is −1.
+    """
+
+    origin: complex
+    inner: complex
+    angle: float
+    turn: int
+    slide: int
+    sign: float
+    unit: complex
+
+
+class Side:
+    """
+    A vector from one point of a group of links to another, in the frame of the first one's link.
+
+    Parameters
+    ----------
+    start, end
+        The points, each in the frame of its own link.
+    carries
+        From the link of the end to the link of the start, one after the other.
+
+    """
+
+    __slots__ = ('_carries', '_end', '_start')
+
+    def __init__(self, start: complex, end: complex, carries: tuple[Carry, ...]) -> None:
+        self._start = start
+        self._end = end
+        self._carries = carries
+
+    def at(self, x: list[float]) -> complex:
+        """Return the vector."""
+        z = self._end
+        for origin, inner, angle, turn, slide, sign, unit in self._carries:
+            if turn >= 0:
+                z = origin + facing(angle + sign * x[turn]) * (z - inner)
+            else:
+                z = origin + facing(angle) * (z - inner) + sign * x[slide] * unit
+        return z - self._start
+
+    def changes(
+        self, x: list[float], v: list[float], a: list[float] | None = None
+    ) -> tuple[complex, complex]:
+        """Return its first derivative, and its second one where accelerations are given."""
+        z, rate, change = self._end, 0j, 0j
+        for origin, inner, angle, turn, slide, sign, unit in self._carries:
+            if turn >= 0:
+                turned = facing(angle + sign * x[turn])
+                w = sign * v[turn]
+                arm = z - inner
+                if a is not None:
+                    pull = (1j * (sign * a[turn]) - w * w) * arm
+                    change = turned * (change + 2j * w * rate + pull)
+                rate = turned * (rate + 1j * w * arm)
+                z = origin + turned * arm
+            else:
+                held = facing(angle)
+                if a is not None:
+                    change = held * change + sign * a[slide] * unit
+                rate = held * rate + sign * v[slide] * unit
+                z = origin + held * (z - inner) + sign * x[slide] * unit
+        return rate, change
+
+
+class DrivenRRRPose(NamedTuple):
+    """The triangle, and both sides in the frames of their first links."""
+
+    status: Status
+    gap: float
+    triangle: RRRPose
+    sides: tuple[complex, complex]
+
+
+class DrivenRRRRates(NamedTuple):
+    """The growth of the diagonal, and the rates of both sides."""
+
+    growth: Growth
+    sides: tuple[complex, complex]
+
+
+class DrivenRRRDyad:
+    """
+    Two groups of links pinned together.
+
+    Parameters
+    ----------
+    ends
+        Indices of the outer pins A and D among the pins.
+    sides
+        From A to B, and from D to B.
+    sign
+        The assembly: +1 where B lies left of A→D, −1 where it lies right of it.
+
+    """
+
+    __slots__ = ('_ends', '_sides', '_sign')
+
+    def __init__(self, ends: tuple[int, int], sides: tuple[Side, Side], sign: int) -> None:
+        self._ends = ends
+        self._sides = sides
+        self._sign = float(sign)
+
+    def close(self, known: State) -> DrivenRRRPose:
+        """Append the angles of the first link of each group."""
+        x = known.coordinates
+        start, end = (known.pins[i] for i in self._ends)
+        one, other = (side.at(x) for side in self._sides)
+        b, c = abs(one), abs(other)
+        diagonal = free_diagonal(
+            end - start, abs(start) + abs(end), abs(b - c), b + c, 4.0 * b * c
+        )
+        difference = (b - c) * (b + c)
+        pose = close_triangle(diagonal, difference, difference, self._sign)
+        x.append(pose.first - phase(one))
+        x.append(pose.second - phase(other))
+        return DrivenRRRPose(pose.status, pose.gap, pose, (one, other))
+
+    def rates(self, pose: DrivenRRRPose, known: State, speeds: State) -> DrivenRRRRates:
+        """Append the rates of the first link of each group."""
+        start, end = self._ends
+        (one, _), (other, _) = (
+            side.changes(known.coordinates, speeds.coordinates) for side in self._sides
+        )
+        unit, other_unit = self._units(pose)
+        between = speeds.pins[end] + other * other_unit - speeds.pins[start] - one * unit
+        vector = known.pins[end] - known.pins[start]
+        growth = free_growth(pose.triangle.diagonal, vector, between)
+        triangle_rates(pose.triangle, self._sign, growth, speeds)
+        return DrivenRRRRates(growth, (one, other))
+
+    def accelerations(
+        self,
+        pose: DrivenRRRPose,
+        rates: DrivenRRRRates,
+        known: State,
+        speeds: State,
+        changes: State,
+    ) -> None:
+        """Append the accelerations of the first link of each group."""
+        x, v, a = known.coordinates, speeds.coordinates, changes.coordinates
+        start, end = self._ends
+        growth, triangle = rates.growth, pose.triangle
+        lean = self._sign * growth.lean
+        # The rates of this dyad's own links, as `rates` has appended them.
+        turns = growth.turn + triangle.less * lean, growth.turn + triangle.more * lean
+        pulls = []
+        for side, turn, rate, unit in zip(
+            self._sides, turns, rates.sides, self._units(pose), strict=True
+        ):
+            _, change = side.changes(x, v, a)
+            pulls.append((change + 2j * turn * rate) * unit)
+        one, other = pulls
+        between = changes.pins[end] + other - changes.pins[start] - one
+        growth_change = free_growth_change(growth, known.pins[end] - known.pins[start], between)
+        b, c = map(abs, pose.sides)
+        difference = (b - c) * (b + c)
+        triangle_accelerations(triangle, self._sign, difference, growth, growth_change, changes)
+
+    def side_of(self, pose: DrivenRRRPose) -> float:
+        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        return pose.triangle.cross
+
+    def transmission_angle(self, pose: DrivenRRRPose) -> float:
+        """Return the angle between the two sides at B, folded into [0, π/2], in [rad]."""
+        return folded(pose.triangle.second - pose.triangle.first)
+
+    def _units(self, pose: DrivenRRRPose) -> tuple[complex, complex]:
+        """Return e^{iθ} of the first link of each group."""
+        triangle, (one, other) = pose.triangle, pose.sides
+        return (
+            facing(triangle.first - phase(one)),
+            facing(triangle.second - phase(other)),
         )

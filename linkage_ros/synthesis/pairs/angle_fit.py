@@ -33,9 +33,9 @@ from math import inf, isfinite
 from linkage_ros.errors import SynthesisError
 from linkage_ros.synthesis.design import Design, FourBar
 from linkage_ros.synthesis.double_double import Array
-from linkage_ros.synthesis.extras import scipy_optimize
 from linkage_ros.synthesis.pairs.freudenstein import fit_equation, links, wanted_of
 from linkage_ros.synthesis.proof import SIDES
+from linkage_ros.synthesis.study import scipy_optimize
 import numpy as np
 
 _TOLERANCE = 1e-15

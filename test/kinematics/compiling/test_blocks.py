@@ -32,11 +32,9 @@ from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.arithmetic import sin, sqrt
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.compiling.blocks import BlockFunction
-from linkage_ros.kinematics.compiling.function import straight
 from linkage_ros.kinematics.compiling.linkage import Compiled
-from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm
-from linkage_ros.kinematics.compiling.python import python_source
+from linkage_ros.kinematics.compiling.numpy_blocks import ArrayForm, BlockFunction
+from linkage_ros.kinematics.compiling.python import python_source, straight
 from linkage_ros.kinematics.compiling.tape import Tape
 from linkage_ros.kinematics.compiling.trace import Motion
 from linkage_ros.kinematics.linkage import Limits
