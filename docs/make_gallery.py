@@ -33,9 +33,9 @@ from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,
+    InputSweep,
     transmission_angles,
     usual_inputs,
-    Way,
 )
 from linkage_ros.kinematics.topology import Driven
 from PIL import Image
@@ -129,7 +129,7 @@ def _sequence(closure: Closure) -> str:
 def _range(closure: Closure) -> str:
     if len(closure.linkage.inputs) > 1:
         return 'it depends on every input'
-    way = Way(closure)
+    way = InputSweep(closure)
     said = []
     for interval in way.ranges:
         if interval.whole:
@@ -147,7 +147,7 @@ def _worst(closure: Closure) -> str:
     """Return the smallest transmission angle of all dyads, or the worst conditioning."""
     if len(closure.linkage.inputs) > 1:
         return ''
-    way = Way(closure)
+    way = InputSweep(closure)
     angles = transmission_angles(way)
     if angles:
         group, found = min(angles.items(), key=lambda item: item[1].lowest.value)

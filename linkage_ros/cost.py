@@ -32,14 +32,21 @@ from statistics import median
 from time import perf_counter_ns
 from typing import NamedTuple
 
-from linkage_ros.effects.stage import bringing, brings, EFFECTS, in_order, LOADED, module_of
+from linkage_ros.effects.stage import (
+    bringing,
+    dependencies,
+    EFFECTS,
+    FORCE_EFFECTS,
+    in_order,
+    module_of,
+)
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.measuring import spread_of
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.scene.scene import Member, Scene
+from linkage_ros.scene.scene import Scene, SceneLinkage
 
 _BEGIN = 1_000_000_000
 _USUAL_RATE = 1000.0
@@ -75,7 +82,7 @@ def _paths(closure: Closure) -> list[Path]:
     if len(centers) > 1:
         sizes = [0.01 * closure.scale if i.slider else 0.01 for i in closure.linkage.inputs]
         return [_swing(c, size, speed) for c, size in zip(centers, sizes, strict=True)]
-    widest = Way(closure).widest_range
+    widest = InputSweep(closure).widest_range
     if widest is None or widest.whole:
         return [lambda seconds: (speed * seconds, speed)]
     middle, width = 0.5 * (widest.lowest + widest.highest), widest.highest - widest.lowest
@@ -173,16 +180,16 @@ class Variants:
             return None
 
 
-def _with(member: Member, named: Names) -> Member:
+def _with(member: SceneLinkage, named: Names) -> SceneLinkage:
     """Return a linkage with these effects, of those that it has or that they bring in."""
     own = member.effects
-    brought = {need for effect in own for need in brings(effect)}
+    brought = {need for effect in own for need in dependencies(effect)}
     effects = {
         name: own[name] if name in own else module_of(name).PARAMETERS()
         for name in in_order({*own, *brought})
         if name in named
     }
-    forced = member.drive[0] == 'torque' or not named.isdisjoint(LOADED)
+    forced = member.drive[0] == 'torque' or not named.isdisjoint(FORCE_EFFECTS)
     return replace(member, effects=effects, loads=member.loads if forced else None)
 
 
@@ -347,7 +354,10 @@ def _added(
     name: str, named: Names, variants: Variants
 ) -> tuple[Variant | None, Variant | None, str]:
     """Return the scene without and with an effect alone, or beside another; and which."""
-    for beside in ('', *(loaded for loaded in LOADED if loaded in named and loaded != name)):
+    for beside in (
+        '',
+        *(loaded for loaded in FORCE_EFFECTS if loaded in named and loaded != name),
+    ):
         base = Names({beside} - {''})
         one = variants.attempt(base | {name})
         if one is not None:

@@ -88,7 +88,7 @@ linkages:
   - {{name: right, linkage: half_open.yaml, {turning}, effects: {{velocity: {{}}}}}}
 """)
     whole = Pipeline(scene)
-    monkeypatch.setattr('linkage_ros.pipeline.pipeline.Line.whole', None)
+    monkeypatch.setattr('linkage_ros.pipeline.pipeline.LinkagePipeline.whole', None)
     apart = Pipeline(scene)
     usual = 0
     for number in range(400):

@@ -27,7 +27,7 @@ import sys
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.pipeline.pipeline import Look
+from linkage_ros.pipeline.pipeline import LinkageTick
 import pytest
 
 from .node.loops import FIVE_BAR
@@ -154,7 +154,7 @@ def test_before_the_first_sample_and_after_the_last_there_is_silence():
 
 
 def assert_silent(tick):
-    assert tick.looks == (Look(None, None, None, None),)
+    assert tick.looks == (LinkageTick(None, None, None, None),)
     assert (tick.message, tick.extras) == (b'', ())
 
 

@@ -23,9 +23,9 @@ from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.linkage import GROUND, Mass
-from linkage_ros.kinematics.topology import find_groups
+from linkage_ros.kinematics.topology import assur_groups
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import Look, Pipeline
+from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
 
@@ -80,7 +80,7 @@ def with_masses(file):
 
 def with_forces(linkage):
     """Yield scenes of a linkage with all that works with forces."""
-    joints = find_groups(linkage).joints
+    joints = assur_groups(linkage).joints
     pins = {joint.name for joint in joints if joint.kind == 'R'}
     held = {
         link: [joint for joint in joints if link in (joint.link, joint.to)]
@@ -119,7 +119,7 @@ def check(linkage, scene, looked=1):
             continue
         for look, beside in zip(one.looks, other.looks, strict=True):
             assert (look.crank, look.reading) == (beside.crank, beside.reading)
-        assert all(isinstance(seen, Look) for seen in other.seen)
+        assert all(isinstance(seen, LinkageTick) for seen in other.seen)
 
 
 @pytest.mark.parametrize('drive', DRIVES)
@@ -153,7 +153,9 @@ def test_the_usual_tick_is_straight(effects):
         (ROOT / 'config' / 'linkages' / 'four_bar.yaml').read_bytes(),
         f'{DRIVES["turning"]}\neffects: {effects}',
     )
-    plain = [number for number, tick in enumerate(ticks(work)) if isinstance(tick.seen[0], Look)]
+    plain = [
+        number for number, tick in enumerate(ticks(work)) if isinstance(tick.seen[0], LinkageTick)
+    ]
     # The first, and those at which an angle passes half a turn.
     assert plain[0] == 0
     assert len(plain) <= 1 + 2 * TICKS * 0.04 / 6.28

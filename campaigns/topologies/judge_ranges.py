@@ -74,7 +74,7 @@ def judge_ranges(
         ranges = closure.input_ranges
         singular = closure.singular_inputs
         position = closure.position(*topology.start)
-        distance = closure.nearness(position).toggle_distance if position.joints else inf
+        distance = closure.singularity_margin(position).toggle_distance if position.joints else inf
     except Exception as error:  # noqa: BLE001 - it is counted
         findings.find('traceback: ranges', repr(error))
         return

@@ -27,9 +27,9 @@ from typing import Any, NamedTuple
 
 from linkage_ros.bag.topic import Topic
 from linkage_ros.bag.writer import BagWriter
-from linkage_ros.effects.stage import Reading
+from linkage_ros.effects.stage import SensorReading
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.pipeline import Look, Pipeline
+from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline
 from linkage_ros.scene.load import load_scene
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +68,7 @@ class Run(NamedTuple):
 
     pipeline: Pipeline
     times: Values
-    looks: list[Look]
+    looks: list[LinkageTick]
 
     def position(self, joint: str) -> Values:
         """Return what is published of a joint, in [rad] or [m]; nan where nothing is."""
@@ -121,7 +121,7 @@ class Run(NamedTuple):
             ]
         )
 
-    def _read(self, joint: str, values: Callable[[Reading], Sequence[float]]) -> Values:
+    def _read(self, joint: str, values: Callable[[SensorReading], Sequence[float]]) -> Values:
         place = self.pipeline.lines[0].member.joints.index(joint)
         read = [look.reading and values(look.reading) for look in self.looks]
         return np.array([each[place] if each else nan for each in read])

@@ -45,7 +45,7 @@ from linkage_ros.dynamics.motion import Motion, OneFreedom
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.ranges import InputRange
 from linkage_ros.measuring import alternating, Progress, Spread, spread_of
-from linkage_ros.scene.scene import Member, Scene
+from linkage_ros.scene.scene import Scene, SceneLinkage
 
 SECONDS = 10.0
 
@@ -106,7 +106,7 @@ class Integrated(NamedTuple):
     times: Sequence[float]
 
 
-def free_motion(member: Member) -> FreeMotion:
+def free_motion(member: SceneLinkage) -> FreeMotion:
     """
     Return a free motion of a linkage, with its known end.
 
@@ -281,7 +281,7 @@ def measure_dynamics(scene: Scene, quick: bool, progress: Progress) -> Part | No
     )
 
 
-def _settings(member: Member, quick: bool) -> list[tuple[str, float]]:
+def _settings(member: SceneLinkage, quick: bool) -> list[tuple[str, float]]:
     """Return methods and steps, with those of the scene."""
     drive = member.drive[1]
     settings = [

@@ -40,7 +40,7 @@ from linkage_ros.cost import (
     Times,
     Variants,
 )
-from linkage_ros.effects.stage import Reading
+from linkage_ros.effects.stage import SensorReading
 from linkage_ros.measuring import Progress, Spread
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
@@ -114,8 +114,8 @@ def departure(true: Pipeline, real: Pipeline, fed: Iterable[tuple[int, bytes]]) 
 
 def _compare(
     turning: Sequence[bool],
-    truth: Reading,
-    reading: Reading,
+    truth: SensorReading,
+    reading: SensorReading,
     errors: tuple[_Errors, _Errors, _Errors],
 ) -> None:
     angles, slides, rates = errors

@@ -38,7 +38,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, RevoluteJoint
 from linkage_ros.kinematics.ranges import reach
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import grid, Way
+from linkage_ros.kinematics.sweep_analysis import grid, InputSweep
 from linkage_ros.measuring import Spread
 from linkage_ros.resources import shipped
 import numpy as np
@@ -134,7 +134,7 @@ def easy(closure: Closure, count: int) -> tuple[tuple[float, ...], ...]:
         candidates = [inputs for inputs, _ in grid(closure, lines)]
         clear = candidates
     else:
-        interval = Way(closure).widest_range
+        interval = InputSweep(closure).widest_range
         assert interval is not None, 'reading the file has proved that it closes somewhere'
         low, span = interval.lowest, interval.highest - interval.lowest
         # Parts of the golden ratio: evenly spread, and on the knots of no table.
@@ -168,7 +168,7 @@ def path(poses: Poses, count: int) -> Poses | None:
     closure = Closure(poses.linkage)
     if len(poses.linkage.inputs) > 1:
         return None
-    interval = Way(closure).widest_range
+    interval = InputSweep(closure).widest_range
     assert interval is not None, 'reading the file has proved that it closes somewhere'
     low, span = poses.inputs[0][0], tau
     if not interval.whole:
@@ -186,7 +186,7 @@ def there_and_back(states: Sequence[tuple[float, ...]]) -> tuple[tuple[float, ..
 
 def near_toggle(closure: Closure) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
     """Return inputs next to an end of the widest range, with their distances from it."""
-    interval = Way(closure).widest_range if len(closure.linkage.inputs) == 1 else None
+    interval = InputSweep(closure).widest_range if len(closure.linkage.inputs) == 1 else None
     if interval is None or interval.whole or not any(interval.limited):
         return (), ()
     upper = interval.limited[1]
@@ -273,7 +273,7 @@ def _ease(closure: Closure, inputs: Sequence[float]) -> float:
     position = closure.position(*inputs)
     if position.status is not Status.CLOSED:
         return -inf
-    return closure.nearness(position).conditioning
+    return closure.singularity_margin(position).conditioning
 
 
 FAR = 0.1

@@ -41,7 +41,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.measuring import Progress, Spread, spread_of
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.processes import Graph, MeasurementError
@@ -89,7 +89,7 @@ def motions_of(closure: Closure, seconds: float) -> Motions:
 
     """
     (start,) = usual_inputs(closure)
-    widest = Way(closure).widest_range
+    widest = InputSweep(closure).widest_range
     length = round(seconds * NANOSECONDS)
     middle, swing, begin, growth = start, _SWING, start, _GROWTH
     if widest is not None and not widest.whole:

@@ -245,7 +245,7 @@ MOST_ATTACHED = 64 * 2**20
 _LONGEST_QOS, _MOST_QOS = 1024, 64
 """Of one profile: letters, and values; rosbag2 writes some 320 and 33."""
 
-Told = Callable[[int], None]
+ProgressCallback = Callable[[int], None]
 """Takes how many bytes of a file have been read, now and then; what it raises ends the reading."""
 
 
@@ -314,7 +314,7 @@ class Bag:
 
 
 def read_bag(
-    path: str | Path, *, allow_truncated: bool = False, told: Told = lambda read: None
+    path: str | Path, *, allow_truncated: bool = False, told: ProgressCallback = lambda read: None
 ) -> Bag:
     """
     Open a bag for reading.
@@ -379,7 +379,7 @@ def read_bag(
 
 
 def _description(
-    file: Path, told: Told, *, finished: bool
+    file: Path, told: ProgressCallback, *, finished: bool
 ) -> tuple[Definitions, list[Attachment], list[str]]:
     """
     Return schemas and channels, attachments, and names of those that are not kept in memory.
@@ -412,7 +412,7 @@ def _kept(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str
 
 
 def _contents(
-    file: Path, definitions: Definitions, told: Told, *, until_damage: bool
+    file: Path, definitions: Definitions, told: ProgressCallback, *, until_damage: bool
 ) -> Iterator[Found]:
     """Yield messages, attachments and metadata in the order of the file; checksums fit."""
     finished = is_finished(file)

@@ -282,7 +282,7 @@ class NewBag:
         )
 
 
-Told = Callable[[int, int], None]
+ProgressCallback = Callable[[int, int], None]
 Stopped = Callable[[], bool]
 
 
@@ -306,7 +306,7 @@ def recovered_name(path: Path) -> Path:
 def recover(
     path: Path,
     target: Path | None = None,
-    told: Told = lambda done, of: None,
+    told: ProgressCallback = lambda done, of: None,
     stopped: Stopped = lambda: False,
 ) -> Recovery | None:
     """

@@ -44,7 +44,7 @@ _LONGEST_ACCOUNT = 4 * 2**20
 VERSIONS = ('linkage_ros', 'python', 'machine')
 
 
-class Taken(NamedTuple):
+class SampleEvent(NamedTuple):
     """A crank message that a tick took, by its clock and by that of the source, in [ns]."""
 
     log_time: int
@@ -52,7 +52,7 @@ class Taken(NamedTuple):
     data: bytes
 
 
-class Turned(NamedTuple):
+class FaultEvent(NamedTuple):
     """A message that a fault has begun or ended, and when, in [ns]."""
 
     log_time: int
@@ -68,7 +68,7 @@ class Reset(NamedTuple):
     data: bytes
 
 
-class Made(NamedTuple):
+class TickEvent(NamedTuple):
     """
     What a tick made.
 
@@ -87,7 +87,7 @@ class Made(NamedTuple):
     messages: tuple[bytes, ...]
 
 
-Event = Taken | Turned | Reset | Made
+Event = SampleEvent | FaultEvent | Reset | TickEvent
 
 
 class RunAccount(NamedTuple):
@@ -247,26 +247,26 @@ def recorded_events(
                 continue
         if open_tick is not None:
             log, time, made = open_tick
-            yield Made(log, time, tuple(made))
+            yield TickEvent(log, time, tuple(made))
             open_tick = None
         # In older bags two linkages that withhold at one tick say so twice.
         again, withheld = withheld == (log_time, publish_time), None
         if taken:
-            yield Taken(log_time, publish_time, data)
+            yield SampleEvent(log_time, publish_time, data)
         if output is not None:
             open_tick = log_time, publish_time, [b''] * len(outputs)
             open_tick[2][output] = data
         elif topic == run.faults_topic:
-            yield Turned(log_time, publish_time, data)
+            yield FaultEvent(log_time, publish_time, data)
         elif topic == run.resets_topic:
             yield Reset(log_time, publish_time, data)
         elif topic == run.withheld_topic:
             withheld = log_time, publish_time
             if not again:
-                yield Made(log_time, publish_time, (b'',) * len(outputs))
+                yield TickEvent(log_time, publish_time, (b'',) * len(outputs))
     if open_tick is not None:
         log, time, made = open_tick
-        yield Made(log, time, tuple(made))
+        yield TickEvent(log, time, tuple(made))
 
 
 _NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')

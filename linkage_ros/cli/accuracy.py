@@ -32,7 +32,7 @@ from linkage_ros.accuracy.page.files import check_folder, PAGE, write_page
 from linkage_ros.accuracy.page.numbers import cell_text, numeric_columns
 from linkage_ros.accuracy.results import Results
 from linkage_ros.accuracy.results import Table as Measured
-from linkage_ros.cli.terminal import progress, show, Table, Told
+from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
 from linkage_ros.errors import did_you_mean, LinkageError, listed
 from linkage_ros.scene.load import load_scene
 
@@ -125,7 +125,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 class _Overall:
     """Makes of how much of a part is done how much of all is."""
 
-    def __init__(self, parts: list[str], told: Told, stop: Event) -> None:
+    def __init__(self, parts: list[str], told: ProgressCallback, stop: Event) -> None:
         self._told, self._stop = told, stop
         self._done = dict.fromkeys(parts, 0.0)
 

@@ -23,7 +23,7 @@ from pathlib import Path
 import sys
 
 from linkage_ros.errors import LinkageError
-from linkage_ros.files.atomic_write import write_whole
+from linkage_ros.files.atomic_write import atomic_write
 from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.linkage import Linkage
@@ -145,5 +145,5 @@ def put(data: bytes, output: Path | None) -> None:
     if output is None:
         sys.stdout.write(data.decode())
     else:
-        write_whole(output, data)
+        atomic_write(output, data)
         print(output)

@@ -43,8 +43,8 @@ from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import BagError, clean, listed
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.replay.replay import recorded_scene
-from linkage_ros.replay.worst_residuals import Examined, WorstStates
-from linkage_ros.scene.scene import Member, Scene
+from linkage_ros.replay.worst_residuals import Examined, WorstResiduals
+from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heeded, StoppedError
 
 _MIB = 2**20
@@ -272,7 +272,7 @@ def scene_account(scene: Scene) -> dict[str, Any]:
     }
 
 
-def worst_account(worst: WorstStates) -> dict[str, Any]:
+def worst_account(worst: WorstResiduals) -> dict[str, Any]:
     """Return what there is to say of a linkage's states, to stand beside what its scene says."""
     account: dict[str, Any] = {
         'four_bars': [
@@ -317,7 +317,7 @@ def local(time: int | None) -> str | None:
     return f'{there:%Y-%m-%d %H:%M:%S}.{rest:09d}{there:%z}'
 
 
-def _linkage(member: Member) -> dict[str, Any]:
+def _linkage(member: SceneLinkage) -> dict[str, Any]:
     linkage = member.linkage
     return {
         'name': member.name,

@@ -33,9 +33,9 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,
     Extreme,
-    Extremes,
+    InputSweep,
+    MinMaxCurve,
     transmission_angles,
-    Way,
     worst_residual,
 )
 from linkage_ros.kinematics.topology import Driven, Dyad, Group, Iterated
@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 def tables(closure: Closure, title: str) -> Iterator[Table]:
     """Yield what there is to say of a linkage."""
-    way = Way(closure) if len(closure.linkage.inputs) == 1 else None
+    way = InputSweep(closure) if len(closure.linkage.inputs) == 1 else None
     yield Table(title, ('', ''), list(_facts(closure, way)))
     yield Table(
         'Solved in this order', ('>', 'group', 'links', 'how', 'assembly'), _groups(closure)
@@ -127,7 +127,7 @@ def describe_group(closure: Closure, number: int) -> tuple[str, str, str, str]:
     )
 
 
-def _facts(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
+def _facts(closure: Closure, way: InputSweep | None) -> Iterator[tuple[str, str]]:
     linkage, structure = closure.linkage, closure.structure
     moving = len(structure.links) - 1
     pins = sum(joint.kind == 'R' for joint in structure.joints)
@@ -163,7 +163,7 @@ def _facts(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
     yield 'worst residual', f'{worst:.1e} m, of {count} positions, at {place}'
 
 
-def _reach(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
+def _reach(closure: Closure, way: InputSweep | None) -> Iterator[tuple[str, str]]:
     if way is None:
         yield 'range', 'no single one: it depends on every input'
         return
@@ -188,7 +188,7 @@ def _reach(closure: Closure, way: Way | None) -> Iterator[tuple[str, str]]:
             yield name, ', '.join(places[status]) or 'none'
 
 
-def _is_reached(way: Way, value: float) -> bool:
+def _is_reached(way: InputSweep, value: float) -> bool:
     """Return whether a value of the input, in one of its turns, is within the limits."""
     turns = (0.0, -tau, tau) if way.turning else (0.0,)
     return not way.closure.bounds or any(way.range_about(value + turn) for turn in turns)
@@ -281,7 +281,7 @@ def _links(closure: Closure, number: int) -> str:
     return describe_group(closure, number)[1]
 
 
-def _extremes(closure: Closure, number: int, found: Extremes, turning: bool) -> tuple[str, ...]:
+def _extremes(closure: Closure, number: int, found: MinMaxCurve, turning: bool) -> tuple[str, ...]:
     lowest, highest = found
     return (
         str(number + 1),
@@ -294,7 +294,7 @@ def _extremes(closure: Closure, number: int, found: Extremes, turning: bool) -> 
 
 
 def _conditioning(
-    closure: Closure, number: int, found: Extremes, turning: bool
+    closure: Closure, number: int, found: MinMaxCurve, turning: bool
 ) -> tuple[str, ...]:
     lowest = found.lowest
     links = _links(closure, number)

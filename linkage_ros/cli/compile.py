@@ -29,7 +29,7 @@ import re
 from threading import Event
 
 from linkage_ros.errors import DefinitionError, did_you_mean, LinkageError, quoted
-from linkage_ros.files.atomic_write import write_whole
+from linkage_ros.files.atomic_write import atomic_write
 from linkage_ros.files.linkage_file import read_closure
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
@@ -91,7 +91,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         text = source(subject, language(subject))
     except DefinitionError as error:
         raise content.error(error.where, error.reason, error.remedy) from None
-    write_whole(output, text.encode())
+    atomic_write(output, text.encode())
     print(output)
     return 0
 

@@ -38,7 +38,7 @@ from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import did_you_mean, LinkageError, listed
 from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
-from linkage_ros.scene.scene import Member, Scene
+from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heeded
 
 _DOMAINS = 101
@@ -109,7 +109,7 @@ def _beside(scene: Scene, seconds: float) -> Iterator[None]:
             process.wait()
 
 
-def _commands(member: Member, seconds: float) -> Iterator[list[str]]:
+def _commands(member: SceneLinkage, seconds: float) -> Iterator[list[str]]:
     """Yield the command of what a linkage needs beside it, if it does."""
     drive, _ = member.drive
     if drive in _BESIDE:

@@ -70,7 +70,7 @@ _MOST_COLUMNS = 10_000
 _FIRST_OF_PINS = QUANTITIES.index(FORCE_X)
 
 Row = list[float | int | None]
-Told = Callable[[int], None]
+ProgressCallback = Callable[[int], None]
 
 
 class Source(NamedTuple):
@@ -130,7 +130,7 @@ class _Tick(NamedTuple):
     messages: dict[str, Values]
 
 
-def survey(source: Source, order: Sequence[str], told: Told) -> Found:
+def survey(source: Source, order: Sequence[str], told: ProgressCallback) -> Found:
     """
     Read a bag for the columns of its rows.
 
@@ -184,7 +184,7 @@ def _sorted(keys: Iterable[Key], order: Sequence[str]) -> tuple[Key, ...]:
     return tuple(sorted(keys, key=rank))
 
 
-def rows_of(source: Source, keys: Sequence[Key], told: Told) -> Iterator[Row]:
+def rows_of(source: Source, keys: Sequence[Key], told: ProgressCallback) -> Iterator[Row]:
     """Yield the rows of a bag: the first four columns, and the numbers under these keys."""
     places = {key: 4 + number for number, key in enumerate(keys)}
     placed: dict[tuple[Key, ...], tuple[int, ...]] = {}
@@ -206,7 +206,9 @@ def rows_of(source: Source, keys: Sequence[Key], told: Told) -> Iterator[Row]:
         yield row
 
 
-def _ticks(source: Source, left_out: Counter[tuple[str, str]], told: Told) -> Iterator[_Tick]:
+def _ticks(
+    source: Source, left_out: Counter[tuple[str, str]], told: ProgressCallback
+) -> Iterator[_Tick]:
     """Yield the ticks of a bag; count the messages that are left out."""
     readers = {
         topic: MessageValues(kind, source.dependent) for topic, kind in source.types.items()

@@ -33,7 +33,7 @@ from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.files.regular_file import read_regular
 from linkage_ros.files.yaml_file import parse_yaml
-from linkage_ros.robot_models.from_urdf import imported
+from linkage_ros.robot_models.from_urdf import from_urdf
 from linkage_ros.robot_models.urdf_file import read_urdf
 
 _LARGEST_FILE = 10_000_000
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
         raise LinkageError(file, f'cannot be read ({reason})', 'name a URDF file') from None
     if len(data) > _LARGEST_FILE:
         raise LinkageError(file, f'is larger than {_LARGEST_FILE} bytes', 'name a URDF file')
-    made = imported(
+    made = from_urdf(
         read_urdf(data, str(file)),
         arguments.close,
         arguments.input,

@@ -25,13 +25,13 @@ from typing import NamedTuple
 from linkage_ros.bag.reader import Bag, RUN_FILE
 from linkage_ros.bag.run_events import (
     BEGUN,
+    FaultEvent,
     OWN_EFFECTS,
     Reset,
     run_said,
     RunAccount,
+    SampleEvent,
     SEED,
-    Taken,
-    Turned,
     WITH_THE_RUN,
 )
 from linkage_ros.bag.topic import QosProfile, Topic
@@ -40,7 +40,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.messages.joint_values import JOINT_STATE
 from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.replay.counterfactual import Done, WhatIf
+from linkage_ros.replay.counterfactual import Counterfactual, Done
 from linkage_ros.replay.replay import own_effects_here, versions_here
 from linkage_ros.scene.scene import Scene
 
@@ -92,7 +92,7 @@ class Names(NamedTuple):
     extras: tuple[str, ...]
 
 
-def names_for(source: Source, scene: Scene, what_if: WhatIf) -> Names:
+def names_for(source: Source, scene: Scene, what_if: Counterfactual) -> Names:
     """Return the names of what a scene publishes."""
     run = source.run
     known: dict[str, str] = {}
@@ -145,7 +145,7 @@ class NewBag:
     """
 
     def __init__(
-        self, folder: Path, source: Source, scene: Scene, what_if: WhatIf, names: Names
+        self, folder: Path, source: Source, scene: Scene, what_if: Counterfactual, names: Names
     ) -> None:
         bag = source.bag
         own = {topic.name: topic for topic in bag.topics}
@@ -193,9 +193,9 @@ class NewBag:
 
     def add(self, event: Done) -> None:
         """Write what happened; raises RecordingError where it cannot be."""
-        if isinstance(event, Taken):
+        if isinstance(event, SampleEvent):
             self._write(self._numbers['crank_topic'], *event)
-        elif isinstance(event, Turned):
+        elif isinstance(event, FaultEvent):
             self._write(self._numbers['faults_topic'], *event)
         elif isinstance(event, Reset):
             self._write(self._numbers['resets_topic'], *event)

@@ -34,7 +34,7 @@ from linkage_ros.bag.order import LogTimeOrder
 from linkage_ros.bag.reader import Bag, is_in_use
 from linkage_ros.bag.topic import Topic
 from linkage_ros.cli.bag_reading import opened
-from linkage_ros.cli.terminal import progress, Told
+from linkage_ros.cli.terminal import progress, ProgressCallback
 from linkage_ros.errors import BagError, clean, did_you_mean, LinkageError
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.bag_topics import offer
@@ -169,7 +169,7 @@ def _say(error: LinkageError, what: str = 'left out: ') -> None:
     print(f'linkage play: {what}{clean(str(error))}', file=sys.stderr)
 
 
-def _tell(told: Told, first: int, last: float, now: int) -> None:
+def _tell(told: ProgressCallback, first: int, last: float, now: int) -> None:
     end = now if last == inf else int(last)
     told((now - first) // NANOSECONDS, (end - first) // NANOSECONDS)
 

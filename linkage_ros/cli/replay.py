@@ -41,7 +41,12 @@ from linkage_ros.cli.terminal import show, Table
 from linkage_ros.errors import BagError, clean, LinkageError, listed
 from linkage_ros.messages.joint_values import JOINT_STATE, UNITS
 from linkage_ros.replay.compare import At, Comparison, First, TopicComparison, ulps
-from linkage_ros.replay.counterfactual import check_drives, find_crank_topic, Remade, WhatIf
+from linkage_ros.replay.counterfactual import (
+    check_drives,
+    Counterfactual,
+    find_crank_topic,
+    Remade,
+)
 from linkage_ros.replay.replay import (
     own_effects_here,
     own_joint_states,
@@ -53,9 +58,9 @@ from linkage_ros.replay.verify import (
     beginning_text,
     DIFFERENT,
     IDENTICAL,
-    Proof,
-    prove,
+    ReplayVerification,
     turning_joints,
+    verify_replay,
 )
 from linkage_ros.scene.load import load_scene
 from linkage_ros.scene.scene import Scene
@@ -81,7 +86,9 @@ def bag_account(bag: Bag, scene: Scene, reading: BagReading, begin: list[int]) -
 
 
 def proof_account(
-    proof: Proof, turning: Mapping[str, bool], versions: Mapping[str, Mapping[str, str]]
+    proof: ReplayVerification,
+    turning: Mapping[str, bool],
+    versions: Mapping[str, Mapping[str, str]],
 ) -> dict[str, Any]:
     """
     Return what there is to say of a proof.
@@ -312,7 +319,7 @@ def replayed_with(
     run, recorded = _own_account(bag)
     topic = find_crank_topic(bag, reading.glance(), scene, run, recorded, crank_topic)
     source = Source(bag, run, recorded, topic)
-    what_if = WhatIf(scene, recorded)
+    what_if = Counterfactual(scene, recorded)
     names = names_for(source, scene, what_if)
     _check_joints(bag, scene, recorded, output)
     kinds = {run.joint_states_topic: JOINT_STATE}
@@ -466,7 +473,7 @@ def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> d
             begin.append(tick.time)
 
     with reading.told() as messages:
-        proof = prove(bag, scene, messages, look)
+        proof = verify_replay(bag, scene, messages, look)
     if not begin and not reading.damage and not reading.stopped:
         raise BagError(bag.path, 'holds no joint states', 'record a run with a crank')
     run = run_account(bag)

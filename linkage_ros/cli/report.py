@@ -47,7 +47,7 @@ from linkage_ros.cli.bag_reading import (
 from linkage_ros.cli.info import tables
 from linkage_ros.cli.terminal import progress
 from linkage_ros.errors import LinkageError
-from linkage_ros.files.atomic_write import replace_whole
+from linkage_ros.files.atomic_write import atomic_replace
 from linkage_ros.report.blocks import Progress
 from linkage_ros.report.html import ReportHeader, run_html, TableOf
 from linkage_ros.report.labels import seconds_text
@@ -221,7 +221,7 @@ def _write(file: Path, page: bytes) -> None:
     """Write a file as a whole, or not at all."""
     try:
         # Where it leads elsewhere, it is that which is written.
-        replace_whole(Path(os.path.realpath(file)), page)
+        atomic_replace(Path(os.path.realpath(file)), page)
     except OSError as error:
         reason = f'cannot be written: {error.strerror or error}'
         raise LinkageError(file, reason, 'name another file with -o') from None

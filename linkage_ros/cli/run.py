@@ -35,7 +35,7 @@ from linkage_ros.node.run import run_linkage_node
 from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import recorded_scene, ReplayedTick
-from linkage_ros.replay.verify import beginning_text, DIFFERENT, prove, UNTOLD
+from linkage_ros.replay.verify import beginning_text, DIFFERENT, UNTOLD, verify_replay
 from linkage_ros.signals import heeded
 
 _RICH = find_spec('rich') is not None
@@ -219,7 +219,7 @@ def _proof(folder: Path) -> str:
         scene = recorded_scene(bag, trust_effects=True)
         pipeline = Pipeline(scene)
         closures = pipeline.closures
-        proof = prove(bag, scene, bag.messages(), look)
+        proof = verify_replay(bag, scene, bag.messages(), look)
     except LinkageError as error:
         return str(error)
     if proof.verdict == UNTOLD:

@@ -35,7 +35,7 @@ from linkage_ros.files.parameters import declared, default_of, is_required, para
 from linkage_ros.files.schema import as_text, linkage_schema, scene_schema
 from linkage_ros.files.section import Section
 from linkage_ros.files.yaml_file import read_yaml
-from linkage_ros.pipeline.pipeline import Line, Pipeline
+from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
 from linkage_ros.scene.load import kind_of, load_scene
 from linkage_ros.scene.scene import Scene
 from linkage_ros.solvers.registry import SOLVERS
@@ -88,7 +88,7 @@ def _facts(scene: Scene) -> Iterator[tuple[str, str]]:
     yield 'recorded', recorded
 
 
-def _solvers(lines: list[Line]) -> Iterator[tuple[str, str]]:
+def _solvers(lines: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
     """Yield what closes the loops, where the scene says so."""
     for line in lines:
         name = f'{line.member.name}: ' if line.member.name else ''
@@ -100,15 +100,15 @@ def _solvers(lines: list[Line]) -> Iterator[tuple[str, str]]:
             yield 'solver', f'{name}{solver}{said and ", "}{said}'
 
 
-def _alike(lines: list[Line]) -> list[list[Line]]:
+def _alike(lines: list[LinkagePipeline]) -> list[list[LinkagePipeline]]:
     """Return the linkages, those together that have the same drive and effects."""
-    groups: dict[str, list[Line]] = {}
+    groups: dict[str, list[LinkagePipeline]] = {}
     for line in lines:
         groups.setdefault(repr((line.member.drive, line.member.effects)), []).append(line)
     return list(groups.values())
 
 
-def _stages(line: Line) -> Iterator[tuple[str, ...]]:
+def _stages(line: LinkagePipeline) -> Iterator[tuple[str, ...]]:
     name, parameters = line.member.drive
     module = import_module(DRIVES[name])
     yield '0', name, 'drive', summary(module.PARAMETERS), _said(parameters), ''

@@ -35,10 +35,10 @@ from typing import Any, NamedTuple
 from linkage_ros.cli.arguments import add_at, fixed, inputs, values, wrapped
 from linkage_ros.cli.terminal import show, Table, text
 from linkage_ros.errors import LinkageError
-from linkage_ros.files.atomic_write import write_whole
+from linkage_ros.files.atomic_write import atomic_write
 from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _STEPS = 36
 _DIGITS = 6
@@ -120,7 +120,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     if arguments.output is None:
         sys.stdout.write(answer)
         return 0
-    write_whole(arguments.output, answer.encode())
+    atomic_write(arguments.output, answer.encode())
     print(arguments.output)
     return 0
 
@@ -174,7 +174,11 @@ def _question(closure: Closure, arguments: argparse.Namespace) -> Question:
             )
         in_turns = in_degrees and not linkage.inputs[0].slider
         asked += _sweep(
-            Way(closure), arguments.first, arguments.last, arguments.steps, in_degrees=in_turns
+            InputSweep(closure),
+            arguments.first,
+            arguments.last,
+            arguments.steps,
+            in_degrees=in_turns,
         )
     acceleration = read(arguments.acceleration, '--acceleration')
     rate = read(arguments.rate, '--rate')
@@ -192,7 +196,7 @@ def _question(closure: Closure, arguments: argparse.Namespace) -> Question:
 
 
 def _sweep(
-    way: Way, first: float | None, last: float | None, steps: int, *, in_degrees: bool
+    way: InputSweep, first: float | None, last: float | None, steps: int, *, in_degrees: bool
 ) -> Iterator[State]:
     """
     Yield inputs from end to end, at equal steps; without ends, all over every range.

@@ -23,7 +23,7 @@ from collections.abc import Iterator, Sequence
 from math import degrees, hypot, isfinite, pi, radians, remainder
 from typing import NamedTuple, TYPE_CHECKING
 
-from linkage_ros.cli.terminal import Told
+from linkage_ros.cli.terminal import ProgressCallback
 from linkage_ros.errors import LinkageError, listed
 from linkage_ros.files.tables import numbers_of
 from linkage_ros.synthesis.defects import assess, Assessment, misses, Needs
@@ -76,7 +76,7 @@ class Search(NamedTuple):
     candidates: int
     keep: int
     address: str
-    progress: Told
+    progress: ProgressCallback
 
     def accepts(self, design: Design) -> bool:
         """Return whether a design has what is needed."""

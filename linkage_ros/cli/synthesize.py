@@ -30,7 +30,7 @@ from threading import Event
 
 from linkage_ros.cli.arguments import angle_text
 from linkage_ros.cli.synthesis_tasks import Answer, answers, CANDIDATES, Search
-from linkage_ros.cli.terminal import progress, show, Table, Told
+from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_text import write_linkage
 from linkage_ros.synthesis.defects import Assessment, distance, misses, Needs
@@ -276,7 +276,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
     return 0
 
 
-def solutions(typed: argparse.Namespace, told: Told) -> tuple[list[Answer], bool]:
+def solutions(typed: argparse.Namespace, told: ProgressCallback) -> tuple[list[Answer], bool]:
     """Return all solutions that have what is needed, or the nearest to it; and whether they do."""
     needs = needs_of(typed)
     keep = typed.best or _LISTED

@@ -116,7 +116,7 @@ def _drawn(table: Table) -> object:
 
 # How far something long has come: a bar by rich on a terminal, a line now and then elsewhere.
 
-Told = Callable[[int, int], None]
+ProgressCallback = Callable[[int, int], None]
 """Takes how much is done, and of how much."""
 
 _EVERY = 5.0
@@ -124,7 +124,7 @@ _EVERY = 5.0
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Told]:
+def progress(what: str) -> Iterator[ProgressCallback]:
     """Give a function to tell progress to; what is told goes to standard error."""
     if sys.stderr.isatty() and find_spec('rich') is not None:
         from rich.console import Console

@@ -22,7 +22,7 @@ from math import nan, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.kinematics.sweep_analysis import samples, Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep, samples
 
 _SAME_PATH = 0.01
 """How far a path may be from another, of its length, and be drawn as the same."""
@@ -61,7 +61,7 @@ class Sweep(NamedTuple):
     travels: dict[str, tuple[float, float]]
 
 
-def sweep(way: Way, interval: InputRange) -> Sweep:
+def sweep(way: InputSweep, interval: InputRange) -> Sweep:
     """Move a linkage through a range."""
     closure = way.closure
     linkage = closure.linkage

@@ -24,7 +24,7 @@ from linkage_ros.drawing.painting import degree_step, INK, Names, OTHER, OTHER_T
 from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.kinematics.sweep_analysis import Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.synthesis.design import Assembly, COUPLER, Design, Wanted
 from linkage_ros.synthesis.proof import closed_position, closure_of, Met, prove, SIDES
 import numpy as np
@@ -126,13 +126,13 @@ def branches(design: Design, shown: Sequence[Pose]) -> list[Branch]:
     found: list[Branch] = []
     for side in SIDES:
         if any(pose.met.side == side for pose in shown):
-            way = Way(closure_of(design, side))
+            way = InputSweep(closure_of(design, side))
             own = design.four_bar.side
             found += [_branch(way, interval, side, own) for interval in _ranges(way, cranks)]
     return found
 
 
-def _ranges(way: Way, cranks: Sequence[float]) -> list[InputRange]:
+def _ranges(way: InputSweep, cranks: Sequence[float]) -> list[InputRange]:
     """Return the ranges in which positions lie; of a whole turn the one about them."""
     found: list[InputRange] = []
     for crank in cranks:
@@ -148,7 +148,7 @@ def _ranges(way: Way, cranks: Sequence[float]) -> list[InputRange]:
     return found
 
 
-def _branch(way: Way, interval: InputRange, side: Assembly, own: Assembly) -> Branch:
+def _branch(way: InputSweep, interval: InputRange, side: Assembly, own: Assembly) -> Branch:
     low, high = interval.lowest, interval.highest
     part = np.linspace(0.0, 1.0, _SAMPLES)
     limited = interval.limited != _TURNS

@@ -43,7 +43,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.kinematics.sweep_analysis import Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _GHOSTS = 5
 
@@ -97,7 +97,7 @@ def view(
 
     """
     position = _closed(closure, inputs)
-    way = Way(closure, inputs)
+    way = InputSweep(closure, inputs)
     value = inputs[0]
     # A pose beyond the limits lies in no range, and is drawn before the widest.
     interval = way.range_about(value) or way.widest_range
@@ -123,7 +123,7 @@ def view(
 def _closed(closure: Closure, inputs: tuple[float, ...]) -> Position:
     position = closure.position(*inputs)
     if not position.joints:
-        ranges = Way(closure, inputs).ranges
+        ranges = InputSweep(closure, inputs).ranges
         near = ' or '.join(_ends_text(interval) for interval in ranges)
         held = ', the others held' if near and len(inputs) > 1 else ''
         raise LinkageError(

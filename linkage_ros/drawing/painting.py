@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 from linkage_ros.drawing.shapes import Circle, Polygon, Segment, Shape
 from linkage_ros.errors import LinkageError
-from linkage_ros.files.atomic_write import write_whole
+from linkage_ros.files.atomic_write import atomic_write
 
 # Where names go in a drawing, so that they hide little and lie on nothing that is read.
 
@@ -202,7 +202,7 @@ def save(figure: Any, file: Path) -> None:
         raise LinkageError(
             file, f'cannot be written ({error})', 'name another picture with -o'
         ) from None
-    write_whole(file, picture.getvalue())
+    atomic_write(file, picture.getvalue())
 
 
 def corners(places: Iterable[complex]) -> tuple[complex, complex]:

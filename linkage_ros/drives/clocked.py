@@ -28,7 +28,7 @@ from linkage_ros.drives.drive import Context, CrankState, Drive
 from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 # Drives that would take a joint beyond its limits, refused when they are built.
 
@@ -73,7 +73,7 @@ def refuse_beyond(
             )
     if not closure.bounds.joints or len(closure.linkage.inputs) > 1:
         return
-    way = Way(closure)
+    way = InputSweep(closure)
     interval = way.range_about(start)
     if interval is None:
         if beyond := closure.beyond(way.position(start)):

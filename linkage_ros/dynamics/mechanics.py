@@ -132,7 +132,7 @@ class Mechanics:
         for spring in self.loads.springs:
             for link, name in spring.ends:
                 points.append((link, complex(*linkage.links[link][name])))
-        self._follower = closure.follower(points)
+        self._follower = closure.point_tracker(points)
         at = iter(self._follower.indices)
         self._bodies = tuple(
             (linkage.masses[link].mass, linkage.masses[link].inertia, next(at), turn)

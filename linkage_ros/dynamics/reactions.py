@@ -284,7 +284,7 @@ class Reactions:
         for spring in mechanics.loads.springs:
             points += [(link, complex(*linkage.links[link][name])) for link, name in spring.ends]
 
-        self._follower = closure.follower(points)
+        self._follower = closure.point_tracker(points)
         at = iter(self._follower.indices)
         centers = {link: next(at) for link in moving}
         self._places = tuple(next(at) for _ in self.joints)

@@ -27,7 +27,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Motion, Reading, Stage, Writer
+from linkage_ros.effects.stage import MechanismState, SensorReading, Stage, Writer
 from linkage_ros.kinematics.arithmetic import all_finite
 
 TOPIC = '~/motion'
@@ -47,7 +47,7 @@ def stage(_parameters: AccelerationParameters, context: Context) -> Stage:
     """Build the stage."""
     acceleration_of = context.closure.acceleration
 
-    def acceleration(motion: Motion) -> Motion:
+    def acceleration(motion: MechanismState) -> MechanismState:
         velocity = motion.velocity
         if velocity is None:
             return motion
@@ -66,7 +66,7 @@ def writer(_parameters: AccelerationParameters, context: Context) -> Writer:
 
     write = joint_trajectory.JointTrajectoryWriter(context.joints_in_messages).write
 
-    def write_motion(_now: int, _motion: Motion | None, reading: Reading) -> bytes:
+    def write_motion(_now: int, _motion: MechanismState | None, reading: SensorReading) -> bytes:
         return write(reading.stamp, reading.joints, reading.rates, reading.accelerations)
 
     return write_motion

@@ -27,7 +27,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import pi, remainder, tau
 from operator import add
 
-from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.kinematics.closure import Closure
 
 _NO_TURN = -0.0
@@ -68,7 +68,7 @@ class Continuous:
         self.raw: tuple[float, ...] = ()
         self.added = (_NO_TURN,) * len(turning)
 
-    def __call__(self, _now: int, reading: Reading) -> Reading:
+    def __call__(self, _now: int, reading: SensorReading) -> SensorReading:
         """Return a reading with the turns that its angles have made."""
         joints, raw = reading.joints, self.raw
         self.raw = joints
@@ -119,7 +119,7 @@ def all_wrapped(turning: Sequence[bool]) -> Sensor:
     """
     turns = tuple(turning)
 
-    def wrap(_now: int, reading: Reading) -> Reading:
+    def wrap(_now: int, reading: SensorReading) -> SensorReading:
         now = [wrapped(v) if turn else v for v, turn in zip(reading.joints, turns, strict=True)]
         return reading._replace(joints=tuple(now))
 

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 from operator import add
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.files.parameters import each, Number
 
 
@@ -54,7 +54,7 @@ def sensor(parameters: BiasParameters, context: Context) -> Sensor:
     """Build the sensor."""
     biases = tuple(parameters.joints.get(joint, 0.0) for joint in context.joints)
 
-    def bias(_now: int, reading: Reading) -> Reading:
+    def bias(_now: int, reading: SensorReading) -> SensorReading:
         return reading._replace(joints=tuple(map(add, reading.joints, biases)))
 
     return bias

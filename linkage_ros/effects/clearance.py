@@ -42,7 +42,7 @@ from dataclasses import dataclass
 from math import hypot
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Motion, Stage, yielding
+from linkage_ros.effects.stage import MechanismState, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.files.parameters import each, Number
 from linkage_ros.kinematics.arithmetic import called, vector
@@ -93,7 +93,7 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
     centred = (0j,) * len(joints)
     shift_of = context.reactions.shift
 
-    def clearance(motion: Motion) -> Motion:
+    def clearance(motion: MechanismState) -> MechanismState:
         reactions = motion.reactions
         if not reactions:
             return motion

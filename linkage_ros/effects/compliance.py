@@ -37,7 +37,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Motion, Stage, yielding
+from linkage_ros.effects.stage import MechanismState, Stage, yielding
 from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.files.parameters import each, Number
 from linkage_ros.kinematics.arithmetic import facing
@@ -101,7 +101,7 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
     rigid = (0j,) * len(context.closure.structure.joints)
     shift_of = context.reactions.shift
 
-    def compliance(motion: Motion) -> Motion:
+    def compliance(motion: MechanismState) -> MechanismState:
         position, reactions = motion.position, motion.reactions
         if not reactions:
             return motion

@@ -50,7 +50,7 @@ from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
-from linkage_ros.effects.stage import Reading, restamped
+from linkage_ros.effects.stage import restamped, SensorReading
 from linkage_ros.files.parameters import choice, number
 
 _AUTOMATIC = 'automatic'
@@ -125,11 +125,11 @@ class Delay:
         """Time up to which readings have arrived, in [ns]."""
         self._messages: int | None = None
         """Time of the last reading before the first silence, in [ns]; nothing before that."""
-        self._on_the_way: deque[tuple[int, Reading]] = deque()
+        self._on_the_way: deque[tuple[int, SensorReading]] = deque()
         """Readings since then that have not arrived."""
         self.gap_begins = False
 
-    def __call__(self, now: int, reading: Reading | None) -> Reading | None:
+    def __call__(self, now: int, reading: SensorReading | None) -> SensorReading | None:
         """Return what arrives; None in the place of a reading is the silence of a sensor."""
         if self._messages is not None:
             if reading is not None:
@@ -140,12 +140,12 @@ class Delay:
             self._history.add(now, reading)
         return self._arriving(now)
 
-    def gap(self, now: int) -> Reading | None:
+    def gap(self, now: int) -> SensorReading | None:
         """Return what arrives at a time, in [ns], at which the linkage has no pose."""
         self.gap_begins = self._messages is None and self._history.add_gap(now)
         return self._arriving(now)
 
-    def silence(self, now: int, gap: bool) -> Reading | None:
+    def silence(self, now: int, gap: bool) -> SensorReading | None:
         """Return what arrives where a sensor before it is silent, or looks into a gap."""
         return self.gap(now) if gap else self(now, None)
 
@@ -156,7 +156,7 @@ class Delay:
             self._messages = newest[0]
             self._on_the_way.append(newest)
 
-    def _arriving(self, now: int) -> Reading | None:
+    def _arriving(self, now: int) -> SensorReading | None:
         due = now - self._delay
         if self._messages is not None and due >= self._messages:
             found = self._next(due)
@@ -165,7 +165,7 @@ class Delay:
         self._arrived = due
         return found if found is None or self._measured else restamped(found, now)
 
-    def _next(self, due: int) -> Reading | None:
+    def _next(self, due: int) -> SensorReading | None:
         """Return the first reading on the way, if it is due."""
         if self._on_the_way and self._on_the_way[0][0] <= due:
             return self._on_the_way.popleft()[1]

@@ -44,7 +44,7 @@ from decimal import Context as Rounding
 from random import Random
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Reading, restamped
+from linkage_ros.effects.stage import restamped, SensorReading
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import choice, number
 
@@ -141,9 +141,9 @@ class Dropout:
         self._chance = use.probability
         self._repeat = use.hold == 'repeat'
         self._random = random.random
-        self._last: Reading | None = None
+        self._last: SensorReading | None = None
 
-    def __call__(self, _now: int, reading: Reading) -> Reading | None:
+    def __call__(self, _now: int, reading: SensorReading) -> SensorReading | None:
         """Return what arrives; None where nothing does."""
         if self._random() >= self._chance:
             self._chance = self._begins

@@ -33,7 +33,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context, CrankBehindPlay
-from linkage_ros.effects.stage import Motion, Stage
+from linkage_ros.effects.stage import MechanismState, Stage
 from linkage_ros.kinematics.arithmetic import all_finite
 
 
@@ -49,7 +49,7 @@ def stage(_parameters: EffortParameters, context: Context) -> Stage:
     """Build the stage."""
     efforts_of = context.mechanics.drive_efforts
 
-    def effort(motion: Motion) -> Motion:
+    def effort(motion: MechanismState) -> MechanismState:
         velocity, acceleration = motion.velocity, motion.acceleration
         if velocity is None or acceleration is None:
             return motion
@@ -66,7 +66,7 @@ def _behind_play(effort: Stage, context: Context) -> Stage:
     """Return the stage for drives with play: one that moves within it bears its own inertia."""
     inertia = context.mechanics.loads.drive_inertia
 
-    def effort_behind_play(motion: Motion) -> Motion:
+    def effort_behind_play(motion: MechanismState) -> MechanismState:
         borne = effort(motion)
         crank = motion.crank
         # An effect of one's own between the two may have made another crank, without play.

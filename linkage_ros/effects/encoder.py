@@ -53,7 +53,7 @@ from dataclasses import dataclass
 from math import floor, tau
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import choice, each, flag, number, whole
 
@@ -214,7 +214,7 @@ class Encoder:
         self._last = 0
         self.read_at_ticks = True
 
-    def __call__(self, now: int, reading: Reading) -> Reading:
+    def __call__(self, now: int, reading: SensorReading) -> SensorReading:
         """Return what is read."""
         values = list(reading.joints)
         for place, counter in self._counters:
@@ -222,7 +222,7 @@ class Encoder:
         found = reading._replace(joints=tuple(values))
         return self.differenced(now, found) if self.read_at_ticks else found
 
-    def differenced(self, now: int, reading: Reading) -> Reading:
+    def differenced(self, now: int, reading: SensorReading) -> SensorReading:
         """Return a reading with the rates that the driver makes of it, at a time in [ns]."""
         if not self._differenced:
             return reading

@@ -39,7 +39,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import deque
 
-from linkage_ros.effects.stage import Reading
+from linkage_ros.effects.stage import SensorReading
 
 _Values = tuple[float, ...]
 
@@ -66,7 +66,7 @@ class History:
         self._span = span
         self._with_rates = with_rates
         self._times: deque[int] = deque()
-        self._readings: deque[Reading | None] = deque()
+        self._readings: deque[SensorReading | None] = deque()
 
     def __len__(self) -> int:
         return len(self._times)
@@ -76,7 +76,7 @@ class History:
         """Earliest time that is remembered, in [ns]."""
         return self._times[0]
 
-    def add(self, now: int, reading: Reading) -> None:
+    def add(self, now: int, reading: SensorReading) -> None:
         """
         Remember a reading.
 
@@ -110,7 +110,7 @@ class History:
         self._append(now, None)
         return True
 
-    def _append(self, now: int, reading: Reading | None) -> None:
+    def _append(self, now: int, reading: SensorReading | None) -> None:
         times, readings = self._times, self._readings
         if times:
             # By the last time: what came due since then is still asked for.
@@ -121,7 +121,7 @@ class History:
         times.append(now)
         readings.append(reading)
 
-    def newest(self, time: int, since: int) -> Reading | None:
+    def newest(self, time: int, since: int) -> SensorReading | None:
         """
         Return the newest reading at a time, in [ns]; in a gap the last one before it, once.
 
@@ -138,7 +138,7 @@ class History:
             return self._readings[at - 1]
         return self._before_gap(time, since)
 
-    def between(self, time: int) -> Reading | None:
+    def between(self, time: int) -> SensorReading | None:
         """
         Return what was read at a time, in [ns], and bears it as its stamp.
 
@@ -156,11 +156,11 @@ class History:
             return None
         return _mixed(time, begin, before, self._times[at], after, self._with_rates)
 
-    def arriving(self, time: int, since: int) -> Reading | None:
+    def arriving(self, time: int, since: int) -> SensorReading | None:
         """Return as `between` does, and the last reading before a gap as it is, once."""
         return self.between(time) or self._before_gap(time, since)
 
-    def _before_gap(self, time: int, since: int) -> Reading | None:
+    def _before_gap(self, time: int, since: int) -> SensorReading | None:
         """Return the reading that was the newest at a time, if it came after another time."""
         at = bisect_right(self._times, time)
         while at and self._times[at - 1] > since:
@@ -169,15 +169,15 @@ class History:
                 return self._readings[at]
         return None
 
-    def after(self, time: int) -> list[tuple[int, Reading]]:
+    def after(self, time: int) -> list[tuple[int, SensorReading]]:
         """Return the readings since a time, in [ns], each with its own."""
         pairs = zip(self._times, self._readings, strict=True)
         return [(at, reading) for at, reading in pairs if at > time and reading is not None]
 
 
 def _mixed(
-    time: int, begin: int, before: Reading, end: int, after: Reading, with_rates: bool
-) -> Reading:
+    time: int, begin: int, before: SensorReading, end: int, after: SensorReading, with_rates: bool
+) -> SensorReading:
     """Return the reading at a time between two, all times in [ns]."""
     s = (time - begin) / (end - begin)
     _, x0, v0, a0, e0 = before
@@ -189,7 +189,7 @@ def _mixed(
         )
     else:
         joints = _line(s, x0, x1)
-    return Reading(time, joints, _line(s, v0, v1), _line(s, a0, a1), _line(s, e0, e1))
+    return SensorReading(time, joints, _line(s, v0, v1), _line(s, a0, a1), _line(s, e0, e1))
 
 
 def _cubic(s: float, x0: float, x1: float, way0: float, way1: float) -> float:

@@ -40,7 +40,7 @@ from random import Random
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.history import History
-from linkage_ros.effects.stage import Reading, restamped
+from linkage_ros.effects.stage import restamped, SensorReading
 from linkage_ros.files.parameters import choice, number
 
 
@@ -101,7 +101,7 @@ class Jitter:
 
         self._earlier = earlier
 
-    def __call__(self, now: int, reading: Reading) -> Reading | None:
+    def __call__(self, now: int, reading: SensorReading) -> SensorReading | None:
         """Return what is read at a time, in [ns]."""
         history = self._history
         history.add(now, reading)

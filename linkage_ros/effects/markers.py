@@ -41,7 +41,7 @@ from math import pi, radians, sin, sqrt
 
 from linkage_ros.drives.drive import Context
 from linkage_ros.effects.marker_shapes import ALARM, Arrows, Key, marker_shapes
-from linkage_ros.effects.stage import Motion, Reading, Writer
+from linkage_ros.effects.stage import MechanismState, SensorReading, Writer
 from linkage_ros.files.parameters import number, text
 from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.linkage import GROUND
@@ -140,9 +140,9 @@ class Markers:
         self._near = sqrt(2.0) * sin(0.5 * use.near_toggle)
         self._groups = tuple(frozenset(_links(group)) for group in closure.structure.groups)
         # What is searched for once is searched for here, and not in a tick.
-        closure.nearness(closure.position(*usual_inputs(closure)))
+        closure.singularity_margin(closure.position(*usual_inputs(closure)))
 
-    def __call__(self, now: int, motion: Motion, _reading: Reading) -> bytes:
+    def __call__(self, now: int, motion: MechanismState, _reading: SensorReading) -> bytes:
         """Return a message, b'' between two of them."""
         if not self.due(now):
             return b''
@@ -213,7 +213,7 @@ class Markers:
 
     def _red(self, position: Position) -> frozenset[str]:
         """Return the links that are near a toggle."""
-        nearness = self._closure.nearness(position)
+        nearness = self._closure.singularity_margin(position)
         near = nearness.conditioning < self._near and nearness.group >= 0
         return self._groups[nearness.group] if near else frozenset()
 

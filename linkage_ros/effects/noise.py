@@ -40,7 +40,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.files.parameters import each, number
 
 _Source = tuple[int, float, Callable[[float, float], float]]
@@ -111,7 +111,7 @@ class Noise:
         self._wandered = [0.0] * len(walk)
         self._last: int | None = None
 
-    def __call__(self, now: int, reading: Reading) -> Reading:
+    def __call__(self, now: int, reading: SensorReading) -> SensorReading:
         """Return the reading with noise."""
         rates = reading.rates
         noisy = list(reading.joints)

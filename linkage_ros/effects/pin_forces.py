@@ -30,7 +30,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Motion, Reading, Stage, Writer
+from linkage_ros.effects.stage import MechanismState, SensorReading, Stage, Writer
 
 TOPIC = '~/pin_forces'
 MESSAGE = 'sensor_msgs/msg/MultiDOFJointState'
@@ -48,7 +48,7 @@ def stage(_parameters: PinForcesParameters, context: Context) -> Stage:
     """Build the stage."""
     solve = context.reactions.solve
 
-    def pin_forces(motion: Motion) -> Motion:
+    def pin_forces(motion: MechanismState) -> MechanismState:
         velocity, acceleration = motion.velocity, motion.acceleration
         if velocity is None or acceleration is None:
             return motion
@@ -66,7 +66,7 @@ def writer(_parameters: PinForcesParameters, context: Context) -> Writer:
         [context.prefix + name for name in context.reactions.names]
     ).write
 
-    def write_forces(now: int, motion: Motion, _reading: Reading) -> bytes:
+    def write_forces(now: int, motion: MechanismState, _reading: SensorReading) -> bytes:
         return write(now, motion.reactions) if motion.reactions else b''
 
     return write_forces

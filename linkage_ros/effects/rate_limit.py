@@ -38,7 +38,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Reading, restamped, Sensor
+from linkage_ros.effects.stage import restamped, Sensor, SensorReading
 from linkage_ros.files.parameters import choice, number
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class RateLimit:
         self._unit, denominator = use.rate.as_integer_ratio()
         self._per = 2_000_000_000 * denominator
         self._repeat = use.hold == 'repeat'
-        self._held: Reading | None = None
+        self._held: SensorReading | None = None
         self._begin = self._due = 0
         self._encoder: Encoder | None = None
 
@@ -92,7 +92,7 @@ class RateLimit:
         self._encoder = encoder
         encoder.read_at_ticks = False
 
-    def __call__(self, now: int, reading: Reading) -> Reading | None:
+    def __call__(self, now: int, reading: SensorReading) -> SensorReading | None:
         """Return what is held; None where that is not repeated."""
         held = self._held
         if held is None:

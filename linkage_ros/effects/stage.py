@@ -113,7 +113,7 @@ NEEDS = {
 PUBLISHED_WITH = {'acceleration': ('velocity',)}
 """What to name an effect is to name too: a trajectory without rates is of no use."""
 
-LOADED = ('effort', 'pin_forces', 'compliance', 'clearance')
+FORCE_EFFECTS = ('effort', 'pin_forces', 'compliance', 'clearance')
 """
 Effects to which masses, loads and friction matter.
 
@@ -127,31 +127,31 @@ def module_of(effect: str) -> ModuleType:
     if '.' not in effect:
         return import_module(EFFECTS[effect])
     from linkage_ros.effects.user_effects import (
-        own_module,  # local import: only where a scene has one
+        user_module,  # local import: only where a scene has one
     )
 
-    return own_module(effect)
+    return user_module(effect)
 
 
 def in_order(named: Collection[str]) -> tuple[str, ...]:
     """Return effects in the order in which they act."""
     if not any('.' in name for name in named):
         return tuple(name for name in EFFECTS if name in named)
-    from linkage_ros.effects.user_effects import with_own  # local import: as above
+    from linkage_ros.effects.user_effects import with_user_effects  # local import: as above
 
-    return with_own(named)
+    return with_user_effects(named)
 
 
 def needs(effect: str) -> tuple[str, ...]:
     """Return what an effect starts from."""
     if '.' not in effect:
         return NEEDS.get(effect, ())
-    from linkage_ros.effects.user_effects import own_needs  # local import: as above
+    from linkage_ros.effects.user_effects import user_needs  # local import: as above
 
-    return own_needs(effect)
+    return user_needs(effect)
 
 
-def brings(effect: str) -> tuple[str, ...]:
+def dependencies(effect: str) -> tuple[str, ...]:
     """Return what an effect brings in."""
     return *needs(effect), *PUBLISHED_WITH.get(effect, ())
 
@@ -159,10 +159,10 @@ def brings(effect: str) -> tuple[str, ...]:
 def bringing(name: str, named: Collection[str]) -> tuple[str, ...]:
     """Return the effects, of those named, that bring another in."""
     own = [other for other in named if '.' in other or other in EFFECTS]
-    return tuple(other for other in in_order(own) if name in brings(other))
+    return tuple(other for other in in_order(own) if name in dependencies(other))
 
 
-class Motion(NamedTuple):
+class MechanismState(NamedTuple):
     """
     What the mechanism does at a tick, handed from stage to stage.
 
@@ -193,7 +193,7 @@ class Motion(NamedTuple):
     shift: tuple[float, ...]
 
 
-class Reading(NamedTuple):
+class SensorReading(NamedTuple):
     """
     What the sensors make of a motion, and what is published.
 
@@ -284,8 +284,8 @@ class SensorStage(NamedTuple):
     """
 
     read: Sensor
-    gap: Callable[[int], Reading | None] | None
-    silence: Callable[[int, bool], Reading | None] | None
+    gap: Callable[[int], SensorReading | None] | None
+    silence: Callable[[int, bool], SensorReading | None] | None
 
     @classmethod
     def of(cls, sensor: Sensor) -> SensorStage:
@@ -328,17 +328,17 @@ class WriterStage(NamedTuple):
         )
 
 
-def restamped(reading: Reading, stamp: int) -> Reading:
+def restamped(reading: SensorReading, stamp: int) -> SensorReading:
     """Return a reading under another stamp, in [ns]."""
     return reading._replace(stamp=stamp)
 
 
-def yielding(motion: Motion, moved: tuple[float, ...]) -> Motion:
+def yielding(motion: MechanismState, moved: tuple[float, ...]) -> MechanismState:
     """Return a motion whose published joints have moved further, in [rad] or [m]."""
     return motion._replace(shift=tuple(map(add, motion.shift, moved)) if motion.shift else moved)
 
 
 DriveStage = Callable[[CrankState], CrankState]
-Stage = Callable[[Motion], Motion]
-Sensor = Callable[[int, Reading], Reading | None]
-Writer = Callable[[int, Any, Reading], bytes]
+Stage = Callable[[MechanismState], MechanismState]
+Sensor = Callable[[int, SensorReading], SensorReading | None]
+Writer = Callable[[int, Any, SensorReading], bytes]

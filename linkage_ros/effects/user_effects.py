@@ -55,7 +55,7 @@ _ORDER = tuple(EFFECTS)
 
 
 @cache
-def own_module(name: str) -> ModuleType:
+def user_module(name: str) -> ModuleType:
     """
     Import an effect of one's own, and look whether it is one.
 
@@ -101,15 +101,15 @@ def found_in(name: str) -> str:
     return quoted(spec.origin or next(iter(spec.submodule_search_locations or ()), package))
 
 
-def own_needs(name: str) -> tuple[str, ...]:
+def user_needs(name: str) -> tuple[str, ...]:
     """Return the quantities that an effect of one's own starts from, and what these start from."""
-    module = own_module(name)
+    module = user_module(name)
     own = (*(('velocity',) if hasattr(module, 'stage') else ()), *getattr(module, 'NEEDS', ()))
     needs = {need for one in own for need in (*NEEDS.get(one, ()), one)}
     return tuple(effect for effect in QUANTITIES if effect in needs)
 
 
-def with_own(named: Iterable[str]) -> tuple[str, ...]:
+def with_user_effects(named: Iterable[str]) -> tuple[str, ...]:
     """Return effects in the order in which they act."""
     return tuple(sorted(named, key=_place))
 
@@ -121,7 +121,7 @@ def identity(name: str) -> str:
     It is the version of its package, where that says one as ``__version__``, and the beginning of
     the SHA-256 of the module's file.
     """
-    module = own_module(name)
+    module = user_module(name)
     package = sys.modules[name.partition('.')[0]]
     version = getattr(module, '__version__', getattr(package, '__version__', ''))
     file = getattr(module, '__file__', None)
@@ -133,7 +133,7 @@ def identity(name: str) -> str:
 def _place(name: str) -> tuple[int, str]:
     if name in EFFECTS:
         return _ORDER.index(name), ''
-    return _ORDER.index(own_module(name).AFTER), name
+    return _ORDER.index(user_module(name).AFTER), name
 
 
 def _failed(name: str, error: BaseException) -> DefinitionError:

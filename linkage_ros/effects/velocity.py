@@ -24,7 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Motion, Stage
+from linkage_ros.effects.stage import MechanismState, Stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ def stage(_parameters: VelocityParameters, context: Context) -> Stage:
     """Build the stage."""
     velocity_of = context.closure.velocity
 
-    def velocity(motion: Motion) -> Motion:
+    def velocity(motion: MechanismState) -> MechanismState:
         position = motion.position
         if not position.status.has_rates:
             return motion

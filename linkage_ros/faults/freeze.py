@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from linkage_ros.effects.stage import Reading, restamped
+from linkage_ros.effects.stage import restamped, SensorReading
 from linkage_ros.faults.fault import Switch
 
 
@@ -64,16 +64,16 @@ class Freeze:
 
     def __init__(self, switch: Switch) -> None:
         self._switch = switch
-        self._last: Reading | None = None
+        self._last: SensorReading | None = None
 
-    def __call__(self, _now: int, reading: Reading) -> Reading | None:
+    def __call__(self, _now: int, reading: SensorReading) -> SensorReading | None:
         """Return a reading, or the last one before it hung."""
         if not self._switch.on:
             self._last = reading
             return reading
         return None if self._last is None else restamped(self._last, reading.stamp)
 
-    def gap(self, now: int) -> Reading | None:
+    def gap(self, now: int) -> SensorReading | None:
         """Return the last reading before it hung, stamped now, in [ns]; nothing else."""
         if not self._switch.on or self._last is None:
             return None

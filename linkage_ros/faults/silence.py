@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.faults.fault import Switch
 
 
@@ -35,7 +35,7 @@ PARAMETERS = SilenceParameters
 def sensor(_parameters: SilenceParameters, switch: Switch, _joints: Sequence[str]) -> Sensor:
     """Build what swallows the readings."""
 
-    def silence(_now: int, reading: Reading) -> Reading | None:
+    def silence(_now: int, reading: SensorReading) -> SensorReading | None:
         return None if switch.on else reading
 
     return silence

@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from linkage_ros.effects.stage import Reading, Sensor
+from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.faults.fault import Switch
 from linkage_ros.files.parameters import name
 
@@ -51,7 +51,7 @@ def sensor(parameters: StuckParameters, switch: Switch, joints: Sequence[str]) -
     def with_one(values: tuple[float, ...], value: float) -> tuple[float, ...]:
         return (*values[:place], value, *values[after:]) if values else ()
 
-    def stuck(_now: int, reading: Reading) -> Reading | None:
+    def stuck(_now: int, reading: SensorReading) -> SensorReading | None:
         nonlocal held
         if not switch.on:
             held = reading.joints[place]

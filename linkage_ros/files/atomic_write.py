@@ -25,7 +25,7 @@ from secrets import token_hex
 from linkage_ros.errors import LinkageError
 
 
-def write_whole(file: str | Path, data: bytes) -> None:
+def atomic_write(file: str | Path, data: bytes) -> None:
     """
     Write a file, in the place of one that is there: beside its place, and moved there.
 
@@ -48,15 +48,15 @@ def write_whole(file: str | Path, data: bytes) -> None:
             raise LinkageError(file, 'is there already and is no file', 'name another file')
         if target.exists() and not os.access(target, os.W_OK):
             raise PermissionError(0, 'Permission denied')
-        replace_whole(target, data)
+        atomic_replace(target, data)
     except (OSError, ValueError, RuntimeError) as error:  # the last for links in a circle
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise LinkageError(file, f'cannot be written ({reason})', 'name another file') from None
 
 
-def replace_whole(target: Path, data: bytes) -> None:
+def atomic_replace(target: Path, data: bytes) -> None:
     """
-    Write a file as `write_whole` does, whatever is in its place; no link is followed.
+    Write a file as `atomic_write` does, whatever is in its place; no link is followed.
 
     Raises
     ------

@@ -35,7 +35,7 @@ import re
 from textwrap import wrap
 
 from linkage_ros.errors import DefinitionError
-from linkage_ros.files.atomic_write import write_whole
+from linkage_ros.files.atomic_write import atomic_write
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
@@ -48,7 +48,7 @@ from linkage_ros.kinematics.linkage import (
     Slider,
 )
 from linkage_ros.kinematics.ranges import describe, InputRange
-from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 
 _WIDTH = 99
 _WHOLE = 1e15
@@ -101,7 +101,7 @@ def write_linkage(linkage: Linkage, file: str | Path, comment: Sequence[str] = (
     """
     data = linkage_text(linkage, comment).encode()
     read_linkage(parse_yaml(data, str(file)))
-    write_whole(file, data)
+    atomic_write(file, data)
 
 
 def number_text(value: float) -> str:
@@ -289,7 +289,7 @@ def _drive(closure: Closure) -> str:
 
 def _start(closure: Closure) -> tuple[float, InputRange]:
     """Return where the single input starts, and the range in which that lies."""
-    way, pose = Way(closure), closure.linkage.pose
+    way, pose = InputSweep(closure), closure.linkage.pose
     if pose is None or pose.points:
         (start,) = usual_inputs(closure)
         # Of a range as narrow as the rounding of its values the usual one may lie beside it.

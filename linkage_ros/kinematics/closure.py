@@ -34,24 +34,24 @@ from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.limits import Bounds, limited, without_mirrored, zero_length
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.plan import Planner
+from linkage_ros.kinematics.plan import SolutionPlan
 from linkage_ros.kinematics.ranges import closing_ranges, input_ranges, InputRange
 from linkage_ros.kinematics.singularity_margin import (
-    Nearness,
-    nearness,
     singular_inputs,
     SingularInput,
+    singularity_margin,
+    SingularityMargin,
 )
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import Pose, State
-from linkage_ros.kinematics.topology import find_groups, Structure
+from linkage_ros.kinematics.topology import assur_groups, Structure
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Batch
     from linkage_ros.kinematics.compiling.linkage import Compiled
     from linkage_ros.kinematics.compiling.solve import Solver
     from linkage_ros.kinematics.compiling.trace import Wanted
-    from linkage_ros.kinematics.point_tracker import Follower
+    from linkage_ros.kinematics.point_tracker import PointTracker
     from numpy.typing import ArrayLike
 
 
@@ -255,8 +255,8 @@ class Closure:
         self.name = name
         self.input_names = tuple(given.joint for given in linkage.inputs)
         self.joint_names = tuple(linkage.joints)
-        self.structure: Structure = find_groups(linkage)
-        planner = Planner(linkage, self.structure)
+        self.structure: Structure = assur_groups(linkage)
+        planner = SolutionPlan(linkage, self.structure)
         self.scale = planner.scale
         """Metres in the unit of length of the steps."""
         steps = tuple(planner.steps)
@@ -519,7 +519,7 @@ class Closure:
             for key, i in self._point_index.items()
         }
 
-    def follower(self, points: Sequence[tuple[str, complex]]) -> Follower:
+    def point_tracker(self, points: Sequence[tuple[str, complex]]) -> PointTracker:
         """
         Return what follows certain points of links and computes no others.
 
@@ -530,10 +530,10 @@ class Closure:
 
         """
         from linkage_ros.kinematics.point_tracker import (
-            Follower,  # local import: only forces need it
+            PointTracker,  # local import: only forces need it
         )
 
-        return Follower(self._known, points)
+        return PointTracker(self._known, points)
 
     def link_angles(self, position: Position) -> dict[str, float]:
         """Return the angle of every link to the ground, in [rad], not wrapped."""
@@ -615,9 +615,9 @@ class Closure:
         """Slide at which the two pins of a cylinder meet, in [m]; None without one."""
         return zero_length(self.linkage, self.structure, 0)
 
-    def nearness(self, position: Position) -> Nearness:
+    def singularity_margin(self, position: Position) -> SingularityMargin:
         """Return how near trouble a closed position is."""
-        return nearness(self, position)
+        return singularity_margin(self, position)
 
     def _all(self, position: Position) -> State:
         """Return a position with all points placed, also those that no loop needs."""

@@ -69,7 +69,7 @@ class Diagonal(NamedTuple):
     status: Status
 
 
-class Growth(NamedTuple):
+class DiagonalRate(NamedTuple):
     """
     The rates of a diagonal: ṡ/s = swing·growth, and its direction's rate is base + swing·turn.
 
@@ -85,9 +85,9 @@ class Growth(NamedTuple):
     lean: float
 
 
-class GrowthChange(NamedTuple):
+class DiagonalAcceleration(NamedTuple):
     """
-    The derivative of a `Growth`, ṡ²/s² added to that of ṡ/s.
+    The derivative of a `DiagonalRate`, ṡ²/s² added to that of ṡ/s.
 
     That is s̈/s = change·growth + swing²·pull, which is no difference of large numbers where A is
     next to D; and the direction's is base + change·turn + swing²·swirl.
@@ -120,12 +120,18 @@ class AnyDiagonal(Protocol):
     def at(self, known: State, /) -> Diagonal:
         """Return the diagonal."""
 
-    def rates(self, diagonal: Diagonal, known: State, speeds: State, /) -> Growth:
+    def rates(self, diagonal: Diagonal, known: State, speeds: State, /) -> DiagonalRate:
         """Return how the diagonal grows and turns."""
 
     def accelerations(
-        self, diagonal: Diagonal, growth: Growth, known: State, speeds: State, changes: State, /
-    ) -> GrowthChange:
+        self,
+        diagonal: Diagonal,
+        growth: DiagonalRate,
+        known: State,
+        speeds: State,
+        changes: State,
+        /,
+    ) -> DiagonalAcceleration:
         """Return the derivative of `rates`."""
 
 
@@ -259,7 +265,7 @@ class CrankDiagonal:
                 status = self._at_change_point
         return Diagonal(square, direction, root_fold, root_stretch, 0.0, near, far, excess, status)
 
-    def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> Growth:
+    def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> DiagonalRate:
         """
         Return φ̇·q and −φ̇·p, beside what OD turns by.
 
@@ -278,7 +284,7 @@ class CrankDiagonal:
         fold_ratio, stretch_ratio = self.ratios(diagonal)
         base = speeds.coordinates[second]
         lean = 0.5 * fold_ratio * stretch_ratio / square
-        return Growth(q, -p, speeds.coordinates[first] - base, base, lean)
+        return DiagonalRate(q, -p, speeds.coordinates[first] - base, base, lean)
 
     def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
         """Return near by fold and far by stretch; where one is the other the ratio is 1."""
@@ -289,8 +295,13 @@ class CrankDiagonal:
         )
 
     def accelerations(
-        self, diagonal: Diagonal, growth: Growth, _known: State, _speeds: State, changes: State
-    ) -> GrowthChange:
+        self,
+        diagonal: Diagonal,
+        growth: DiagonalRate,
+        _known: State,
+        _speeds: State,
+        changes: State,
+    ) -> DiagonalAcceleration:
         """
         Return the derivative of `rates`.
 
@@ -309,7 +320,7 @@ class CrankDiagonal:
         pull = -growth.turn * (1.0 - growth.turn)
         base = changes.coordinates[second]
         change = changes.coordinates[first] - base
-        return GrowthChange(pull, swirl, change, base, self.bend(diagonal))
+        return DiagonalAcceleration(pull, swirl, change, base, self.bend(diagonal))
 
     def bend(self, diagonal: Diagonal) -> float:
         """Return the bend that `accelerations` tells of."""
@@ -394,19 +405,26 @@ class FreeDiagonal:
         start, end = (known.pins[i] for i in self._ends)
         return free_diagonal(end - start, abs(start) + abs(end), *self._limits)
 
-    def rates(self, diagonal: Diagonal, known: State, speeds: State) -> Growth:
+    def rates(self, diagonal: Diagonal, known: State, speeds: State) -> DiagonalRate:
         """Return the velocity of D against A, divided by AD."""
         first, second = self._ends
         vector = known.pins[second] - known.pins[first]
-        return free_growth(diagonal, vector, speeds.pins[second] - speeds.pins[first])
+        return free_diagonal_rate(diagonal, vector, speeds.pins[second] - speeds.pins[first])
 
     def accelerations(
-        self, _diagonal: Diagonal, growth: Growth, known: State, _speeds: State, changes: State
-    ) -> GrowthChange:
+        self,
+        _diagonal: Diagonal,
+        growth: DiagonalRate,
+        known: State,
+        _speeds: State,
+        changes: State,
+    ) -> DiagonalAcceleration:
         """Return the derivative of `rates`."""
         first, second = self._ends
         vector = known.pins[second] - known.pins[first]
-        return free_growth_change(growth, vector, changes.pins[second] - changes.pins[first])
+        return free_diagonal_acceleration(
+            growth, vector, changes.pins[second] - changes.pins[first]
+        )
 
 
 def free_diagonal(
@@ -439,14 +457,18 @@ def free_diagonal(
     return Diagonal(square, phase(vector), root_fold, root_stretch, 0.0, 0.0, 0.0, square, status)
 
 
-def free_growth(diagonal: Diagonal, vector: complex, velocity: complex) -> Growth:
+def free_diagonal_rate(diagonal: Diagonal, vector: complex, velocity: complex) -> DiagonalRate:
     """Return how a diagonal grows that changes at a velocity."""
     unit = velocity / vector
-    return Growth(unit.real, unit.imag, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch)
+    return DiagonalRate(
+        unit.real, unit.imag, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch
+    )
 
 
-def free_growth_change(growth: Growth, vector: complex, pull: complex) -> GrowthChange:
-    """Return the derivative of `free_growth`, of a diagonal that changes at an acceleration."""
+def free_diagonal_acceleration(
+    growth: DiagonalRate, vector: complex, pull: complex
+) -> DiagonalAcceleration:
+    """Return the derivative of `free_diagonal_rate`, for a diagonal with an acceleration."""
     square = pull / vector
     square += growth.turn * (growth.turn - 2j * growth.growth)
-    return GrowthChange(square.real, square.imag, 0.0, 0.0, None)
+    return DiagonalAcceleration(square.real, square.imag, 0.0, 0.0, None)

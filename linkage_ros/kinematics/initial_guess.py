@@ -25,7 +25,7 @@ from linkage_ros.errors import DefinitionError, listed
 from linkage_ros.kinematics.linkage import Linkage
 
 
-class StartingPose(NamedTuple):
+class InitialGuess(NamedTuple):
     """
     A rough pose.
 
@@ -45,14 +45,14 @@ class StartingPose(NamedTuple):
     places: tuple[complex, ...]
 
 
-def starting_pose(
+def initial_guess(
     linkage: Linkage,
     links: Sequence[str],
     blocks: Mapping[str, str],
     points: Mapping[str, Mapping[str, complex]],
     scale: float,
     place_known: Callable[[Sequence[float]], tuple[Mapping[str, complex], Mapping[str, float]]],
-) -> StartingPose:
+) -> InitialGuess:
     """
     Fit links to the points that the file's pose gives.
 
@@ -138,4 +138,4 @@ def starting_pose(
             )
         first = next(iter(points[link].values()))
         places.append(given[known] + turn * (first - points[link][known]))
-    return StartingPose(inputs, tuple(angle_of(link) for link in links), tuple(places))
+    return InitialGuess(inputs, tuple(angle_of(link) for link in links), tuple(places))

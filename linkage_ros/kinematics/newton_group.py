@@ -52,7 +52,7 @@ from linkage_ros.kinematics.equations import (
     OnLine,
     Parallel,
 )
-from linkage_ros.kinematics.initial_guess import starting_pose, StartingPose
+from linkage_ros.kinematics.initial_guess import initial_guess, InitialGuess
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
@@ -61,7 +61,7 @@ from linkage_ros.kinematics.topology import Joint
 import numpy as np
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.plan import Planner
+    from linkage_ros.kinematics.plan import SolutionPlan
 
 
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
@@ -126,7 +126,7 @@ class Iteration:
         self,
         constraints: tuple[Constraint, ...],
         slides: tuple[OnLine, ...],
-        start: StartingPose,
+        start: InitialGuess,
         before: tuple[Step, ...],
         sliding: tuple[bool, ...],
         far: float,
@@ -525,7 +525,11 @@ class Constraints:
     """
 
     def __init__(
-        self, linkage: Linkage, joints: Sequence[Joint], links: Sequence[str], planner: Planner
+        self,
+        linkage: Linkage,
+        joints: Sequence[Joint],
+        links: Sequence[str],
+        planner: SolutionPlan,
     ) -> None:
         self._linkage = linkage
         self._planner = planner
@@ -559,7 +563,7 @@ class Constraints:
                 {link: x[a.coordinate] + a.constant for link, a in planner.angles.items()},
             )
 
-        start = starting_pose(
+        start = initial_guess(
             self._linkage, self._links, planner.blocks, planner.points, planner.scale, place_known
         )
         sliding = tuple(bool(given.slider) for given in self._linkage.inputs)

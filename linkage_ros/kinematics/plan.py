@@ -35,8 +35,8 @@ from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad, swivel_diagonal
 from linkage_ros.kinematics.dyads.rrp import RRPDyad
 from linkage_ros.kinematics.dyads.rrr import (
-    Carry,
     crank_diagonal,
+    DrivenOffset,
     DrivenRRRDyad,
     FoldingRRRDyad,
     RRRDyad,
@@ -44,7 +44,7 @@ from linkage_ros.kinematics.dyads.rrr import (
 )
 from linkage_ros.kinematics.known_links import Angle, Held, KnownLinks, Line, Slide
 from linkage_ros.kinematics.linkage import Input, Linkage
-from linkage_ros.kinematics.point_steps import Turned
+from linkage_ros.kinematics.point_steps import RelativeAngle
 from linkage_ros.kinematics.rail import CrankRail, FreeRail, Rail, UnsignedRail
 from linkage_ros.kinematics.rounding import ROUNDING, UNIT_ROUNDOFF
 from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Structure
@@ -92,7 +92,7 @@ class _Hinge(NamedTuple):
         return -sign if folds and not self.crank_first else sign
 
 
-class Planner(KnownLinks):
+class SolutionPlan(KnownLinks):
     """
     Makes the steps of a linkage, group after group.
 
@@ -131,7 +131,7 @@ class Planner(KnownLinks):
             sign = 1.0 if self._linkage.inputs[driven.index].child == joint.link else -1.0
             coordinate = index
             if angle.coordinate or sign < 0.0:
-                self.add(Turned(angle.coordinate, index, sign))
+                self.add(RelativeAngle(angle.coordinate, index, sign))
                 coordinate = self.new_coordinates(1)
                 before = self.turns_with.get(angle.coordinate)
                 if before is not None:
@@ -346,9 +346,9 @@ class Planner(KnownLinks):
         for i, name in enumerate(slides):
             self.slides[name] = Slide(k + len(group.links) + i, 1.0)
 
-    def _carries(self, start: str, end: str) -> tuple[Carry, ...]:
+    def _carries(self, start: str, end: str) -> tuple[DrivenOffset, ...]:
         """Return the way from one link of a body to another, through its driven joints."""
-        ways: dict[str, tuple[Carry, ...]] = {start: ()}
+        ways: dict[str, tuple[DrivenOffset, ...]] = {start: ()}
         while end not in ways:
             for i, given in enumerate(self._linkage.inputs):
                 for one, other in self._ends(i):
@@ -363,15 +363,19 @@ class Planner(KnownLinks):
             one, other = self._linkage.sliders[given.slider].along, self.blocks[given.slider]
         return (one, other), (other, one)
 
-    def _carry(self, index: int, given: Input, inner: str, outer: str) -> Carry:
+    def _carry(self, index: int, given: Input, inner: str, outer: str) -> DrivenOffset:
         if given.slider:
             point = self.point_of(given.slider, inner)
             line = self.line(given.slider, outer, point)
             self.slides[given.slider] = Slide(index, 1.0)
-            return Carry(line.start, point, line.angle, -1, index, line.sign, line.direction)
+            return DrivenOffset(
+                line.start, point, line.angle, -1, index, line.sign, line.direction
+            )
         (pin,) = set(self.points[inner]) & set(self.points[outer])
         sign = 1.0 if given.child == inner else -1.0
-        return Carry(self.points[outer][pin], self.points[inner][pin], 0.0, index, -1, sign, 0j)
+        return DrivenOffset(
+            self.points[outer][pin], self.points[inner][pin], 0.0, index, -1, sign, 0j
+        )
 
     def _hinge(self, first: str, second: str) -> _Hinge | None:
         """Return how two pins lie on links that share a pin O, if any two do."""

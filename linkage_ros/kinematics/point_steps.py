@@ -148,7 +148,7 @@ class PointOnRail:
         changes.pins.append(changes.pins[self._pin] + moved * unit)
 
 
-class Turned:
+class RelativeAngle:
     """
     The angle of a link that a driven joint turns against another.
 

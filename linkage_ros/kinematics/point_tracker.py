@@ -46,7 +46,7 @@ class _Node(NamedTuple):
     slide: int
 
 
-class Follower:
+class PointTracker:
     """
     Certain points of links.
 

@@ -35,7 +35,7 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 
 
-class Sight(NamedTuple):
+class PinOnRail(NamedTuple):
     """
     The pin A in the frame of the rail.
 
@@ -73,15 +73,15 @@ class Sight(NamedTuple):
 class Rail(Protocol):
     """What a dyad asks of a rail."""
 
-    def at(self, known: State, /) -> Sight:
+    def at(self, known: State, /) -> PinOnRail:
         """Return the pin in the frame of the rail."""
 
-    def rates(self, sight: Sight, known: State, speeds: State, /) -> tuple[complex, float]:
+    def rates(self, sight: PinOnRail, known: State, speeds: State, /) -> tuple[complex, float]:
         """Return the pin's velocity in that frame, and the rate of the frame, in [rad/s]."""
 
     def accelerations(
         self,
-        sight: Sight,
+        sight: PinOnRail,
         rates: tuple[complex, float],
         known: State,
         speeds: State,
@@ -90,11 +90,11 @@ class Rail(Protocol):
     ) -> tuple[complex, float]:
         """Return the pin's acceleration in that frame, and that of the frame, in [rad/s²]."""
 
-    def climb(self, sight: Sight, rise: float, speeds: State, /) -> float:
+    def climb(self, sight: PinOnRail, rise: float, speeds: State, /) -> float:
         """Return the rate of y, the rise, by below and above."""
 
     def across(
-        self, sight: Sight, pull: complex, link_rate: float, speeds: State, changes: State, /
+        self, sight: PinOnRail, pull: complex, link_rate: float, speeds: State, changes: State, /
     ) -> float:
         """Return ÿ + y·λ̇², of a link at the rate λ̇, by below and above."""
 
@@ -160,7 +160,7 @@ class CrankRail:
         across = ((self._below, 0.5 * pi), (self._above, -0.5 * pi))
         return tuple(psi - phase(self._arm) for bracket, psi in across if bracket == 0.0)
 
-    def at(self, known: State) -> Sight:
+    def at(self, known: State) -> PinOnRail:
         """Return the pin in the frame of the rail."""
         first, second = self.arms
         base = known.coordinates[second]
@@ -168,7 +168,7 @@ class CrankRail:
         arm = facing(swing) * self._arm
         place = self._pivot + arm
         if self._link == inf:
-            return Sight(place, inf, inf, 0.0, base, arm, 0.0, Status.CLOSED)
+            return PinOnRail(place, inf, inf, 0.0, base, arm, 0.0, Status.CLOSED)
         eta = facing(-0.5 * swing) * self._half_turn
         sine, cosine = eta.imag, eta.real
         part, other_part = self._root_length * sine, self._root_length * cosine
@@ -178,7 +178,7 @@ class CrankRail:
             above = self._root(self._above, other_part, other_square, place.imag)
         if Status.OPEN in (below.status, above.status):
             gap = below.missing + above.missing
-            return Sight(place, 0.0, 0.0, gap, base, arm, 0.0, Status.OPEN)
+            return PinOnRail(place, 0.0, 0.0, gap, base, arm, 0.0, Status.OPEN)
         lean, status = 0.0, Status.CLOSED
         if self._changes_over:
             # Of the rate, which is 0 where the root is; two forms of one zero would not cancel.
@@ -192,7 +192,7 @@ class CrankRail:
                 not self._above and passes_zero(cosine, 0.5 * swing)
             ):
                 status = self._at_change_point
-        return Sight(place, below.root, above.root, 0.0, base, arm, lean, status)
+        return PinOnRail(place, below.root, above.root, 0.0, base, arm, lean, status)
 
     def _root(self, bracket: float, part: float, square: float, side: float) -> Root:
         """Return the root of the link's length less what it has to reach."""
@@ -206,7 +206,7 @@ class CrankRail:
             where(shorter, abs(bracket) + square, size),
         )
 
-    def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
+    def rates(self, sight: PinOnRail, _known: State, speeds: State) -> tuple[complex, float]:
         """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
         first, second = self.arms
         turn, arm = speeds.coordinates[second], sight.arm
@@ -215,7 +215,7 @@ class CrankRail:
 
     def accelerations(
         self,
-        sight: Sight,
+        sight: PinOnRail,
         _rates: tuple[complex, float],
         _known: State,
         speeds: State,
@@ -228,7 +228,7 @@ class CrankRail:
         swing_change = changes.coordinates[first] - change
         return (1j * swing_change - swing * swing) * sight.arm, change
 
-    def climb(self, sight: Sight, rise: float, speeds: State) -> float:
+    def climb(self, sight: PinOnRail, rise: float, speeds: State) -> float:
         """Return the rate of y, the rise, by below and above."""
         if not self._changes_over:
             return rise / (sight.below * sight.above)
@@ -236,7 +236,7 @@ class CrankRail:
         return (speeds.coordinates[first] - speeds.coordinates[second]) * sight.lean
 
     def across(
-        self, sight: Sight, _pull: complex, link_rate: float, speeds: State, changes: State
+        self, sight: PinOnRail, _pull: complex, link_rate: float, speeds: State, changes: State
     ) -> float:
         """
         Return ÿ + y·λ̇² by below and above.
@@ -281,7 +281,7 @@ class UnsignedRail(CrankRail):
 
     _at_change_point = Status.TOGGLE
 
-    def at(self, known: State) -> Sight:
+    def at(self, known: State) -> PinOnRail:
         """Return the pin in the frame of the rail."""
         found = super().at(known)
         lean = where((found.below < 0.0) != (found.above < 0.0), -found.lean, found.lean)
@@ -313,14 +313,14 @@ class FreeRail:
         self._arm = arm
         self._back = unit.conjugate()
 
-    def at(self, known: State) -> Sight:
+    def at(self, known: State) -> PinOnRail:
         """Return the pin in the frame of the rail."""
         base = known.coordinates[self._arm]
         start, end = (known.pins[i] for i in self._ends)
         place = (end - start) * (facing(-base) * self._back)
         link = self._link
         if link == inf:
-            return Sight(place, inf, inf, 0.0, base, 0j, 0.0, Status.CLOSED)
+            return PinOnRail(place, inf, inf, 0.0, base, 0j, 0.0, Status.CLOSED)
         size = abs(start) + abs(end) + link
         below, above = root_of(link - place.imag, size), Root(0.0)
         if below.status is not Status.OPEN:
@@ -328,9 +328,9 @@ class FreeRail:
         gap = below.missing + above.missing
         is_open = Status.OPEN in (below.status, above.status)
         status = Status.OPEN if is_open else Status.CLOSED
-        return Sight(place, below.root, above.root, gap, base, 0j, 0.0, status)
+        return PinOnRail(place, below.root, above.root, gap, base, 0j, 0.0, status)
 
-    def rates(self, sight: Sight, _known: State, speeds: State) -> tuple[complex, float]:
+    def rates(self, sight: PinOnRail, _known: State, speeds: State) -> tuple[complex, float]:
         """Return the pin's velocity in the frame of the rail, and the rate of the frame."""
         start, end = (speeds.pins[i] for i in self._ends)
         turn = speeds.coordinates[self._arm]
@@ -339,7 +339,7 @@ class FreeRail:
 
     def accelerations(
         self,
-        sight: Sight,
+        sight: PinOnRail,
         rates: tuple[complex, float],
         _known: State,
         _speeds: State,
@@ -354,12 +354,12 @@ class FreeRail:
         apparent = 2j * turn * velocity + (1j * change - turn * turn) * sight.place
         return (end - start) * back - apparent, change
 
-    def climb(self, sight: Sight, rise: float, _speeds: State) -> float:
+    def climb(self, sight: PinOnRail, rise: float, _speeds: State) -> float:
         """Return the rate of y, the rise, by below and above."""
         return rise / (sight.below * sight.above)
 
     def across(
-        self, sight: Sight, pull: complex, link_rate: float, _speeds: State, _changes: State
+        self, sight: PinOnRail, pull: complex, link_rate: float, _speeds: State, _changes: State
     ) -> float:
         """Return ÿ + y·λ̇² by below and above."""
         across = pull.imag + sight.place.imag * link_rate * link_rate

@@ -29,7 +29,7 @@ from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.diagonals import CrankDiagonal
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
-from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, Turned
+from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, RelativeAngle
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.branch import Branch
@@ -68,7 +68,7 @@ _POINT = 1e-9
 _ROUNDED = 1e-9
 """Of a margin: what is farther from zero has its sign."""
 
-_CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, Turned)
+_CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, RelativeAngle)
 
 
 class InputRange(NamedTuple):

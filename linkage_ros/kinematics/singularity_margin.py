@@ -62,7 +62,7 @@ class SingularInput(NamedTuple):
     status: Status
 
 
-class Nearness(NamedTuple):
+class SingularityMargin(NamedTuple):
     """
     How near trouble a position is; the smaller, the nearer.
 
@@ -89,7 +89,7 @@ class Nearness(NamedTuple):
     group: int = -1
 
 
-def nearness(closure: Closure, position: Position) -> Nearness:
+def singularity_margin(closure: Closure, position: Position) -> SingularityMargin:
     """Return how near trouble a closed position is."""
     angle, conditioning, weakest = 0.5 * pi, 1.0, -1
     groups = closure.step_groups
@@ -110,7 +110,7 @@ def nearness(closure: Closure, position: Position) -> Nearness:
         value = _within(closure, position.state.coordinates[1] * unit)
         for singular in closure.singular_inputs:
             distance = min(distance, abs(away(closure, value, singular.value)))
-    return Nearness(angle, conditioning, distance, weakest)
+    return SingularityMargin(angle, conditioning, distance, weakest)
 
 
 def away(closure: Closure, value: float, place: float) -> float:

@@ -145,7 +145,7 @@ class Sampled(NamedTuple):
     results: list[float]
 
 
-class Extremes(NamedTuple):
+class MinMaxCurve(NamedTuple):
     """The lowest and the highest value of something over the range of an input."""
 
     lowest: Extreme
@@ -157,7 +157,7 @@ class Extremes(NamedTuple):
         return self.highest.value - self.lowest.value < _SAME
 
 
-class Way:
+class InputSweep:
     """
     A linkage as a function of one of its inputs; the others are held.
 
@@ -313,7 +313,7 @@ def usual_inputs(closure: Closure) -> tuple[float, ...]:
         if turning and _ease(closure, closure.position(*usual)) > _EASY:
             return usual
         return max(grid(closure, _MANY), key=lambda found: _ease(closure, found[1]))[0]
-    interval = Way(closure).widest_range
+    interval = InputSweep(closure).widest_range
     assert interval is not None, 'reading the file has proved that it closes somewhere'
     if interval.whole:
         return (pi / 3.0,)
@@ -323,7 +323,7 @@ def usual_inputs(closure: Closure) -> tuple[float, ...]:
 def _ease(closure: Closure, position: Position) -> float:
     if position.status is not Status.CLOSED:
         return -1.0
-    return closure.nearness(position).conditioning
+    return closure.singularity_margin(position).conditioning
 
 
 def grid(closure: Closure, count: int = _GRID) -> Iterator[tuple[tuple[float, ...], Position]]:
@@ -362,7 +362,7 @@ def samples(interval: InputRange, count: int = _SAMPLES) -> list[float]:
 
 def extremes(
     function: Callable[[float], float], ranges: Sequence[InputRange], count: int = _SAMPLES
-) -> Extremes:
+) -> MinMaxCurve:
     """
     Find the lowest and the highest value of a function of the input.
 
@@ -375,11 +375,11 @@ def extremes(
     return _ends(function, sampled)
 
 
-def _ends(function: Callable[[float], float], sampled: Sequence[Sampled]) -> Extremes:
+def _ends(function: Callable[[float], float], sampled: Sequence[Sampled]) -> MinMaxCurve:
     lowest = _lowest(function, sampled)
     upside_down = [one._replace(results=[-y for y in one.results]) for one in sampled]
     highest = _lowest(lambda value: -function(value), upside_down)
-    return Extremes(lowest, Extreme(-highest.value, highest.at))
+    return MinMaxCurve(lowest, Extreme(-highest.value, highest.at))
 
 
 def _lowest(function: Callable[[float], float], sampled: Sequence[Sampled]) -> Extreme:
@@ -443,7 +443,7 @@ def zeros(function: Callable[[float], float], ranges: Sequence[InputRange]) -> l
     return found
 
 
-def transmission_angles(way: Way) -> dict[int, Extremes]:
+def transmission_angles(way: InputSweep) -> dict[int, MinMaxCurve]:
     """
     Return the extreme transmission angles of each group over the range, by its number, in [rad].
 
@@ -452,12 +452,12 @@ def transmission_angles(way: Way) -> dict[int, Extremes]:
     return _of_each_step(way, 'transmission_angle', _SAMPLES)
 
 
-def conditionings(way: Way) -> dict[int, Extremes]:
+def conditionings(way: InputSweep) -> dict[int, MinMaxCurve]:
     """Return the extreme conditioning of each iterated group over the range, by its number."""
     return _of_each_step(way, 'conditioning', _SAMPLES // 4)
 
 
-def _of_each_step(way: Way, name: str, count: int) -> dict[int, Extremes]:
+def _of_each_step(way: InputSweep, name: str, count: int) -> dict[int, MinMaxCurve]:
     """Return the extremes of what a method of the steps tells of their poses, by group."""
     closure = way.closure
     told = {
@@ -490,7 +490,7 @@ def _of_each_step(way: Way, name: str, count: int) -> dict[int, Extremes]:
 
 
 def _of_pose(
-    way: Way, number: int, method: Callable[..., float], closed: float
+    way: InputSweep, number: int, method: Callable[..., float], closed: float
 ) -> Callable[[float], float]:
     """Return what a method tells of a step's pose; no number where its loops do not close."""
     pose_at = pose_alone(way.closure, number, *way.inputs(closed))
@@ -519,7 +519,7 @@ def worst_residual(closure: Closure) -> tuple[float, tuple[float, ...], int] | N
     if len(closure.linkage.inputs) > 1:
         tried = grid(closure)
     else:
-        way = Way(closure)
+        way = InputSweep(closure)
         values = [value for interval in way.ranges for value in samples(interval)]
         tried = (((value,), way.position(value)) for value in values)
     found = [

@@ -165,7 +165,7 @@ _LARGEST_GROUP = 8
 """Bodies of a group that is searched for by trial; a larger one is solved as a whole."""
 
 
-def find_groups(linkage: Linkage) -> Structure:
+def assur_groups(linkage: Linkage) -> Structure:
     """
     Find the order in which a linkage is solved.
 

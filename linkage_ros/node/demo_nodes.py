@@ -48,7 +48,7 @@ from sensor_msgs.msg import JointState
 # What the small nodes have in common that run beside the linkage's own, for demos and tests.
 
 
-class Companion(Node):
+class DemoNode(Node):
     """A node whose parameters are numbers within bounds, and the name of a joint."""
 
     def joint(self) -> str:
@@ -70,7 +70,7 @@ class Companion(Node):
 AnyNode = TypeVar('AnyNode', bound=Node)
 
 
-def run_companion(
+def run_demo_node(
     name: str, make: Callable[[], AnyNode], run: Callable[[AnyNode, Event], None], stop: Event
 ) -> int:
     """
@@ -108,7 +108,7 @@ _OLDEST = 0.1
 """A state that came longer ago is none, in [s]."""
 
 
-class PDController(Companion):
+class PDController(DemoNode):
     """Commands the effort of a joint."""
 
     def __init__(self) -> None:
@@ -169,7 +169,7 @@ class PDController(Companion):
 
 def run_pd_controller(stop: Event) -> int:
     """Control until the event, or for the time that was set, and return the exit code."""
-    return run_companion('pd_controller', PDController, PDController.run, stop)
+    return run_demo_node('pd_controller', PDController, PDController.run, stop)
 
 
 # A crank that turns, for demos and tests.
@@ -179,7 +179,7 @@ def run_pd_controller(stop: Event) -> int:
 # angle(t) = start + speed·t + (ripple·speed/2π)·sin(2πt).
 
 
-class CrankSource(Companion):
+class CrankSource(DemoNode):
     """Publishes a turning crank."""
 
     def __init__(self) -> None:
@@ -217,4 +217,4 @@ class CrankSource(Companion):
 
 def run_crank_source(stop: Event) -> int:
     """Publish a turning crank until the event, and return the exit code."""
-    return run_companion('crank_source', CrankSource, CrankSource.run, stop)
+    return run_demo_node('crank_source', CrankSource, CrankSource.run, stop)

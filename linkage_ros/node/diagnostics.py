@@ -31,7 +31,7 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.run_snapshots import RunSnapshots
 from linkage_ros.node.tick_loop import Counts, TickLoop
-from linkage_ros.pipeline.pipeline import Line, Look
+from linkage_ros.pipeline.pipeline import LinkagePipeline, LinkageTick
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Injection
@@ -53,7 +53,7 @@ _NEARNESS = {
     'conditioning': 'Conditioning',
     'toggle_distance': 'Input to the nearest toggle ({unit})',
 }
-"""What is told of `Closure.nearness`, and as what."""
+"""What is told of `Closure.singularity_margin`, and as what."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class Snapshot:
 
 
 @dataclass(frozen=True, slots=True)
-class Health:
+class DiagnosticsSummary:
     """
     All that the diagnostics tell.
 
@@ -290,9 +290,11 @@ class Health:
             level, message = WARN, warning
         return self._status('loop closure', level, message, values)
 
-    def _nearness(self, posed: Sequence[tuple[Line, Position]]) -> tuple[dict[str, str], str]:
+    def _nearness(
+        self, posed: Sequence[tuple[LinkagePipeline, Position]]
+    ) -> tuple[dict[str, str], str]:
         """Return how near trouble the linkage is that is nearest, and what there is to warn."""
-        nearness = [(line, line.closure.nearness(position)) for line, position in posed]
+        nearness = [(line, line.closure.singularity_margin(position)) for line, position in posed]
         inputs = [driven for line, _ in posed for driven in line.member.linkage.inputs]
         unit = ' or '.join(sorted({_unit(driven) for driven in inputs}))
         values, warnings = {}, []
@@ -390,7 +392,7 @@ def no_clock(silence: float) -> str:
     return 'No /clock yet' if silence == inf else f'No /clock for {silence:.1f} s'
 
 
-def _shares(looks: Sequence[tuple[Line, Look]]) -> tuple[dict[str, str], str]:
+def _shares(looks: Sequence[tuple[LinkagePipeline, LinkageTick]]) -> tuple[dict[str, str], str]:
     """Return what of its limits each joint takes at the last tick, and what is too much."""
     values, warnings = {}, []
     for line, look in looks:
@@ -409,7 +411,7 @@ def _shares(looks: Sequence[tuple[Line, Look]]) -> tuple[dict[str, str], str]:
     return values, '; '.join(warnings)
 
 
-def _inputs(line: Line, look: Look) -> dict[str, str]:
+def _inputs(line: LinkagePipeline, look: LinkageTick) -> dict[str, str]:
     """Return the inputs of the only linkage."""
     angles = look.crank.angles if look.crank is not None else ()
     return {
@@ -418,7 +420,9 @@ def _inputs(line: Line, look: Look) -> dict[str, str]:
     }
 
 
-def _exertions(line: Line, look: Look) -> dict[str, tuple[float | None, float | None]]:
+def _exertions(
+    line: LinkagePipeline, look: LinkageTick
+) -> dict[str, tuple[float | None, float | None]]:
     """Return rate and effort of the joints that have limits, as far as they are known."""
     linkage, reading = line.member.linkage, look.reading
     found: dict[str, tuple[float | None, float | None]] = {}
@@ -433,7 +437,7 @@ def _exertions(line: Line, look: Look) -> dict[str, tuple[float | None, float | 
     return {name: of for name, of in found.items() if name in linkage.limits}
 
 
-def _of(line: Line) -> str:
+def _of(line: LinkagePipeline) -> str:
     """Return which linkage it is, where there are several."""
     return f' ({line.member.name})' if line.member.name else ''
 

@@ -36,7 +36,7 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node import pacing
 from linkage_ros.node.bag_topics import bag_topic
-from linkage_ros.node.diagnostics import CLOCK_PATIENCE, Health, no_clock, Snapshot
+from linkage_ros.node.diagnostics import CLOCK_PATIENCE, DiagnosticsSummary, no_clock, Snapshot
 from linkage_ros.node.parameters import declare_parameters, nearness_limits
 from linkage_ros.node.real_time import RealTime
 from linkage_ros.node.run_recording import RunRecording
@@ -64,7 +64,7 @@ from std_srvs.srv import SetBool, Trigger
 # A service whose answer comes when it is known, without an executor that waits for it.
 
 
-class LateAnswers:
+class DeferredResponse:
     """
     Lets the callback of a service return before it knows the answer.
 
@@ -152,7 +152,7 @@ class LinkageNode(LifecycleNode):
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_service(Trigger, '~/start_recording', self._on_start_recording)
         self.create_service(Trigger, '~/stop_recording', self._on_stop_recording)
-        self._snapshot_answers = LateAnswers(
+        self._snapshot_answers = DeferredResponse(
             self.create_service(Trigger, '~/snapshot', self._on_snapshot)
         )
         self._snapshot_written = self.create_guard_condition(self.recording.collect)
@@ -445,7 +445,7 @@ class LinkageNode(LifecycleNode):
         simulated = self.get_parameter('use_sim_time').value
         clock = self.get_clock().now()
         now = Snapshot.of(self.loop.counts, time.monotonic_ns())
-        health = Health(
+        health = DiagnosticsSummary(
             node=self.get_fully_qualified_name(),
             scene=self.scene.name,
             rate=0.0 if simulated else self.scene.rate,

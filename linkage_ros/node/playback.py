@@ -62,7 +62,7 @@ class Part(NamedTuple):
     loop: bool
 
 
-class Cue(NamedTuple):
+class QueuedMessage(NamedTuple):
     """
     A message and its time.
 
@@ -83,7 +83,7 @@ class Cue(NamedTuple):
     data: bytes
 
 
-def cues(order: LogTimeOrder, part: Part) -> Iterator[Cue]:
+def playback_queue(order: LogTimeOrder, part: Part) -> Iterator[QueuedMessage]:
     """
     Yield the messages that are played.
 
@@ -103,7 +103,7 @@ def cues(order: LogTimeOrder, part: Part) -> Iterator[Cue]:
                 break
             if topic in part.topics:
                 newest = max(newest, log_time)
-                yield Cue(base, log_time, topic, data)
+                yield QueuedMessage(base, log_time, topic, data)
         if not part.loop:
             return
         if newest == part.first:
@@ -113,17 +113,19 @@ def cues(order: LogTimeOrder, part: Part) -> Iterator[Cue]:
         base += newest - part.first
 
 
-def read_ahead(messages: Iterator[Cue], stop: Event) -> Generator[Cue, None, None]:
+def read_ahead(
+    messages: Iterator[QueuedMessage], stop: Event
+) -> Generator[QueuedMessage, None, None]:
     """
     Yield messages that a thread of its own has read before they are asked for, until the event.
 
     It reads some batches ahead and no further. What is raised while reading is raised here, behind
     the messages that were read before.
     """
-    batches: Queue[list[Cue] | Exception] = Queue(_BATCHES)
+    batches: Queue[list[QueuedMessage] | Exception] = Queue(_BATCHES)
     ended = Event()
 
-    def hand_over(batch: list[Cue] | Exception) -> bool:
+    def hand_over(batch: list[QueuedMessage] | Exception) -> bool:
         while not ended.is_set():
             try:
                 batches.put(batch, timeout=_LOOK)
@@ -133,7 +135,7 @@ def read_ahead(messages: Iterator[Cue], stop: Event) -> Generator[Cue, None, Non
         return False
 
     def read() -> None:
-        batch: list[Cue] = []
+        batch: list[QueuedMessage] = []
         size = 0
         error: Exception | None = None
         try:
@@ -264,7 +266,7 @@ class Playback:
         self.counts = dict.fromkeys(publish, 0)
         self.late = self.latest = self.played = self.took = 0
 
-    def run(self, cues: Iterable[Cue]) -> None:
+    def run(self, cues: Iterable[QueuedMessage]) -> None:
         """Send the messages, to their end or until the clock says that it was stopped."""
         steady, counts = self._steady, self.counts
         begun: int | None = None

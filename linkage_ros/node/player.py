@@ -28,7 +28,14 @@ from linkage_ros.bag.order import LogTimeOrder
 from linkage_ros.errors import LinkageError
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.messages.single_values import TIME_END, time_message
-from linkage_ros.node.playback import cues, Part, Playback, read_ahead, SteadyClock, Ticks
+from linkage_ros.node.playback import (
+    Part,
+    Playback,
+    playback_queue,
+    read_ahead,
+    SteadyClock,
+    Ticks,
+)
 from linkage_ros.node.transports import leave_out_shared_memory
 from linkage_ros.signals import bounded_end
 import rclpy
@@ -165,7 +172,7 @@ def play(
     )
     error = None
     try:
-        with closing(read_ahead(cues(order, part), stop)) as messages:
+        with closing(read_ahead(playback_queue(order, part), stop)) as messages:
             playback.run(messages)
     except LinkageError as raised:
         error = raised

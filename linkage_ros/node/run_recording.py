@@ -50,7 +50,7 @@ from linkage_ros.node.run_snapshots import (
     RunSnapshots,
 )
 from linkage_ros.node.tick_loop import TickLoop
-from linkage_ros.pipeline.pipeline import Line
+from linkage_ros.pipeline.pipeline import LinkagePipeline
 from linkage_ros.replay.replay import own_effects_here
 from linkage_ros.scene.scene import RecordParameters, Scene
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -252,7 +252,7 @@ class RunRecording:
 
 
 def _attachments(
-    scene: Scene, topics: Sequence[tuple[str, Topic]], begun: str, lines: Sequence[Line]
+    scene: Scene, topics: Sequence[tuple[str, Topic]], begun: str, lines: Sequence[LinkagePipeline]
 ) -> dict[str, tuple[str, bytes]]:
     named = {key: topic.name for key, topic in topics if key != EXTRA}
     run = {
@@ -275,7 +275,7 @@ def _attachments(
     }
 
 
-def _chosen(lines: Sequence[Line]) -> dict[str, dict[str, Mapping[str, float]]]:
+def _chosen(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str, float]]]:
     """Return by the name of each linkage the solver that was chosen, where one was."""
     return {
         line.member.name: {line.choice.solver: line.choice.parameters}

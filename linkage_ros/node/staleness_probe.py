@@ -20,7 +20,7 @@ It knows where the crank is at every instant, and so where the joints are. At in
 at random, it uses the newest joint state that has come: as it is, or carried forward by its rates
 from its stamp to now. How far that is from the truth is what an application gets of the node's
 rate. For each motion of the crank it prints a line of JSON when it begins and one with what it
-found. Its only argument is a JSON object, `Task` as it is.
+found. Its only argument is a JSON object, `TableRequest` as it is.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import JointStateReader, JointStateWriter, Rejection
 from linkage_ros.messages.layout import NANOSECONDS
-from linkage_ros.node.demo_nodes import Companion, run_companion
+from linkage_ros.node.demo_nodes import DemoNode, run_demo_node
 from linkage_ros.node.scene_topics import OUTPUT_QOS
 from linkage_ros.scene.load import load_scene
 from linkage_ros.signals import stop_on_signals
@@ -52,7 +52,7 @@ _LEAD = 300_000_000
 """Before the first use the crank stands where the motion starts, in [ns]."""
 
 
-class Task(NamedTuple):
+class TableRequest(NamedTuple):
     """
     What is to be done.
 
@@ -73,10 +73,10 @@ class Task(NamedTuple):
     use_rate: float
 
 
-class Consumer(Companion):
+class StalenessProbe(DemoNode):
     """Publishes a crank and uses joint states."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: TableRequest) -> None:
         super().__init__('consumer')
         self._task = task
         (member,) = load_scene(task.scene).members
@@ -177,9 +177,9 @@ def _never(_: Any) -> None:
 def main() -> int:
     """Run the consumer and return the exit code."""
     stop = stop_on_signals()
-    task = Task(**json.loads(sys.argv[1]))
+    task = TableRequest(**json.loads(sys.argv[1]))
     try:
-        return run_companion('consumer', partial(Consumer, task), Consumer.run, stop)
+        return run_demo_node('consumer', partial(StalenessProbe, task), StalenessProbe.run, stop)
     except LinkageError as error:
         print(error, file=sys.stderr)
         return 2

@@ -34,7 +34,7 @@ from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.messages.single_values import time_message
-from linkage_ros.pipeline.pipeline import Look, Pipeline, Tick
+from linkage_ros.pipeline.pipeline import LinkageTick, Pipeline, Tick
 
 if TYPE_CHECKING:
     from linkage_ros.faults.injection import Change, Injection
@@ -424,7 +424,7 @@ class TickLoop:
             recorder.offer(withheld, now, at, time_message(at))
         counts.ticks += 1
         for number, one in enumerate(tick.seen):
-            if not isinstance(one, Look):
+            if not isinstance(one, LinkageTick):
                 _, reading, _ = one
                 counts.withheld += reading is None
                 continue

@@ -34,13 +34,13 @@ from linkage_ros.effects.angle_unwrap import all_wrapped, beginnings, Continuous
 from linkage_ros.effects.stage import (
     Effect,
     effect_of,
+    FORCE_EFFECTS,
     in_order,
-    LOADED,
+    MechanismState,
     module_of,
-    Motion,
     needs,
     PUBLISHED_WITH,
-    Reading,
+    SensorReading,
     SensorStage,
     WriterStage,
 )
@@ -49,7 +49,7 @@ from linkage_ros.kinematics.arithmetic import all_finite
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
-from linkage_ros.pipeline.sample_router import Routes
+from linkage_ros.pipeline.sample_router import SampleRouter
 from linkage_ros.pipeline.straight_tick import (
     Numbers,
     Seen,
@@ -59,7 +59,7 @@ from linkage_ros.pipeline.straight_tick import (
     straight_share,
     straight_tick,
 )
-from linkage_ros.scene.scene import Member, Scene
+from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.solvers.registry import SOLVERS
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ _OF_FORCES = {'pin_forces'}
 """Effects whose messages are made of the forces in the joints alone."""
 
 
-class Look(NamedTuple):
+class LinkageTick(NamedTuple):
     """
     What a linkage comes to at a tick, step by step.
 
@@ -100,8 +100,8 @@ class Look(NamedTuple):
 
     crank: CrankState | None
     position: Position | None
-    motion: Motion | None
-    reading: Reading | None
+    motion: MechanismState | None
+    reading: SensorReading | None
 
 
 class Tick(NamedTuple):
@@ -124,16 +124,16 @@ class Tick(NamedTuple):
 
     message: bytes
     extras: tuple[bytes, ...]
-    seen: Sequence[Look | Seen | Numbers]
-    lines: Sequence[Line]
+    seen: Sequence[LinkageTick | Seen | Numbers]
+    lines: Sequence[LinkagePipeline]
 
     @property
-    def looks(self) -> tuple[Look, ...]:
+    def looks(self) -> tuple[LinkageTick, ...]:
         """All that each linkage came to; what no message needed is worked out here."""
         return tuple(line.looked(seen) for line, seen in zip(self.lines, self.seen, strict=True))
 
 
-class Extra(NamedTuple):
+class AuxiliaryOutput(NamedTuple):
     """
     A message beside the joint states.
 
@@ -176,7 +176,7 @@ class _Wanted:
         return self.pick(motion)
 
 
-class Line:
+class LinkagePipeline:
     """
     A linkage at work. To reset it, build it again.
 
@@ -199,7 +199,11 @@ class Line:
     """
 
     def __init__(
-        self, scene: Scene, member: Member, closure: Closure | None, injection: Injection | None
+        self,
+        scene: Scene,
+        member: SceneLinkage,
+        closure: Closure | None,
+        injection: Injection | None,
     ) -> None:
         self.member = member
         try:
@@ -222,7 +226,7 @@ class Line:
         effects = [effect_of(name) for name in in_order(computed)]
         self.stages = tuple(effect.name for effect in effects)
         """Names of the effects that are computed, in physical order."""
-        forced = drive == 'torque' or not computed.isdisjoint(LOADED)
+        forced = drive == 'torque' or not computed.isdisjoint(FORCE_EFFECTS)
         _refuse_idle(member, forced)
         _refuse_solver(member, forced)
 
@@ -301,7 +305,7 @@ class Line:
         self._read_behind = partial(self._read, first=len(running)) if behind else None
         self._straight: Straight | None = None
         moved = {effect.name for effect in effects if effect.stage is not None}
-        if self.closure.by_steps and moved <= {*_KINEMATIC, *LOADED} and not self._faults:
+        if self.closure.by_steps and moved <= {*_KINEMATIC, *FORCE_EFFECTS} and not self._faults:
             wanted = None
             if 'acceleration' in moved:
                 of = [given[name] for name in self.stages if name in moved]
@@ -322,13 +326,13 @@ class Line:
         return self._straight if self._read_behind is None and of_seen else None
 
     @cached_property
-    def see(self) -> Callable[[int], Look | Seen]:
+    def see(self) -> Callable[[int], LinkageTick | Seen]:
         """Return a function of the time, in [ns]: what the linkage comes to."""
         if self._straight is None:
             return self._see
         return straight_look(self._straight, self._read_behind, self.look)
 
-    def _see(self, now: int) -> Look:
+    def _see(self, now: int) -> LinkageTick:
         """Return what the linkage comes to at a time, in [ns], step by step."""
         crank = self.drive.state(now)
         if crank is not None:
@@ -336,45 +340,45 @@ class Line:
                 crank = stage(crank)
         return self.look(now, crank)
 
-    def look(self, now: int, crank: CrankState | None) -> Look:
+    def look(self, now: int, crank: CrankState | None) -> LinkageTick:
         """Return what the linkage comes to, from the crank on."""
         if crank is None:
-            return Look(None, None, None, self._read_gap(now))
+            return LinkageTick(None, None, None, self._read_gap(now))
         position = self._close(*crank.angles)
         for fault in self._faults:
             position = fault(position)
         if not position.joints:
-            return Look(crank, position, None, self._read_gap(now))
+            return LinkageTick(crank, position, None, self._read_gap(now))
         motion = self._moved(crank, position)
-        return Look(crank, position, motion, self._read(now, self._observed(now, motion)))
+        return LinkageTick(crank, position, motion, self._read(now, self._observed(now, motion)))
 
     def _ideal(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
         """Return what an ideal sensor reads of a motion on symbols, and the forces in joints."""
         acceleration = motion.acceleration
         if acceleration is None or not all_finite(acceleration.joints):
             return []
-        moved = Motion(CrankState((), (), (), 0), *motion, (), (), ())
+        moved = MechanismState(CrankState((), (), (), 0), *motion, (), (), ())
         _velocity, _acceleration, *stages = self._stages
         for stage in stages:
             moved = stage(moved)
         reactions = [] if _OF_FORCES.isdisjoint(self._read_off) else [*chain(*moved.reactions)]
         return [*self._observed(0, moved)[1:], reactions]
 
-    def _moved(self, crank: CrankState, position: Position) -> Motion:
+    def _moved(self, crank: CrankState, position: Position) -> MechanismState:
         """Return what the mechanism does in a pose."""
-        motion = Motion(crank, position, None, None, (), (), ())
+        motion = MechanismState(crank, position, None, None, (), (), ())
         for stage in self._stages:
             motion = stage(motion)
         return motion
 
-    def _observed(self, now: int, motion: Motion) -> Reading:
+    def _observed(self, now: int, motion: MechanismState) -> SensorReading:
         """Return what an ideal sensor reads of a motion: what is named, and no more."""
         position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
         efforts: tuple[float, ...] = ()
         if 'effort' in self._read_off and motion.efforts:
             # Of the inputs, which are published first; 0 for the others.
             efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
-        return Reading(
+        return SensorReading(
             now,
             tuple(map(add, position.joints, motion.shift)) if motion.shift else position.joints,
             velocity.joints if velocity and 'velocity' in self._read_off else (),
@@ -382,9 +386,9 @@ class Line:
             efforts,
         )
 
-    def _read(self, now: int, ideal: Reading, first: int = 0) -> Reading | None:
+    def _read(self, now: int, ideal: SensorReading, first: int = 0) -> SensorReading | None:
         """Return what the sensors, from a number on, make of what an ideal one reads."""
-        reading: Reading | None = ideal
+        reading: SensorReading | None = ideal
         gap = False
         for sensor in self._sensors[first:]:
             if reading is not None:
@@ -394,9 +398,9 @@ class Line:
                 reading = sensor.silence(now, gap)
         return reading
 
-    def _read_gap(self, now: int) -> Reading | None:
+    def _read_gap(self, now: int) -> SensorReading | None:
         """Return what the sensors read where the linkage has no pose."""
-        reading: Reading | None = None
+        reading: SensorReading | None = None
         for sensor in self._sensors:
             if reading is not None:
                 reading = sensor.read(now, reading)
@@ -404,21 +408,21 @@ class Line:
                 reading = sensor.gap(now)
         return reading
 
-    def looked(self, seen: Look | Seen | Numbers) -> Look:
+    def looked(self, seen: LinkageTick | Seen | Numbers) -> LinkageTick:
         """Return all that a linkage came to: of a straight tick it is worked out here."""
-        if isinstance(seen, Look):
+        if isinstance(seen, LinkageTick):
             return seen
         crank_numbers, numbers, _ = seen
         crank = CrankState(*crank_numbers)
         position = self._close(*crank.angles)
-        reading = None if numbers is None else Reading(*numbers)
-        return Look(crank, position, self._moved(crank, position), reading)
+        reading = None if numbers is None else SensorReading(*numbers)
+        return LinkageTick(crank, position, self._moved(crank, position), reading)
 
-    def write_extras(self, now: int, seen: Look | Seen) -> list[bytes]:
+    def write_extras(self, now: int, seen: LinkageTick | Seen) -> list[bytes]:
         """Return the messages beside the joint states at a time, in [ns]; b'' for none."""
         return [self._written(extra, now, seen) for extra in self.extras]
 
-    def _written(self, extra: Extra, now: int, seen: Look | Seen) -> bytes:
+    def _written(self, extra: AuxiliaryOutput, now: int, seen: LinkageTick | Seen) -> bytes:
         writer = extra.writer
         if writer.due is not None and not writer.due(now):
             return b''
@@ -457,7 +461,7 @@ class Line:
         return rejection
 
 
-def _between_readings(member: Member, named: set[str], moves_by_rates: bool) -> set[str]:
+def _between_readings(member: SceneLinkage, named: set[str], moves_by_rates: bool) -> set[str]:
     """Return the effects that mix readings, where they do so without rates or not at all."""
     found = {'jitter', 'delay'} & named
     if moves_by_rates and 'delay' in found:
@@ -467,13 +471,13 @@ def _between_readings(member: Member, named: set[str], moves_by_rates: bool) -> 
     return set() if moves_by_rates else found
 
 
-def _extra(effect: Effect, writer: Any, member: str) -> Extra:
+def _extra(effect: Effect, writer: Any, member: str) -> AuxiliaryOutput:
     topic = f'~/{member}/{effect.topic[2:]}' if member else effect.topic
     written = WriterStage.of(writer, of_reading=effect.of_reading)
-    return Extra(effect.name, topic, effect.message, written)
+    return AuxiliaryOutput(effect.name, topic, effect.message, written)
 
 
-def _without_rates(_now: int, reading: Reading) -> Reading:
+def _without_rates(_now: int, reading: SensorReading) -> SensorReading:
     """Let rates end that have served between readings."""
     return reading._replace(rates=())
 
@@ -490,7 +494,7 @@ def _silent_beyond(close: Callable[..., Position], closure: Closure) -> Callable
     return within
 
 
-def _refuse_not_imported(member: Member) -> None:
+def _refuse_not_imported(member: SceneLinkage) -> None:
     if member.not_imported:
         from linkage_ros.effects.user_effects import (
             found_in,  # local import: only where a scene has one
@@ -505,7 +509,7 @@ def _refuse_not_imported(member: Member) -> None:
         )
 
 
-def _refuse_idle(member: Member, forced: bool) -> None:
+def _refuse_idle(member: SceneLinkage, forced: bool) -> None:
     """Refuse what acts on nothing."""
     # Of several linkages those without forces may share what others need.
     own = member.content
@@ -517,22 +521,22 @@ def _refuse_idle(member: Member, forced: bool) -> None:
             raise DefinitionError(
                 key,
                 'acts on nothing here: no effect and no drive asks for forces',
-                f'leave it out, drive by torque, or name one of {listed(LOADED)}',
+                f'leave it out, drive by torque, or name one of {listed(FORCE_EFFECTS)}',
             )
 
 
-def _refuse_solver(member: Member, forced: bool) -> None:
+def _refuse_solver(member: SceneLinkage, forced: bool) -> None:
     """Refuse what has no poses of dyads where forces start from these."""
     if forced and member.solver is not None and member.solver[0] != 'closed_form':
         raise DefinitionError(
             'solver',
             f'{member.solver[0]} finds no forces, and an effect or the drive asks for them',
-            f'write closed_form, or leave {listed(LOADED)} and torque out',
+            f'write closed_form, or leave {listed(FORCE_EFFECTS)} and torque out',
         )
 
 
 def _closure(
-    member: Member,
+    member: SceneLinkage,
     effects: Sequence[Effect],
     given: Mapping[str, Any],
     seed: str,
@@ -593,7 +597,7 @@ class Pipeline:
         self.injection = injection
         """The faults; nothing where the scene has none."""
         self.lines = [
-            Line(scene, member, closures[number] if closures else None, injection)
+            LinkagePipeline(scene, member, closures[number] if closures else None, injection)
             for number, member in enumerate(scene.members)
         ]
         self.extras = [extra for line in self.lines for extra in line.extras]
@@ -617,9 +621,9 @@ class Pipeline:
             or any(not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines)
         )
         """Whether there may be ticks without a message of which a replay has to know."""
-        self._routes = Routes({line: line.member.inputs for line in self.lines})
+        self._routes = SampleRouter({line: line.member.inputs for line in self.lines})
         self._offered = 0
-        self._newest: dict[Line, int] = {}
+        self._newest: dict[LinkagePipeline, int] = {}
         self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
         self.tick = self._ticking()
         """Ticks at a time, in [ns]."""
@@ -655,7 +659,7 @@ class Pipeline:
         self._newest.clear()
         return len(numbers)
 
-    def _made(self, now: int, seen: Sequence[Look | Seen]) -> Tick:
+    def _made(self, now: int, seen: Sequence[LinkageTick | Seen]) -> Tick:
         """Return what a tick comes to; joints are left out that have no reading."""
         extras: tuple[bytes, ...] = ()
         if self.extras:
@@ -710,7 +714,7 @@ class Pipeline:
     def remembers(self, tick: Tick) -> bool:
         """Return whether a tick without a message changes what comes after it."""
         return any(
-            not isinstance(seen, Look)
+            not isinstance(seen, LinkageTick)
             or line.gap_begins
             or (seen.position is not None and (bool(seen.position.joints) or self._goes_on))
             for line, seen in zip(self.lines, tick.seen, strict=True)
@@ -755,7 +759,7 @@ def _refuse_stamps(scene: Scene) -> None:
 
 
 def _joined(
-    readings: Sequence[Reading],
+    readings: Sequence[SensorReading],
 ) -> tuple[list[float], list[float], list[float]]:
     """
     Return positions, rates and efforts of all readings.
@@ -775,9 +779,9 @@ def _of_all(values: list[float], count: int) -> list[float]:
     return values if len(values) == count else []
 
 
-def _named(seen: Look | Numbers) -> Look | Seen:
+def _named(seen: LinkageTick | Numbers) -> LinkageTick | Seen:
     """Return what a linkage comes to with the names of its parts."""
-    if isinstance(seen, Look):
+    if isinstance(seen, LinkageTick):
         return seen
     crank, reading, reactions = seen
-    return Seen(CrankState(*crank), Reading(*reading), reactions)
+    return Seen(CrankState(*crank), SensorReading(*reading), reactions)

@@ -32,7 +32,7 @@ _LONGEST = 100_000
 Receiver = TypeVar('Receiver')
 
 
-class Routes(Generic[Receiver]):
+class SampleRouter(Generic[Receiver]):
     """
     Finds the receivers of messages; a message with the same names as one before is not parsed.
 

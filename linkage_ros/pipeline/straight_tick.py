@@ -33,7 +33,7 @@ from math import pi
 from typing import Any, NamedTuple, TYPE_CHECKING, TypeAlias
 
 from linkage_ros.drives.drive import CrankState
-from linkage_ros.effects.stage import Reading
+from linkage_ros.effects.stage import SensorReading
 from linkage_ros.generated_code import written
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Seen(NamedTuple):
     """
 
     crank: CrankState
-    reading: Reading | None
+    reading: SensorReading | None
     reactions: tuple[tuple[float, float, float], ...]
 
 
@@ -176,7 +176,9 @@ def straight(
 
 
 def straight_look(
-    usual: Straight, read: Callable[[int, Reading], Reading | None] | None, plain: Plain
+    usual: Straight,
+    read: Callable[[int, SensorReading], SensorReading | None] | None,
+    plain: Plain,
 ) -> Callable[[int], Any]:
     """
     Return what a linkage comes to, as a function of the time, in [ns].
@@ -279,7 +281,7 @@ def _function(
 ) -> Callable[..., Any]:
     # The constructor of a named tuple is a function of Python's; this is one of C's.
     new = tuple.__new__
-    types = {'new': new, 'CrankState': CrankState, 'Reading': Reading, 'Seen': Seen}
+    types = {'new': new, 'CrankState': CrankState, 'Reading': SensorReading, 'Seen': Seen}
     source = '\n    '.join([f'def tick({", ".join(parameters)}):', *usual.lines, *lines])
     function: Callable[..., Any] = written(source, 'tick', usual.bound | types | bound)
     return function

@@ -32,7 +32,7 @@ from dataclasses import replace
 from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.bag.reader import Bag, BagMessage
-from linkage_ros.bag.run_events import Event, Made, Reset, RunAccount, Taken, Turned
+from linkage_ros.bag.run_events import Event, FaultEvent, Reset, RunAccount, SampleEvent, TickEvent
 from linkage_ros.errors import BagError, did_you_mean, LinkageError, listed
 from linkage_ros.messages.joint_state import head_of, JointStateReader, Rejection
 from linkage_ros.messages.joint_values import JOINT_STATE
@@ -70,7 +70,7 @@ class Remade(NamedTuple):
     tick: Tick | None
 
 
-Done = Taken | Turned | Reset | Remade
+Done = SampleEvent | FaultEvent | Reset | Remade
 
 
 def check_drives(scene: Scene, where: str) -> None:
@@ -86,7 +86,7 @@ def check_drives(scene: Scene, where: str) -> None:
             )
 
 
-class WhatIf:
+class Counterfactual:
     """
     A scene over the samples of a bag.
 
@@ -147,7 +147,7 @@ class WhatIf:
     def _on_samples(self, events: Iterable[Event]) -> Iterator[Done]:
         made: Remade | None = None  # what the bag has of it may follow
         for event in events:
-            if isinstance(event, Made):
+            if isinstance(event, TickEvent):
                 if made is not None and made.time == event.time:
                     yield made._replace(recorded=event.messages)
                     made = None
@@ -157,7 +157,7 @@ class WhatIf:
             if made is not None:
                 yield made
                 made = None
-            if isinstance(event, Turned):
+            if isinstance(event, FaultEvent):
                 yield from self._follow(event)
             elif isinstance(event, Reset):
                 yield self._reset(event)
@@ -177,14 +177,14 @@ class WhatIf:
             if at < self._seen:
                 yield from self._catch_up(self._seen + 1)
                 self._due = None
-            if isinstance(event, Made):
+            if isinstance(event, TickEvent):
                 yield from self._known(at, event.time, event.messages)
                 taken = None
                 self._seen = at
                 continue
             yield from self._catch_up(at)
             self._seen = at
-            if isinstance(event, Turned):
+            if isinstance(event, FaultEvent):
                 yield from self._follow(event)
                 continue
             if isinstance(event, Reset):
@@ -201,7 +201,7 @@ class WhatIf:
 
     def _known(
         self, log_time: int, at: int, recorded: tuple[bytes, ...]
-    ) -> Iterator[Turned | Remade]:
+    ) -> Iterator[FaultEvent | Remade]:
         """Tick where the run has ticked, if it is time; times in [ns]."""
         yield from self._catch_up(at)
         due = self._due
@@ -213,7 +213,7 @@ class WhatIf:
         yield from self._tick_unless_back(self._clock(log_time), self._clock(at), recorded)
         self._due = (at if due is None or self._same_rate else due) + self._period
 
-    def _catch_up(self, to: int) -> Iterator[Turned | Remade]:
+    def _catch_up(self, to: int) -> Iterator[FaultEvent | Remade]:
         """Make the ticks that were due before a time, in [ns]."""
         while (due := self._due) is not None and due + self._slack < to:
             age = self._clock(due) - self._pipeline.newest_stamp
@@ -245,7 +245,7 @@ class WhatIf:
             self._last = now
         return Remade(now, at, recorded, tick)
 
-    def _offer(self, event: Taken) -> Generator[Taken | Turned, None, bool]:
+    def _offer(self, event: SampleEvent) -> Generator[SampleEvent | FaultEvent, None, bool]:
         """Offer a sample; return whether it was good."""
         yield from self._change(event.log_time)
         now = self._clock(event.log_time)
@@ -260,7 +260,7 @@ class WhatIf:
         self._pipeline = Pipeline(self._scene, self._closures, self._injection)
         return Reset(now, now, event.data)
 
-    def _follow(self, event: Turned) -> Iterator[Turned]:
+    def _follow(self, event: FaultEvent) -> Iterator[FaultEvent]:
         """Let a fault begin or end as it did in the run."""
         try:
             name, on = read_change(event.data)
@@ -273,9 +273,9 @@ class WhatIf:
             self._injection.turn(name, on)
         now = self._clock(event.log_time)
         self._write_at(now)
-        yield Turned(now, now, event.data)
+        yield FaultEvent(now, now, event.data)
 
-    def _change(self, now: int) -> Iterator[Turned]:
+    def _change(self, now: int) -> Iterator[FaultEvent]:
         """Let faults begin and end that are this scene's own, at a time in [ns]."""
         if self._injection is None:
             return
@@ -283,7 +283,7 @@ class WhatIf:
             shifted = self._clock(now)
             self._write_at(shifted)
             text = change_text(change, self._scene.faults[change.name].kind)
-            yield Turned(shifted, shifted, text_message(text))
+            yield FaultEvent(shifted, shifted, text_message(text))
 
     def _clock(self, time: int) -> int:
         return time if self._injection is None else self._injection.clock(time)

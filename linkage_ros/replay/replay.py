@@ -33,11 +33,11 @@ from typing import NamedTuple, TYPE_CHECKING
 from linkage_ros import __version__
 from linkage_ros.bag.reader import Bag, BagMessage, RUN_FILE
 from linkage_ros.bag.run_events import (
-    Made,
     recorded_events,
     Reset,
     run_account,
-    Taken,
+    SampleEvent,
+    TickEvent,
     VERSIONS,
 )
 from linkage_ros.errors import BagError, listed
@@ -147,7 +147,7 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
         last = event.log_time
         if isinstance(event, Reset):
             pipeline = Pipeline(scene, closures, injection)
-        elif isinstance(event, Made):
+        elif isinstance(event, TickEvent):
             if event.time >= TIME_END:
                 raise BagError(
                     bag.path,
@@ -157,7 +157,7 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
             joint_states, *extras = event.messages
             tick = pipeline.tick(event.time)
             yield ReplayedTick(event.time, joint_states, tuple(extras), tick)
-        elif isinstance(event, Taken):
+        elif isinstance(event, SampleEvent):
             pipeline.offer(event.data, event.log_time)
         elif injection is not None:
             turn(bag, injection, event.data)

@@ -46,7 +46,7 @@ trace.
 """
 
 
-class Proof(NamedTuple):
+class ReplayVerification(NamedTuple):
     """
     What came of running a bag's scene once more.
 
@@ -87,12 +87,12 @@ class Proof(NamedTuple):
         return IDENTICAL
 
 
-def prove(
+def verify_replay(
     bag: Bag,
     scene: Scene,
     messages: Iterable[BagMessage],
     look: Callable[[ReplayedTick], None] = lambda _: None,
-) -> Proof:
+) -> ReplayVerification:
     """
     Run a bag's scene once more and compare; memory does not grow with the bag.
 
@@ -133,10 +133,10 @@ def prove(
         comparison.add(at, recorded, now)
     comparison.settle()
     lost = _lost(scene) if beginning else ()
-    return Proof(comparison, untold, probe.first if untold else None, beginning, lost)
+    return ReplayVerification(comparison, untold, probe.first if untold else None, beginning, lost)
 
 
-def beginning_text(proof: Proof) -> str:
+def beginning_text(proof: ReplayVerification) -> str:
     """Return in words what could not be told of a bag without the beginning of its run."""
     text = f'{proof.beginning}: what the node remembered then is not in it, so {proof.untold} '
     text += f'of {proof.ticks} ticks, at the start, could not be told'

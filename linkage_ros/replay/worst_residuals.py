@@ -24,11 +24,11 @@ from typing import NamedTuple
 from linkage_ros.bag.reader import Bag
 from linkage_ros.errors import BagError
 from linkage_ros.kinematics.closure import Closure, Position
-from linkage_ros.kinematics.singularity_margin import Nearness
+from linkage_ros.kinematics.singularity_margin import SingularityMargin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import replay
-from linkage_ros.scene.scene import Member, Scene
+from linkage_ros.scene.scene import Scene, SceneLinkage
 
 _TOLD_EVERY = 1024
 
@@ -50,7 +50,7 @@ class Place(NamedTuple):
     inputs: tuple[float, ...]
 
 
-class WorstStates(NamedTuple):
+class WorstResiduals(NamedTuple):
     """
     The worst states of a linkage over a run.
 
@@ -69,13 +69,13 @@ class WorstStates(NamedTuple):
 
     """
 
-    member: Member
+    member: SceneLinkage
     closure: Closure
     states: int
     toggles: int
     limited: int
     residual: tuple[float, Place] | None
-    nearest: tuple[Nearness, Place] | None
+    nearest: tuple[SingularityMargin, Place] | None
 
 
 class Examined(NamedTuple):
@@ -97,7 +97,7 @@ class Examined(NamedTuple):
 
     """
 
-    linkages: tuple[WorstStates, ...]
+    linkages: tuple[WorstResiduals, ...]
     joint_states: int
     same: int
     damage: str
@@ -163,12 +163,12 @@ class _Watch:
         'of',
     )
 
-    def __init__(self, member: Member, closure: Closure) -> None:
+    def __init__(self, member: SceneLinkage, closure: Closure) -> None:
         self.of, self.closure = member, closure
         self._states = self._toggles = self._limited = 0
         self._worst, self._least = -1.0, inf
         self._place: Place | None = None
-        self._nearest: tuple[Nearness, Place] | None = None
+        self._nearest: tuple[SingularityMargin, Place] | None = None
 
     def look(self, time: int, inputs: Sequence[float], position: Position) -> None:
         self._states += 1
@@ -177,14 +177,14 @@ class _Watch:
         residual = self.closure.residual(position)
         if residual > self._worst:
             self._worst, self._place = residual, Place(time, tuple(inputs))
-        nearness = self.closure.nearness(position)
+        nearness = self.closure.singularity_margin(position)
         if nearness.conditioning < self._least:
             self._least = nearness.conditioning
             self._nearest = nearness, Place(time, tuple(inputs))
 
-    def found(self) -> WorstStates:
+    def found(self) -> WorstResiduals:
         residual = (self._worst, self._place) if self._place else None
-        return WorstStates(
+        return WorstResiduals(
             self.of,
             self.closure,
             self._states,

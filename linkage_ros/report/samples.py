@@ -34,7 +34,7 @@ from linkage_ros.report.blocks import Rows
 from linkage_ros.report.decimation import Flags, Numbers, Times
 from linkage_ros.report.labels import short
 from linkage_ros.report.run import Lane
-from linkage_ros.scene.scene import Member, Scene
+from linkage_ros.scene.scene import Scene, SceneLinkage
 import numpy as np
 
 
@@ -51,7 +51,7 @@ class Crank:
 
     """
 
-    def __init__(self, member: Member, columns: Sequence[int]) -> None:
+    def __init__(self, member: SceneLinkage, columns: Sequence[int]) -> None:
         self._columns = list(columns)
         self._carried = bool(getattr(member.drive[1], 'carry_forward', False))
         width = len(columns)

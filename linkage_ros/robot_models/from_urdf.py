@@ -37,10 +37,10 @@ from linkage_ros.kinematics.linkage import (
     Side,
 )
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
-from linkage_ros.kinematics.topology import Dyad, find_groups, Iterated
+from linkage_ros.kinematics.topology import assur_groups, Dyad, Iterated
 from linkage_ros.robot_models.planar import find_closings, find_loops, lay_flat, Planar
 from linkage_ros.robot_models.urdf_file import MOVING, UrdfFile
-from linkage_ros.robot_models.urdf_topology import Skeleton, skeleton
+from linkage_ros.robot_models.urdf_topology import urdf_topology, UrdfTopology
 
 # On which sides the dyads of a linkage close, from a pose of its links.
 #
@@ -86,7 +86,7 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
         Where it is no linkage; where no sides lead to the pose, or several do.
 
     """
-    groups = find_groups(linkage).groups
+    groups = assur_groups(linkage).groups
     if any(isinstance(group, Iterated) for group in groups):
         linkage = replace(linkage, pose=Pose(inputs, _points(linkage, poses)))
     keys = [_key(each) for each in groups if isinstance(each, Dyad) and each.kind in _SIDED]
@@ -146,7 +146,7 @@ _MET = 1e-3
 """How far pins may be apart in a pose and meet in it, of the size."""
 
 
-class Imported(NamedTuple):
+class ImportedLinkage(NamedTuple):
     """
     A linkage, and what of the URDF is not in it, in words.
 
@@ -157,14 +157,14 @@ class Imported(NamedTuple):
     left_out: tuple[str, ...]
 
 
-def imported(
+def from_urdf(
     urdf: UrdfFile,
     close: Sequence[tuple[str, str]] = (),
     inputs: Sequence[str] = (),
     at: Mapping[str, float] | None = None,
     *,
     limits: bool = True,
-) -> Imported:
+) -> ImportedLinkage:
     """
     Make a linkage of a URDF.
 
@@ -224,12 +224,12 @@ class _Import:
         self._planar: Planar = lay_flat(urdf, self._loops)
         self._pose = dict.fromkeys(moving, 0.0) | dict(urdf.start) | dict(at)
         self._told = {*urdf.start, *at}
-        self._skeleton: Skeleton = skeleton(urdf, self._planar, self._closings, alone)
+        self._skeleton: UrdfTopology = urdf_topology(urdf, self._planar, self._closings, alone)
 
     def _error(self, where: str, reason: str, remedy: str) -> FileError:
         return FileError(self._urdf.file, where, reason, remedy)
 
-    def made(self) -> Imported:
+    def made(self) -> ImportedLinkage:
         made = self._skeleton
         links = {
             link: {name: (at.real, at.imag) for name, at in points.items()}
@@ -263,7 +263,7 @@ class _Import:
             linkage = assembled(linkage, given, poses, self._where())
         except DefinitionError as error:
             raise self._error(error.where, error.reason, error.remedy) from None
-        return Imported(linkage, self._loops.left_out)
+        return ImportedLinkage(linkage, self._loops.left_out)
 
     def _input(self, name: str) -> Input:
         joint = self._skeleton.joints.get(name)

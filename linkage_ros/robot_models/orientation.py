@@ -32,7 +32,7 @@ from typing import NamedTuple, TYPE_CHECKING
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.ranges import InputRange, reach
-from linkage_ros.kinematics.sweep_analysis import samples, usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array
@@ -175,7 +175,7 @@ def spans(closure: Closure) -> dict[str, Span]:
             for name, joint in joints.items()
         }
     (start,) = usual_inputs(closure)
-    interval = Way(closure).range_about(start)
+    interval = InputSweep(closure).range_about(start)
     assert interval is not None, 'what is usual lies in a range'
     found = dict(zip(closure.linkage.joints, _published(closure, start, interval), strict=True))
     (given,) = closure.linkage.inputs

@@ -44,7 +44,7 @@ from linkage_ros.robot_models.xml import comment, document, number, numbers, rou
 # x axis along the line.
 
 
-class Cut(NamedTuple):
+class LoopJoint(NamedTuple):
     """
     A pin or slider that the tree leaves open.
 
@@ -65,7 +65,7 @@ class Cut(NamedTuple):
     frames: tuple[str, ...]
 
 
-def add_frames(tree: Tree, names: PrefixedNames) -> list[Cut]:
+def add_frames(tree: Tree, names: PrefixedNames) -> list[LoopJoint]:
     """Add to a tree the frames of all cuts, of joints that no link needs, and of traced points."""
     adding = _Adding(tree, names)
     cuts = [*adding.pins(), *adding.sliders()]
@@ -81,7 +81,7 @@ class _Adding:
         self._joints = named_joints(tree.linkage)
         self._spare = list(tree.spare)
 
-    def pins(self) -> list[Cut]:
+    def pins(self) -> list[LoopJoint]:
         cuts = []
         for point, carriers in _carriers(self._tree.linkage).items():
             apart = {link: link for link in carriers}
@@ -93,10 +93,10 @@ class _Adding:
             ends = list({of: link for link, of in reversed(apart.items())}.values())[::-1]
             if len(ends) > 1:
                 frames = tuple(self._fixed(point, link, point) for link in ends)
-                cuts.append(Cut('pin', point, frames))
+                cuts.append(LoopJoint('pin', point, frames))
         return cuts
 
-    def sliders(self) -> list[Cut]:
+    def sliders(self) -> list[LoopJoint]:
         linkage, cuts = self._tree.linkage, []
         carriers = _carriers(linkage)
         for name, slider in linkage.sliders.items():
@@ -112,7 +112,7 @@ class _Adding:
                 turn = phase(complex(*slider.direction))
                 line = self._fixed(f'{shown}_line', slider.along, slider.through, turn)
             frames = (line, self._fixed(shown, end, slider.point))
-            cuts.append(Cut('slide' if slides else 'line', name, frames))
+            cuts.append(LoopJoint('slide' if slides else 'line', name, frames))
         return cuts
 
     def spare(self) -> None:
@@ -183,7 +183,7 @@ class _Model(NamedTuple):
     part: Part
     names: PrefixedNames
     tree: Tree
-    cuts: Sequence[Cut]
+    cuts: Sequence[LoopJoint]
     spans: Mapping[str, Span]
     bodies: Mapping[str, Body]
 

@@ -206,7 +206,7 @@ class _Rail(NamedTuple):
 
 
 @dataclass(slots=True)
-class Skeleton:
+class UrdfTopology:
     """
     What a URDF comes to.
 
@@ -230,12 +230,12 @@ class Skeleton:
     traced: tuple[str, ...] = ()
 
 
-def skeleton(
+def urdf_topology(
     urdf: UrdfFile,
     planar: Planar,
     closings: Sequence[Closing],
     alone: dict[str, str],
-) -> Skeleton:
+) -> UrdfTopology:
     """
     Put the loops of a URDF together.
 
@@ -281,7 +281,7 @@ class _Building:
         self._rails: dict[str, _Rail] = {}
         self._joints: dict[str, tuple[str, str] | str] = {}
 
-    def built(self) -> Skeleton:
+    def built(self) -> UrdfTopology:
         kept = [self._planar.root]
         kept += [each.child for each in self._chains if each.child not in self._tips]
         for chain in self._chains:
@@ -289,7 +289,7 @@ class _Building:
                 self._hold(chain, kept)
         for closing in self._closings:
             self._close(closing)
-        made = Skeleton(bodies=dict(self._link_names(kept)))
+        made = UrdfTopology(bodies=dict(self._link_names(kept)))
         names = {body: link for link, body in made.bodies.items()}
         for mark, body, place in self._planar.marks:
             number = self._points.there(body, place)

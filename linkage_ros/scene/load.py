@@ -41,10 +41,10 @@ from linkage_ros.resources import named_file
 from linkage_ros.scene.scene import (
     AS_THE_RUN_GOES,
     LEASTS,
-    Member,
     parts_of,
     RecordParameters,
     Scene,
+    SceneLinkage,
     SPLITS,
     StorageParameters,
 )
@@ -185,7 +185,7 @@ def parse_scene(
         The seed where the scene names none; None for one that follows from its name.
     trust_effects
         Whether the effects of one's own that the scene names are imported, which runs them. Where
-        they are not, `Member.not_imported` names them.
+        they are not, `SceneLinkage.not_imported` names them.
 
     Raises
     ------
@@ -211,7 +211,7 @@ def parse_scene(
     return replace(scene, members=tuple(_as_chosen(one, solvers) for one in scene.members))
 
 
-def _as_chosen(member: Member, solvers: Mapping[str, Any]) -> Member:
+def _as_chosen(member: SceneLinkage, solvers: Mapping[str, Any]) -> SceneLinkage:
     """Return a linkage with the solver that was chosen for it, where one was."""
     if member.accuracy is None or member.name not in solvers:
         return member
@@ -236,7 +236,7 @@ def _scene(
     closed: Closure | None = None,
 ) -> Scene:
     files = {SCENE_FILE: scene_bytes}
-    members: list[Member] = []
+    members: list[SceneLinkage] = []
     if 'linkages' in content:
         if 'linkage' in content:
             raise content.error('linkage', 'stands beside linkages', 'write one of the two')
@@ -308,7 +308,7 @@ def _member(
     folder: str,
     trust_effects: bool,
     closure: Closure | None = None,
-) -> Member:
+) -> SceneLinkage:
     def where(key: str) -> Section:
         return own if key in own else scene
 
@@ -343,7 +343,7 @@ def _member(
     for effect in not_imported:
         effects.section(effect)
     types = _effects(effects, not_imported)
-    member = Member(
+    member = SceneLinkage(
         name=name,
         linkage=linkage,
         closure=closure,
@@ -421,7 +421,7 @@ def _record(content: Section) -> RecordParameters:
 
 def read_solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
     """
-    Return what closes the loops, or how well that is to be done, as a `Member` holds it.
+    Return what closes the loops, or how well that is to be done, as a `SceneLinkage` holds it.
 
     Raises
     ------
@@ -524,7 +524,7 @@ def _end(content: Section, key: str) -> tuple[str, str]:
     return link, point
 
 
-def read_faults(content: Section, members: Sequence[Member]) -> dict[str, Fault]:
+def read_faults(content: Section, members: Sequence[SceneLinkage]) -> dict[str, Fault]:
     """
     Return the faults that a scene names, by their names.
 

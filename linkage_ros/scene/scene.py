@@ -129,7 +129,7 @@ class RecordParameters:
 
 
 @dataclass(frozen=True, slots=True)
-class Member:
+class SceneLinkage:
     """
     A linkage of a scene, with its drive and its effects.
 
@@ -221,7 +221,7 @@ class Scene:
     """
 
     name: str
-    members: tuple[Member, ...]
+    members: tuple[SceneLinkage, ...]
     rate: float
     wrapped: bool
     seed: int

@@ -39,7 +39,7 @@ from typing import Any
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.kinematics.topology import Dyad, Iterated
 from linkage_ros.solvers.newton import LEAST_SINE, NewtonClosure
 from linkage_ros.solvers.solver import Choice, Solver
@@ -162,7 +162,7 @@ def _states(closed: Closure) -> list[tuple[float, ...]]:
     if len(closed.linkage.inputs) > 1:
         usual = usual_inputs(closed)
         return [tuple(x + 1e-3 * k for x in usual) for k in range(_STATES)]
-    interval = Way(closed).widest_range
+    interval = InputSweep(closed).widest_range
     assert interval is not None, 'reading the file has proved that it closes somewhere'
     low, high = interval.lowest, interval.highest
     return [(low + (high - low) * (k + 0.5) / _STATES,) for k in range(_STATES)]

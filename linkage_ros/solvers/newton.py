@@ -48,7 +48,7 @@ from linkage_ros.files.parameters import number
 from linkage_ros.kinematics.arithmetic import cross
 from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
 from linkage_ros.kinematics.linkage import Linkage
-from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, Turned
+from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, RelativeAngle
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import PLACED, State, Step
@@ -584,7 +584,7 @@ class NewtonClosure(Solver):
                 # Where nothing is iterated, no loop asks for a pin.
                 if iterates:
                     plan.append(step)
-            elif isinstance(step, Turned):
+            elif isinstance(step, RelativeAngle):
                 plan.append(step)
             elif isinstance(groups[group], Dyad):
                 plan.append(NewtonDyad(next(loops), tolerance, tolerance / self.scale))

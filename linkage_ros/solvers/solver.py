@@ -34,7 +34,7 @@ from linkage_ros.kinematics.closure import (
     Velocity,
 )
 from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.kinematics.singularity_margin import Nearness, SingularInput
+from linkage_ros.kinematics.singularity_margin import SingularInput, SingularityMargin
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
@@ -169,9 +169,9 @@ class Solver(Closure):
         """Where the single input closes every loop, whatever its limits; of several, none."""
         return self.closed.closing_ranges
 
-    def nearness(self, position: Position) -> Nearness:
+    def singularity_margin(self, position: Position) -> SingularityMargin:
         """Return how near trouble a closed position is."""
-        return self.closed.nearness(self.exact(position))
+        return self.closed.singularity_margin(self.exact(position))
 
 
 def _rows(values: Any, driven: int, count: int) -> list[list[float]]:

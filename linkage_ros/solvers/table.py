@@ -46,7 +46,7 @@ from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velo
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
-from linkage_ros.kinematics.sweep_analysis import Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.solvers.solver import Solver
 import numpy as np
 
@@ -335,7 +335,7 @@ class TableClosure(Solver):
                     'solver.table.span', f'{low:g} to {high:g} is empty', 'write [low, high]'
                 )
             return 0.0, [(low, high)]
-        ranges = Way(self.closed).ranges
+        ranges = InputSweep(self.closed).ranges
         whole = [one for one in ranges if one.whole]
         period = whole[0].highest - whole[0].lowest if whole else 0.0
         return period, [(one.lowest, one.highest) for one in ranges]

@@ -41,7 +41,7 @@ from linkage_ros.accuracy.reference import Reference, Truth
 from linkage_ros.accuracy.solving import PEERS
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint
-from linkage_ros.kinematics.sweep_analysis import Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.solvers.table import Order
 import numpy as np
 import pytest
@@ -273,7 +273,7 @@ def slope(errors: Sequence[float], factor: float) -> float:
 def test_tables_have_their_orders(name: str, kind: Order, orders: tuple[int | None, ...]) -> None:
     linkage = dyads_of(name)
     cells = (135, 405, 1215)
-    interval = Way(Closure(linkage)).widest_range
+    interval = InputSweep(Closure(linkage)).widest_range
     assert interval is not None
     # A quarter into a cell is three quarters into one of a third, and a quarter again: where the
     # errors of all derivatives are of the same part of their bounds.

@@ -54,7 +54,7 @@ def test_easy_poses_are_many_different_closed_and_away_from_trouble(name: str) -
     poses = easy(closure, 24)
     assert len(poses) == len(set(poses)) == 24
     for inputs in poses:
-        near = closure.nearness(closure.position(*inputs))
+        near = closure.singularity_margin(closure.position(*inputs))
         assert near.conditioning > 0.02
         # Of an input that slides the distance is in metres.
         assert near.toggle_distance > (0.005 if closure.linkage.inputs[0].slider else 0.05)

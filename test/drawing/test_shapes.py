@@ -31,7 +31,7 @@ from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 import pytest
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
@@ -45,7 +45,7 @@ places = st.builds(complex, coordinates, coordinates)
 def drawn(name: str) -> tuple[Closure, dict[tuple[str, str], complex], list[object]]:
     closure = Closure(read_linkage(read_yaml(LINKAGES / f'{name}.yaml')[0]))
     inputs = usual_inputs(closure)
-    way = Way(closure, inputs)
+    way = InputSweep(closure, inputs)
     position = closure.position(*inputs)
     interval = way.range_about(inputs[0])
     assert interval is not None
@@ -182,7 +182,7 @@ def test_a_turn_crosses_the_edge_where_the_line_does() -> None:
 
 def test_traced_points_of_a_peaucellier_cell_run_straight() -> None:
     closure = Closure(read_linkage(read_yaml(LINKAGES / 'peaucellier.yaml')[0]))
-    way = Way(closure)
+    way = InputSweep(closure)
     path = sweep(way, way.ranges[0]).paths['P']
     assert len(path) > 700
     assert all(abs(place.real - 0.13125) < 1e-14 for place in path)

@@ -161,7 +161,7 @@ def test_the_ground_bears_what_the_linkage_does(name):
     reactions = Reactions(Mechanics(closure, loads))
     gravity = complex(*loads.gravity)
     centers = [(link, complex(*mass.center)) for link, mass in linkage.masses.items()]
-    follower = closure.follower(centers)
+    follower = closure.point_tracker(centers)
 
     for q in STATES[name]:
         rates, pulls = [1.3, -0.8][: len(q)], [-2.0, 3.5][: len(q)]

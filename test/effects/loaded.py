@@ -22,7 +22,7 @@ from importlib import import_module
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.dynamics.loads import Loads
 from linkage_ros.effects import velocity
-from linkage_ros.effects.stage import EFFECTS, Motion
+from linkage_ros.effects.stage import EFFECTS, MechanismState
 from linkage_ros.kinematics.closure import Closure
 
 GRAVITY = 9.81
@@ -53,7 +53,7 @@ def moved(within, crank, effects):
     """
     state = CrankState(*((value,) for value in crank), 0)
     motion = velocity.stage(velocity.PARAMETERS(), within)(
-        Motion(state, within.closure.position(crank[0]), None, None, (), (), ())
+        MechanismState(state, within.closure.position(crank[0]), None, None, (), (), ())
     )
     for effect in EFFECTS:
         if effect == 'acceleration' or effect in effects:

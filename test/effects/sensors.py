@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from linkage_ros.drives.drive import Context
-from linkage_ros.effects.stage import Reading
+from linkage_ros.effects.stage import SensorReading
 from linkage_ros.messages.joint_state import JointStateWriter
 from mpmath import gammainc
 
@@ -41,7 +41,7 @@ def context(loop=ANGLES, seed='seed'):
 
 
 def reading(now, *joints, rates=(), accelerations=(), efforts=()):
-    return Reading(now, joints, rates, accelerations, efforts)
+    return SensorReading(now, joints, rates, accelerations, efforts)
 
 
 def published(effects, ticks=100, seed=0, rate=10.0):

@@ -24,7 +24,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import acceleration, velocity
-from linkage_ros.effects.stage import Motion, Reading
+from linkage_ros.effects.stage import MechanismState, SensorReading
 from linkage_ros.kinematics.status import Status
 import pytest
 
@@ -43,7 +43,7 @@ def moved(loop, angle, rate, alpha=0.0):
     crank = CrankState((angle,), (rate,), (alpha,), 0)
     context = Context(loop, 1000.0, True, 'seed', None, None)
     motion = velocity.stage(velocity.PARAMETERS(), context)(
-        Motion(crank, position, None, None, (), (), ())
+        MechanismState(crank, position, None, None, (), (), ())
     )
     return acceleration.stage(acceleration.PARAMETERS(), context)(motion)
 
@@ -99,7 +99,7 @@ def test_what_is_no_number_is_left_out(value):
 
     context = Context(Overflowing(), 1000.0, True, 'seed', None, None)
     stage = acceleration.stage(acceleration.AccelerationParameters(), context)
-    motion = Motion(CRANK, POSITION, VELOCITY, None, (), (), ())
+    motion = MechanismState(CRANK, POSITION, VELOCITY, None, (), (), ())
     assert stage(motion) == motion
 
 
@@ -112,7 +112,7 @@ def test_the_message_is_the_motion_at_one_point():
     motion = moved(FOUR_BAR, 1.0, 2.0)
     rates, accelerations = motion.velocity.joints, motion.acceleration.joints
     # Turns added, and whatever else sensors do: what is written is what is read.
-    reading = Reading(3_000_000_004, (7.0, 8.0), rates, accelerations, ())
+    reading = SensorReading(3_000_000_004, (7.0, 8.0), rates, accelerations, ())
     context = Context(FOUR_BAR, 1000.0, True, 'seed', None, None, prefix='left_')
     data = acceleration.writer(acceleration.PARAMETERS(), context)(9, motion, reading)
     message = STORE.deserialize_cdr(data, 'trajectory_msgs/msg/JointTrajectory')

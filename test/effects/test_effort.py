@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from linkage_ros.drives.drive import CrankState
 from linkage_ros.dynamics.loads import Friction, JointFriction
 from linkage_ros.effects import effort
-from linkage_ros.effects.stage import Motion
+from linkage_ros.effects.stage import MechanismState
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.status import Status
 import numpy as np
@@ -144,7 +144,9 @@ def test_the_rest_of_the_motion_is_passed_on():
     velocity = within.closure.velocity(position, 2.0)
     acceleration = within.closure.acceleration(position, velocity, 3.0)
     crank = CrankState((1.0,), (2.0,), (3.0,), 0)
-    motion = Motion(crank, position, velocity, acceleration, (), ('reactions',), (0.5, 0.5))
+    motion = MechanismState(
+        crank, position, velocity, acceleration, (), ('reactions',), (0.5, 0.5)
+    )
     found = effort.stage(effort.EffortParameters(), within)(motion)
     assert found == motion._replace(efforts=found.efforts)
     assert len(found.efforts) == 1

@@ -27,7 +27,7 @@ from hypothesis import strategies as st
 from linkage_ros.drawing.painting import outline
 from linkage_ros.drawing.shapes import carried_shapes, Polygon
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.sweep_analysis import usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
@@ -98,7 +98,7 @@ def colour(marker):
 def some_inputs(closure):
     """Return inputs all over the range of the first one."""
     start = usual_inputs(closure)
-    way = Way(closure, start)
+    way = InputSweep(closure, start)
     span = way.range_about(start[0])
     steps = (0.03, 0.2, 0.45, 0.7, 0.97)
     found = [way.inputs(span.lowest + (span.highest - span.lowest) * part) for part in steps]

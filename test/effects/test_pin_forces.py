@@ -22,7 +22,7 @@ from cmath import rect
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.effects import pin_forces
-from linkage_ros.effects.stage import Motion, Reading
+from linkage_ros.effects.stage import MechanismState, SensorReading
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
@@ -78,7 +78,7 @@ def test_at_a_toggle_there_are_none_and_no_message():
     motion = moved(within, (0.0, 1.0, 0.0), {'pin_forces': ()})
     assert motion.position.status is Status.TOGGLE
     assert motion.reactions == ()
-    reading = Reading(7, motion.position.joints, (), (), ())
+    reading = SensorReading(7, motion.position.joints, (), (), ())
     assert pin_forces.writer(pin_forces.PARAMETERS(), within)(9, motion, reading) == b''
 
 
@@ -93,7 +93,7 @@ def test_the_rest_of_the_motion_is_passed_on():
     before = moved(within, (1.0, 2.0, 3.0), {'effort': ()})._replace(shift=(0.5, 0.5))
     found = pin_forces.stage(pin_forces.PARAMETERS(), within)(before)
     assert found == before._replace(reactions=found.reactions)
-    assert isinstance(found, Motion)
+    assert isinstance(found, MechanismState)
     assert len(found.reactions) == 4
 
 

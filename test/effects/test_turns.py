@@ -23,7 +23,7 @@ from math import nextafter, pi, tau
 from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.effects.angle_unwrap import all_wrapped, Continuous, wrapped
-from linkage_ros.effects.stage import Reading
+from linkage_ros.effects.stage import SensorReading
 import pytest
 
 EXACT_TAU = Fraction('6.28318530717958647692528676655900576839433879875021')
@@ -32,7 +32,7 @@ steps = st.floats(-3.0, 3.0)
 
 
 def reading(*joints):
-    return Reading(7, joints, (), (), ())
+    return SensorReading(7, joints, (), (), ())
 
 
 @given(st.lists(steps, min_size=1, max_size=60), st.floats(-pi, pi))
@@ -111,4 +111,4 @@ def test_many_turns_add_up_without_drift():
 def test_the_rest_of_the_motion_is_passed_on():
     rest = (1.0, 2.0), (3.0, 4.0), (5.0, 0.0)
     for stage in (Continuous([True, False]), all_wrapped([True, False])):
-        assert stage(9, Reading(7, (0.5, 0.5), *rest)) == (7, (0.5, 0.5), *rest)
+        assert stage(9, SensorReading(7, (0.5, 0.5), *rest)) == (7, (0.5, 0.5), *rest)

@@ -23,7 +23,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from linkage_ros.drives.drive import Context, CrankState
 from linkage_ros.effects import velocity
-from linkage_ros.effects.stage import Motion
+from linkage_ros.effects.stage import MechanismState
 from linkage_ros.kinematics.status import Status
 import pytest
 
@@ -41,7 +41,7 @@ def moved(loop, angle, rate):
     crank = CrankState((angle,), (rate,), (0.0,), 0)
     context = Context(loop, 1000.0, True, 'seed', None, None)
     stage = velocity.stage(velocity.VelocityParameters(), context)
-    return stage(Motion(crank, position, None, None, (), (), ()))
+    return stage(MechanismState(crank, position, None, None, (), (), ()))
 
 
 @given(st.floats(-10.0, 10.0), st.floats(-100.0, 100.0))

@@ -26,7 +26,7 @@ from linkage_ros.kinematics.assembly_modes import other_assemblies
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, Pose
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.solvers.table import TableClosure
 from mpmath import mp
 import numpy as np
@@ -227,7 +227,7 @@ def test_what_once_leapt_stays_on_its_branch(name: str) -> None:
     for end, walked in ((interval.lowest, down), (interval.highest, up)):
         toggle, condition = exact_toggle(made, walked.states[-1].tolist())
         assert abs(end - toggle) < 64.0 * 2.0**-53 * condition
-    assert Way(closure).ranges == (interval,)
+    assert InputSweep(closure).ranges == (interval,)
 
 
 def test_one_direction_of_the_crank_has_a_pose_for_each_of_its_turns() -> None:
@@ -239,7 +239,7 @@ def test_one_direction_of_the_crank_has_a_pose_for_each_of_its_turns() -> None:
     here, there = closure.position(5.27), closure.position(5.27 - tau)
     assert here.status is there.status is Status.CLOSED
     assert abs(here.joints[1] - there.joints[1]) > 1.0
-    assert closure.nearness(there).toggle_distance == pytest.approx(
+    assert closure.singularity_margin(there).toggle_distance == pytest.approx(
         5.27 - tau - interval.lowest, abs=1e-12
     )
 
@@ -252,14 +252,14 @@ def test_beyond_the_end_of_more_than_a_turn_it_is_open() -> None:
     position = closure.position(6.75324)
     assert position.status is Status.OPEN
     assert position.gap > 0.0
-    assert Way(closure).range_about(6.75324) is None
+    assert InputSweep(closure).range_about(6.75324) is None
 
 
 def test_of_less_than_a_turn_whole_turns_of_the_input_change_nothing() -> None:
     closure = Closure(class_3_linkage())
-    (interval,) = Way(closure).ranges
+    (interval,) = InputSweep(closure).ranges
     assert interval.highest - interval.lowest < tau
-    found = Way(closure).range_about(1.0 - 3.0 * tau)
+    found = InputSweep(closure).range_about(1.0 - 3.0 * tau)
     assert found is not None
     assert found.lowest == pytest.approx(interval.lowest - 3.0 * tau)
     assert closure.position(1.0 - 3.0 * tau).status is Status.CLOSED

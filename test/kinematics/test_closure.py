@@ -26,10 +26,10 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import (
+    InputSweep,
     pose_alone,
     transmission_angles,
     usual_inputs,
-    Way,
 )
 import pytest
 
@@ -274,7 +274,7 @@ def test_what_a_loop_takes_hardly_grows_with_the_number_of_loops(monkeypatch) ->
         with monkeypatch.context() as patch:
             for kind in kinds:
                 patch.setattr(kind, 'close', counted(kind.close, closings))
-            transmission_angles(Way(side_by_side(count)))
+            transmission_angles(InputSweep(side_by_side(count)))
         taken.append(closings[0] / count)
     # Their ranges are searched for together; without that the ratio is 10.
     assert taken[1] < 3.0 * taken[0]
@@ -331,7 +331,7 @@ def case(request):
 def test_they_lie_where_their_links_carry_them(case):
     closure, inputs, names, points = case
     position = closure.position(*inputs)
-    follower = closure.follower(points)
+    follower = closure.point_tracker(points)
     places = follower.places(position)
     expected, angles = closure.points(position), closure.link_angles(position)
     wanted = [expected[name] for name in names]
@@ -343,7 +343,7 @@ def test_they_lie_where_their_links_carry_them(case):
 
 def test_rates_are_slopes_of_places(case):
     closure, inputs, _, points = case
-    follower, step = closure.follower(points), 1e-4
+    follower, step = closure.point_tracker(points), 1e-4
     rates, pulls = [0.9, -0.6][: len(inputs)], [0.4, 1.1][: len(inputs)]
 
     def at(t):
@@ -366,7 +366,7 @@ def test_rates_are_slopes_of_places(case):
 
 def test_what_is_asked_twice_is_walked_once():
     closure = Closure(read_linkage(read_yaml(FOLDER / 'four_bar.yaml')[0]))
-    follower = closure.follower([('coupler', 0.06 + 0j)] * 3)
+    follower = closure.point_tracker([('coupler', 0.06 + 0j)] * 3)
     assert len(set(follower.indices)) == 1
 
 
@@ -374,7 +374,7 @@ def test_the_ground_stands():
     closure = Closure(read_linkage(read_yaml(FOLDER / 'four_bar.yaml')[0]))
     position = closure.position(1.0)
     velocity = closure.velocity(position, 5.0)
-    follower = closure.follower([('ground', 0.3 + 0.4j)])
+    follower = closure.point_tracker([('ground', 0.3 + 0.4j)])
     places = follower.places(position)
     assert places == [0.3 + 0.4j]
     assert follower.velocities(position, velocity, places) == [0j]

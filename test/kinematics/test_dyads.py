@@ -27,7 +27,7 @@ from linkage_ros.files.linkage_text import scene_text_for
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 import pytest
 
 from .linkages import four_bar_linkage, FourBar, inverted_slider_crank_linkage, InvertedSliderCrank
@@ -331,7 +331,7 @@ def test_the_length_is_positive(foot, c, start, end, facing, angle):
     except FileError:
         assume(False)
     (one,) = closure.input_ranges
-    (usual,) = Way(closure).ranges
+    (usual,) = InputSweep(closure).ranges
     assert usual == one
     # The pins' distance goes from |foot| − c to |foot| + c; the slide is it less start and end.
     shift = end - start

@@ -27,8 +27,8 @@ from linkage_ros.kinematics import closure as closure_module
 from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Pose, RevoluteJoint, Side
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import Way
-from linkage_ros.kinematics.topology import Driven, find_groups, Iterated, Structure
+from linkage_ros.kinematics.sweep_analysis import InputSweep
+from linkage_ros.kinematics.topology import assur_groups, Driven, Iterated, Structure
 from linkage_ros.solvers.table import TableClosure
 import numpy as np
 import pytest
@@ -55,7 +55,7 @@ CLOSED_FORM = ['four_bar', 'slider_crank', 'inverted_slider_crank', 'scotch_yoke
 
 def iterated(linkage: Linkage) -> Structure:
     """Return a structure in which every link but the ground is iterated."""
-    found = find_groups(linkage)
+    found = assur_groups(linkage)
     links = tuple(link for link in found.links if link != GROUND)
     crank = tuple(
         group
@@ -76,7 +76,7 @@ def test_it_finds_what_the_closed_form_finds(name: str, monkeypatch: pytest.Monk
         for (_, point), place in exact.points(exact.position(start)).items()
     }
     posed = replace(linkage, assembly={}, pose=Pose((start,), rough))
-    monkeypatch.setattr(closure_module, 'find_groups', iterated)
+    monkeypatch.setattr(closure_module, 'assur_groups', iterated)
     found = Closure(posed)
     turns = not linkage.inputs[0].slider
     for i in range(-20, 21):
@@ -126,7 +126,7 @@ def test_near_a_limit_its_conditioning_falls_to_nothing() -> None:
     closure = Closure(class_3_linkage())
     (interval,) = closure.input_ranges
     found = [
-        closure.nearness(closure.position(interval.highest - distance)).conditioning
+        closure.singularity_margin(closure.position(interval.highest - distance)).conditioning
         for distance in (0.3, 1e-2, 1e-4, 1e-6)
     ]
     assert found == sorted(found, reverse=True)
@@ -257,7 +257,7 @@ def test_a_platform_on_a_change_point_linkage_repeats_after_two_turns() -> None:
         (interval,) = closure.input_ranges
         assert interval.whole
         assert interval.turns == 2
-        assert Way(closure).ranges[0].highest == pytest.approx(2.0 * tau)
+        assert InputSweep(closure).ranges[0].highest == pytest.approx(2.0 * tau)
         # Apart: the four-bar itself is on its other side after a turn, and back after two.
         once, twice = (closure.points(closure.position(1.0 + n * tau)) for n in (1, 2))
         start = closure.points(closure.position(1.0))
@@ -273,7 +273,7 @@ def test_a_table_of_a_chain_is_proven(tail: bool) -> None:
     rng = random.Random(3)
     linkage = chain(rng, FOUR_BARS['crank-rocker'], tail)
     closure = Closure(linkage)
-    interval = Way(closure).ranges[0]
+    interval = InputSweep(closure).ranges[0]
     span = None
     if not interval.whole:
         width = interval.highest - interval.lowest

@@ -28,7 +28,7 @@ from linkage_ros.kinematics.batch import CODES
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits
 from linkage_ros.kinematics.status import Status
-from linkage_ros.kinematics.sweep_analysis import Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.solvers.newton import NewtonClosure
 from linkage_ros.solvers.table import TableClosure
 import numpy as np
@@ -324,7 +324,7 @@ def test_positions_arrays_and_ranges_agree(sides, own, rocker, coupler):
         and margin(value, closure.position(value).joints) > 1e-9
     ]
     for value in about[:: max(1, len(about) // 5)]:
-        interval = Way(closure).range_about(value)
+        interval = InputSweep(closure).range_about(value)
         assert interval is not None
         assert interval.whole or interval.lowest <= value <= interval.highest
 
@@ -415,10 +415,10 @@ joints: {rod_joint: {parent: left, child: left_rod, limits: [-1.5, 0.5]}}
     assert closure.position(0.9, 1.5).status is LIMITED
     batch = closure.solve(np.array([1.5, 0.9]), np.array([1.5, 1.5]), derivatives=0)
     assert batch.status.tolist() == [CODES[CLOSED], CODES[LIMITED]]
-    (one,) = Way(closure, (1.5, 1.5)).ranges
+    (one,) = InputSweep(closure, (1.5, 1.5)).ranges
     assert one.lowest >= 1.0
     assert one.highest <= 2.0
     for end, by, outward in zip(one[:2], one.by, (-1, 1), strict=True):
         assert by in ('left_joint', 'rod_joint')
-        assert Way(closure, (1.5, 1.5)).position(end + outward * 1e-6).status is LIMITED
+        assert InputSweep(closure, (1.5, 1.5)).position(end + outward * 1e-6).status is LIMITED
     assert remainder(rod, tau) == rod

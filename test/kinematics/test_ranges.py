@@ -32,10 +32,10 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import (
     extremes,
     grid,
+    InputSweep,
     samples,
     transmission_angles,
     usual_inputs,
-    Way,
     worst_residual,
 )
 from mpmath import mp, mpf
@@ -258,8 +258,8 @@ LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 FILES = sorted(LINKAGES.glob('*.yaml'))
 
 
-def of_lengths(a: float, b: float, c: float, d: float) -> Way:
-    return Way(Closure(four_bar_linkage((a, b, c, d), 'left')))
+def of_lengths(a: float, b: float, c: float, d: float) -> InputSweep:
+    return InputSweep(Closure(four_bar_linkage((a, b, c, d), 'left')))
 
 
 def test_a_full_turn_begins_at_0() -> None:
@@ -273,7 +273,7 @@ def test_a_single_change_point_needs_two_turns() -> None:
 
 def test_a_limited_range_lies_about_its_middle() -> None:
     """Its limit follows from one triangle: O, B and a point that is 0.075 m from B."""
-    ((low, high, *_),) = Way(shipped('peaucellier')).ranges
+    ((low, high, *_),) = InputSweep(shipped('peaucellier')).ranges
     # The arms close where |OB| = 0.125 − 0.05, and |OB| = 2·0.05·cos(φ/2).
     limit = 2.0 * acos(0.75)
     assert low == pytest.approx(-limit, abs=1e-14)
@@ -285,7 +285,7 @@ def test_every_shipped_linkage_has_a_usual_pose_inside_its_range(file: Path) -> 
     closure = shipped(file.stem)
     inputs = usual_inputs(closure)
     assert closure.position(*inputs).status is Status.CLOSED
-    interval = Way(closure, inputs).range_about(inputs[0])
+    interval = InputSweep(closure, inputs).range_about(inputs[0])
     assert interval is not None
     assert interval.lowest < inputs[0] < interval.highest
 
@@ -343,7 +343,7 @@ def test_several_inputs_start_from_their_pose(
 def test_the_other_inputs_are_held_along_a_way() -> None:
     """The elbows of the five-bar are 0.22 m apart at the ends of the left crank's way."""
     closure = shipped('five_bar')
-    way = Way(closure, (radians(60.0), radians(60.0)))
+    way = InputSweep(closure, (radians(60.0), radians(60.0)))
     ((low, high, *_),) = way.ranges
     b = complex(0.12 + 0.09 * cos(radians(60.0)), 0.09 * sin(radians(60.0)))
     for end in (low, high):
@@ -417,7 +417,7 @@ def test_the_least_transmission_angle_of_a_crank_rocker_is_that_of_the_textbook(
 
 
 def test_a_slider_crank_s_is_least_where_the_crank_pin_is_farthest_from_the_line() -> None:
-    ((_, found),) = transmission_angles(Way(shipped('slider_crank'))).items()
+    ((_, found),) = transmission_angles(InputSweep(shipped('slider_crank'))).items()
     assert degrees(found.lowest.value) == pytest.approx(degrees(acos(0.05 / 0.14)), abs=1e-9)
     assert [degrees(at) for at in found.lowest.at] == [pytest.approx(270.0, abs=1e-5)]
 

@@ -107,7 +107,7 @@ def test_the_distance_to_the_nearest_counts_down_to_it(kind: str) -> None:
     for at in flat.at:
         for away in (1e-3, -1e-3, 1e-6):
             position = closure.position(flat.sign * at + away)
-            assert closure.nearness(position).toggle_distance == pytest.approx(abs(away))
+            assert closure.singularity_margin(position).toggle_distance == pytest.approx(abs(away))
 
 
 def test_a_dyad_that_follows_others_is_searched_for_its_singular_inputs() -> None:
@@ -155,7 +155,7 @@ def test_the_ends_of_a_limited_range_are_toggles() -> None:
 def test_the_files_that_had_none(name: str, status: Status, places: list[float]) -> None:
     closure = defect(name)
     assert agree(met(closure, status), places)
-    assert closure.nearness(closure.position(places[0] + 1e-3)).toggle_distance < inf
+    assert closure.singularity_margin(closure.position(places[0] + 1e-3)).toggle_distance < inf
 
 
 # Dyads on a rocker that lie flat, have parallel lines, or whose pins meet.
@@ -227,7 +227,7 @@ def test_where_the_pins_of_a_straight_rod_meet_in_a_chain_no_pose_can_be_told() 
     # C stands at the angle φ + π/2, the swivel at the direction of (3, 4).
     meeting = np.arctan2(0.8, 0.6) - 0.5 * pi
     assert Status.INDETERMINATE in statuses_at(solved, meeting)
-    near = solved.nearness(solved.position(meeting + 0.01))
+    near = solved.singularity_margin(solved.position(meeting + 0.01))
     assert near.toggle_distance == pytest.approx(0.01, abs=1e-6)
 
 

@@ -17,7 +17,7 @@
 
 from campaigns.attacks.graph import attack
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.pipeline.sample_router import Routes
+from linkage_ros.pipeline.sample_router import SampleRouter
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from sensor_msgs.msg import JointState
@@ -54,7 +54,7 @@ def test_a_parameter_of_no_known_type_does_not_end_the_node(graph, write_scene, 
 
 
 def test_what_huge_messages_are_for_is_not_remembered():
-    routes = Routes({'left': ['crank_joint'], 'right': ['other']})
+    routes = SampleRouter({'left': ['crank_joint'], 'right': ['other']})
     for number in range(3):
         names = ['crank_joint', f'of_message_{number}', *(f'joint_{n}' for n in range(20_000))]
         message = JointStateWriter(names).write(1, [0.0] * len(names), [])

@@ -22,7 +22,7 @@ from math import pi, tau
 
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter
-from linkage_ros.node.diagnostics import Health, Snapshot
+from linkage_ros.node.diagnostics import DiagnosticsSummary, Snapshot
 from linkage_ros.node.tick_loop import TickLoop
 from linkage_ros.node.warnings import Warnings
 from linkage_ros.pipeline.pipeline import Pipeline
@@ -137,7 +137,7 @@ def ran(said, angles, linkage=LIMITED):
 
 def health(loop):
     window = Snapshot(), Snapshot.of(loop.counts, BEGIN)
-    return Health(
+    return DiagnosticsSummary(
         'node', 's', 1000.0, BEGIN, '/crank', (), loop, *window, '',
         {'transmission_angle': 0.0, 'conditioning': 0.0, 'toggle_distance': 0.0},
     )  # fmt: skip

@@ -18,7 +18,7 @@
 from types import SimpleNamespace
 
 from linkage_ros.kinematics.linkage import Input
-from linkage_ros.node.diagnostics import Health, Snapshot
+from linkage_ros.node.diagnostics import DiagnosticsSummary, Snapshot
 from linkage_ros.node.tick_loop import Counts
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
@@ -45,7 +45,7 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
     closure = SimpleNamespace(
         input_ranges=(),
         residual=lambda _: 0.0,
-        nearness=lambda asked: (
+        singularity_margin=lambda asked: (
             asked is position and SimpleNamespace(**dict(zip(LIMITS, nearness, strict=True)))
         ),
     )
@@ -61,7 +61,7 @@ def status(nearness=(1.0, 0.5, 0.5), inputs=(CRANK,), limits=LIMITS, opened=0):
         recorder=None,
         injection=None,
     )
-    health = Health(
+    health = DiagnosticsSummary(
         'node', 'scene', 0.0, 0, '/crank', (),
         loop,
         Snapshot(), Snapshot(unclosed=opened), '', limits,

@@ -22,7 +22,15 @@ from threading import Event
 from linkage_ros.bag.order import LogTimeOrder
 from linkage_ros.bag.reader import BagMessage
 from linkage_ros.errors import BagError, LinkageError
-from linkage_ros.node.playback import Cue, cues, LATE, Part, Playback, read_ahead, Ticks
+from linkage_ros.node.playback import (
+    LATE,
+    Part,
+    Playback,
+    playback_queue,
+    QueuedMessage,
+    read_ahead,
+    Ticks,
+)
 import pytest
 
 from .graph import wait_for
@@ -71,7 +79,7 @@ def played(events, rate=1.0, clock_period=None, takes=None, stop_at=None):
     ticks = None if clock_period is None else Ticks(clock_period * MS, tick)
     playback = Playback(FIRST, rate, publish, clock, ticks)
     playback.run(
-        Cue(base[0] * MS if base else 0, FIRST + time * MS, topic, b'')
+        QueuedMessage(base[0] * MS if base else 0, FIRST + time * MS, topic, b'')
         for time, topic, *base in events
     )
     return sent, playback
@@ -94,7 +102,7 @@ def test_no_time_is_lost_on_the_way():
     clock = Clock()
     times = []
     playback = Playback(FIRST, 3.0, {'a': lambda _: times.append(clock.time)}, clock)
-    playback.run(Cue(0, FIRST + number * MS, 'a', b'') for number in range(1_000_000))
+    playback.run(QueuedMessage(0, FIRST + number * MS, 'a', b'') for number in range(1_000_000))
     assert all(abs(t - BEGUN - n * MS / 3) <= 0.5 + 1e-6 for n, t in enumerate(times))
 
 
@@ -199,20 +207,20 @@ HELD = [(10, 'a'), (20, 'b'), (30, 'a'), (40, 'b'), (50, 'c')]
     ],
 )
 def test_a_part_is_played(first, last, topics, expected):
-    found = list(cues(Order(HELD), Part(first, last, topics, loop=False)))
+    found = list(playback_queue(Order(HELD), Part(first, last, topics, loop=False)))
     assert [(cue.log_time, cue.topic) for cue in found] == expected
     assert {cue.base for cue in found} <= {0}
 
 
 def test_a_loop_repeats_its_part():
-    endless = cues(Order(HELD), Part(20, 40, 'ab', loop=True))
+    endless = playback_queue(Order(HELD), Part(20, 40, 'ab', loop=True))
     found = [next(endless) for _ in range(7)]
     assert [cue.base for cue in found] == [0, 0, 0, 20, 20, 20, 40]
     assert [cue.log_time for cue in found] == [20, 30, 40, 20, 30, 40, 20]
 
 
 def test_a_loop_over_one_instant_is_refused_after_it():
-    instant = cues(Order([(10, 'a'), (10, 'b')]), Part(10, 99, 'ab', loop=True))
+    instant = playback_queue(Order([(10, 'a'), (10, 'b')]), Part(10, 99, 'ab', loop=True))
     assert [next(instant).topic, next(instant).topic] == ['a', 'b']
     with pytest.raises(LinkageError, match='all that is played is of one instant'):
         next(instant)
@@ -221,7 +229,7 @@ def test_a_loop_over_one_instant_is_refused_after_it():
 def endless(taken):
     while True:
         taken.append(1)
-        yield Cue(0, len(taken), 'a', bytes(100))
+        yield QueuedMessage(0, len(taken), 'a', bytes(100))
 
 
 def test_so_much_is_read_ahead_and_no_more():
@@ -249,7 +257,7 @@ def test_large_messages_are_read_ahead_by_their_size():
     def images():
         while True:
             taken.append(1)
-            yield Cue(0, len(taken), 'a', bytes(2**21))
+            yield QueuedMessage(0, len(taken), 'a', bytes(2**21))
 
     messages = read_ahead(images(), Event())
     next(messages)
@@ -263,7 +271,7 @@ def test_what_was_read_before_an_error_is_played_before_it():
     order = Order([(number, 'a') for number in range(1000)], error)
     found = []
     with pytest.raises(BagError, match='is damaged'):
-        found.extend(read_ahead(cues(order, Part(0, 1e9, 'a', loop=False)), Event()))
+        found.extend(read_ahead(playback_queue(order, Part(0, 1e9, 'a', loop=False)), Event()))
     assert [cue.log_time for cue in found] == list(range(1000))
 
 

@@ -25,7 +25,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.replay.replay import recorded_scene
-from linkage_ros.replay.verify import IDENTICAL, prove
+from linkage_ros.replay.verify import IDENTICAL, verify_replay
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosbags.highlevel import AnyReader
@@ -138,7 +138,7 @@ def test_each_file_of_its_bag_has_it_as_it_was_offered(graph, folder, write_scen
 def replayed(bag):
     """Return whether a bag replays to the same bytes."""
     found = read_bag(bag)
-    return prove(found, recorded_scene(found), found.messages()).verdict == IDENTICAL
+    return verify_replay(found, recorded_scene(found), found.messages()).verdict == IDENTICAL
 
 
 def test_joints_that_do_not_tell_all_are_said_in_a_line(write_scene, start):

@@ -28,7 +28,7 @@ from linkage_ros.drawing.shapes import carried_shapes, Circle, shapes
 from linkage_ros.files.linkage_file import read_linkage
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import samples, usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.report.data import page_data, poses
@@ -65,7 +65,7 @@ def published(closure, positions, inputs, prefix=''):
 def some(closure):
     """Return inputs at which a linkage closes, and its positions there."""
     usual = usual_inputs(closure)
-    interval = Way(closure, usual).range_about(usual[0])
+    interval = InputSweep(closure, usual).range_about(usual[0])
     values = samples(interval, 24) if interval else [usual[0]]
     inputs = [(value, *usual[1:]) for value in values]
     found = [(each, closure.position(*each)) for each in inputs]
@@ -169,7 +169,7 @@ def moments(scene):
     (line,) = Pipeline(scene).lines
     (member,) = scene.members
     usual = usual_inputs(line.closure)
-    interval = Way(line.closure, usual).range_about(usual[0])
+    interval = InputSweep(line.closure, usual).range_about(usual[0])
     values = samples(interval, TICKS) if interval else [usual[0]] * TICKS
     write = JointStateWriter(member.inputs).write
     for tick, value in enumerate(values):

@@ -24,7 +24,7 @@ from linkage_ros.cli.main import main
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Limits, RevoluteJoint
-from linkage_ros.robot_models.from_urdf import imported
+from linkage_ros.robot_models.from_urdf import from_urdf
 from linkage_ros.robot_models.urdf_file import read_urdf
 import numpy as np
 import pytest
@@ -102,7 +102,7 @@ GRIPPER = f"""<robot name="gripper">
 
 def gripper(**options):
     options = {'close': [('bar_end', 'finger_end')], 'inputs': ['motor_joint'], **options}
-    return imported(read_urdf(GRIPPER.encode(), 'g.urdf'), **options)
+    return from_urdf(read_urdf(GRIPPER.encode(), 'g.urdf'), **options)
 
 
 def test_a_gripper_on_an_arm():
@@ -164,8 +164,8 @@ def test_a_pose_says_the_side():
     file = read_urdf(turned.encode(), 'g.urdf')
     options = {'close': [('bar_end', 'finger_end')], 'inputs': ['motor_joint']}
     with pytest.raises(FileError, match='m apart where all joints are 0; give a pose'):
-        imported(file, **options)
-    made = imported(file, at={'finger_joint': 0.5}, **options)
+        from_urdf(file, **options)
+    made = from_urdf(file, at={'finger_joint': 0.5}, **options)
     again, first = Closure(made.linkage), Closure(gripper().linkage)
     assert again.linkage.pose.inputs == (0.0,)
     for angle in (0.1, -0.2):
@@ -188,7 +188,7 @@ def folded(crank, arm, **options):
         frame('arm', 'arm_end', '0.1 0 0'),
     ]
     urdf = read_urdf(FOLDED.format(''.join(parts)).encode(), 'r.urdf')
-    return imported(urdf, [('rod_end', 'arm_end')], ['crank_joint'], **options)
+    return from_urdf(urdf, [('rod_end', 'arm_end')], ['crank_joint'], **options)
 
 
 def test_a_start_in_which_two_assemblies_meet():
@@ -313,7 +313,7 @@ BAD = {
 def test_what_is_no_linkage(name):
     text, message, *close = BAD[name]
     with pytest.raises(FileError) as caught:
-        imported(read_urdf(text.encode(), 'x.urdf'), *(close or [CLOSED]), ['j'])
+        from_urdf(read_urdf(text.encode(), 'x.urdf'), *(close or [CLOSED]), ['j'])
     assert '\n' not in str(caught.value)
     assert str(caught.value).startswith(message)
 

@@ -25,10 +25,10 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.files.linkage_file import load
 from linkage_ros.files.linkage_text import linkage_text
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import samples, usual_inputs, Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
-from linkage_ros.robot_models.from_urdf import imported
+from linkage_ros.robot_models.from_urdf import from_urdf
 from linkage_ros.robot_models.part import Part, PartError
 from linkage_ros.robot_models.urdf import urdf
 from linkage_ros.robot_models.urdf_file import read_urdf
@@ -161,7 +161,7 @@ def test_no_state_of_the_whole_range_lies_beyond_the_limits(name, angles):
     closures = Pipeline(scene).closures
     limits = limits_of(scene_model(scene, closures, urdf))
     (given,) = closures[0].linkage.inputs
-    interval = Way(closures[0]).range_about(*usual_inputs(closures[0]))
+    interval = InputSweep(closures[0]).range_about(*usual_inputs(closures[0]))
     values = samples(interval, 300)
     seen = 0
     for first in range(0, len(values), len(values) // 4):
@@ -288,7 +288,7 @@ WITHIN = 1e-12
 
 def back(closure):
     """Return a linkage that went through URDF and through the text of a linkage file."""
-    made = imported(read_urdf(urdf('it', [Part(closure)]), 'it.urdf'))
+    made = from_urdf(read_urdf(urdf('it', [Part(closure)]), 'it.urdf'))
     text = linkage_text(made.linkage)
     return Closure(linkage_of(text))
 
@@ -297,7 +297,7 @@ def inputs_of(closure):
     """Return inputs all over the range, but for its very ends, where rounding opens loops."""
     if len(closure.linkage.inputs) > 1:
         return [(1.3 + 0.05 * i, 1.8 - 0.03 * i) for i in range(15)]
-    interval = Way(closure).widest_range
+    interval = InputSweep(closure).widest_range
     return [(value,) for value in samples(interval, 200)[1:-1]]
 
 

@@ -222,7 +222,7 @@ def test_a_spoilt_file_is_answered_or_refused_in_one_line(case: tuple[str, Any])
             velocity = closure.velocity(position, *(1.0,) * count)
             closure.acceleration(position, velocity, *(0.0,) * count)
             closure.residual(position)
-            closure.nearness(position)
+            closure.singularity_margin(position)
         else:
             assert bool(position.joints) == position.status.has_pose
 

@@ -157,7 +157,7 @@ def test_what_is_not_tabled_is_that_of_the_closed_form() -> None:
     position, true = table.position(1.0), closure.position(1.0)
     velocity, speed = table.velocity(position, 2.0), closure.velocity(true, 2.0)
     change = table.acceleration(position, velocity, 3.0)
-    assert table.nearness(position) == closure.nearness(true)
+    assert table.singularity_margin(position) == closure.singularity_margin(true)
     assert table.points(position) == closure.points(true)
     assert table.link_angles(position) == closure.link_angles(true)
     assert table.point_motion(position, velocity, change) == closure.point_motion(

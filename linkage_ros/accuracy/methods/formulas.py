@@ -46,7 +46,7 @@ from typing import Any, NamedTuple
 from linkage_ros.accuracy.methods import ACCELERATION, Joints, Method, Motion, RATE
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
-from linkage_ros.kinematics.topology import Driven, find_groups
+from linkage_ros.kinematics.topology import assur_groups, Driven
 import numpy as np
 
 
@@ -105,7 +105,7 @@ class PlainFourBar(NamedTuple):
 
 def plain_four_bar(linkage: Linkage) -> PlainFourBar | None:
     """Return a linkage as a four-bar, or None if it is anything else."""
-    structure = find_groups(linkage)
+    structure = assur_groups(linkage)
     found = list(four_bars(structure))
     driven = [group for group in structure.groups if isinstance(group, Driven)]
     if len(found) != 1 or len(structure.groups) != 2 or len(driven) != 1 or linkage.sliders:

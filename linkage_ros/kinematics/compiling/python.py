@@ -164,7 +164,7 @@ def _atom(text: str) -> str:
 # A function of numbers, made a straight line: without its loops, lists and calls.
 
 
-class Line(NamedTuple):
+class StraightFunction(NamedTuple):
     """
     A function as a straight line.
 
@@ -184,7 +184,9 @@ class Line(NamedTuple):
     results: tuple[float, ...]
 
 
-def straight(function: Callable[..., Sequence[float]], values: Sequence[complex]) -> Line:
+def straight(
+    function: Callable[..., Sequence[float]], values: Sequence[complex]
+) -> StraightFunction:
     """
     Return a function as a straight line, which has the same bits.
 
@@ -210,4 +212,4 @@ def straight(function: Callable[..., Sequence[float]], values: Sequence[complex]
         return group
 
     constants = tuple(0.0 if isinstance(number, Operation) else number for number in found)
-    return Line(varying, places, constants)
+    return StraightFunction(varying, places, constants)

@@ -32,7 +32,7 @@ from math import asin
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import cross
-from linkage_ros.kinematics.rail import Rail, Sight
+from linkage_ros.kinematics.rail import PinOnRail, Rail
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 
@@ -58,7 +58,7 @@ class RPPPose(NamedTuple):
     gap: float
     first: float
     second: float
-    sight: Sight
+    sight: PinOnRail
 
 
 class RPPDyad:

@@ -45,7 +45,7 @@ from linkage_ros.kinematics.diagonals import (
     AnyDiagonal,
     CrankDiagonal,
     Diagonal,
-    Growth,
+    DiagonalRate,
     UnsignedDiagonal,
 )
 from linkage_ros.kinematics.rounding import margin
@@ -114,7 +114,7 @@ class RPRDyad:
         known.coordinates.append(slide)
         return RPRPose(status, 0.0, rail, slide, diagonal)
 
-    def rates(self, pose: RPRPose, known: State, speeds: State) -> Growth:
+    def rates(self, pose: RPRPose, known: State, speeds: State) -> DiagonalRate:
         """Append the rates of rail and slide."""
         growth = self.diagonal.rates(pose.diagonal, known, speeds)
         lean = self._sign * growth.lean
@@ -124,7 +124,7 @@ class RPRDyad:
         return growth
 
     def accelerations(
-        self, pose: RPRPose, growth: Growth, known: State, speeds: State, changes: State
+        self, pose: RPRPose, growth: DiagonalRate, known: State, speeds: State, changes: State
     ) -> None:
         """Append the accelerations of rail and slide."""
         change = self.diagonal.accelerations(pose.diagonal, growth, known, speeds, changes)

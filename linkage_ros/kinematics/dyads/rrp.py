@@ -34,7 +34,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from linkage_ros.kinematics.arithmetic import atan2
-from linkage_ros.kinematics.rail import Rail, Sight
+from linkage_ros.kinematics.rail import PinOnRail, Rail
 from linkage_ros.kinematics.rounding import SMALLEST
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
@@ -66,7 +66,7 @@ class RRPPose(NamedTuple):
     link: float
     slide: float
     along: float
-    sight: Sight
+    sight: PinOnRail
 
 
 class RRPRates(NamedTuple):

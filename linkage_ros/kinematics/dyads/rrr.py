@@ -54,11 +54,11 @@ from linkage_ros.kinematics.diagonals import (
     AnyDiagonal,
     CrankDiagonal,
     Diagonal,
+    DiagonalAcceleration,
+    DiagonalRate,
     free_diagonal,
-    free_growth,
-    free_growth_change,
-    Growth,
-    GrowthChange,
+    free_diagonal_acceleration,
+    free_diagonal_rate,
     UnsignedDiagonal,
 )
 from linkage_ros.kinematics.rounding import margin, SMALLEST
@@ -128,14 +128,14 @@ class RRRDyad:
         known.coordinates.append(pose.second)
         return pose
 
-    def rates(self, pose: RRRPose, known: State, speeds: State) -> Growth:
+    def rates(self, pose: RRRPose, known: State, speeds: State) -> DiagonalRate:
         """Append the rates of both links."""
         growth = self.diagonal.rates(pose.diagonal, known, speeds)
         triangle_rates(pose, self._sign, growth, speeds)
         return growth
 
     def accelerations(
-        self, pose: RRRPose, growth: Growth, known: State, speeds: State, changes: State
+        self, pose: RRRPose, growth: DiagonalRate, known: State, speeds: State, changes: State
     ) -> None:
         """Append the accelerations of both links."""
         change = self.diagonal.accelerations(pose.diagonal, growth, known, speeds, changes)
@@ -190,7 +190,7 @@ def close_triangle(diagonal: Diagonal, more: float, less: float, sign: float) ->
     return RRRPose(status, 0.0, first, second, cross, diagonal, more, less)
 
 
-def triangle_rates(pose: RRRPose, sign: float, growth: Growth, speeds: State) -> None:
+def triangle_rates(pose: RRRPose, sign: float, growth: DiagonalRate, speeds: State) -> None:
     """Append ω3 and ω4 of a closed pose."""
     lean = sign * growth.lean
     for part in (pose.less, pose.more):
@@ -201,8 +201,8 @@ def triangle_accelerations(
     pose: RRRPose,
     sign: float,
     difference: float,
-    growth: Growth,
-    change: GrowthChange,
+    growth: DiagonalRate,
+    change: DiagonalAcceleration,
     changes: State,
 ) -> None:
     """Append α3 and α4."""
@@ -369,7 +369,7 @@ class FoldingRRRDyad(RRRDyad):
 # Likewise (z̈ + 2i·θ̇·ż)·e^{iθ} for the accelerations.
 
 
-class Carry(NamedTuple):
+class DrivenOffset(NamedTuple):
     """
     From the frame of one link to that of the one which it is driven against.
 
@@ -401,7 +401,7 @@ class Side:
 
     __slots__ = ('_carries', '_end', '_start')
 
-    def __init__(self, start: complex, end: complex, carries: tuple[Carry, ...]) -> None:
+    def __init__(self, start: complex, end: complex, carries: tuple[DrivenOffset, ...]) -> None:
         self._start = start
         self._end = end
         self._carries = carries
@@ -452,7 +452,7 @@ class DrivenRRRPose(NamedTuple):
 class DrivenRRRRates(NamedTuple):
     """The growth of the diagonal, and the rates of both sides."""
 
-    growth: Growth
+    growth: DiagonalRate
     sides: tuple[complex, complex]
 
 
@@ -502,7 +502,7 @@ class DrivenRRRDyad:
         unit, other_unit = self._units(pose)
         between = speeds.pins[end] + other * other_unit - speeds.pins[start] - one * unit
         vector = known.pins[end] - known.pins[start]
-        growth = free_growth(pose.triangle.diagonal, vector, between)
+        growth = free_diagonal_rate(pose.triangle.diagonal, vector, between)
         triangle_rates(pose.triangle, self._sign, growth, speeds)
         return DrivenRRRRates(growth, (one, other))
 
@@ -529,7 +529,9 @@ class DrivenRRRDyad:
             pulls.append((change + 2j * turn * rate) * unit)
         one, other = pulls
         between = changes.pins[end] + other - changes.pins[start] - one
-        growth_change = free_growth_change(growth, known.pins[end] - known.pins[start], between)
+        growth_change = free_diagonal_acceleration(
+            growth, known.pins[end] - known.pins[start], between
+        )
         b, c = map(abs, pose.sides)
         difference = (b - c) * (b + c)
         triangle_accelerations(triangle, self._sign, difference, growth, growth_change, changes)

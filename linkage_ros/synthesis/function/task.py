@@ -36,7 +36,7 @@ from typing import NamedTuple
 
 from linkage_ros.errors import SynthesisError
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.sweep_analysis import Way
+from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.synthesis.design import Design, ROCKER
 from linkage_ros.synthesis.function.expression import Array, Expression, named
 import numpy as np
@@ -503,7 +503,7 @@ def _rms(crank: Array, error: Array) -> float:
 
 def _opens_at(closure: Closure, low: float, high: float) -> float | None:
     """Return where, on the way from one angle to another, the loop opens, if it does."""
-    interval = Way(closure).range_about(low)
+    interval = InputSweep(closure).range_about(low)
     if interval is None:
         return low
     if interval.whole or interval.lowest - _SAME <= high <= interval.highest + _SAME:
