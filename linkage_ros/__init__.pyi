@@ -45,12 +45,12 @@ from linkage_ros.kinematics.linkage import (
 )
 from linkage_ros.kinematics.ranges import InputRange as InputRange
 from linkage_ros.kinematics.status import Status as Status
-from linkage_ros.pipeline import Pipeline as Pipeline, Tick as Tick
-from linkage_ros.replay import recorded_scene as recorded_scene
-from linkage_ros.scene.linkage_file import load as load
+from linkage_ros.pipeline.pipeline import Pipeline as Pipeline, Tick as Tick
+from linkage_ros.replay.replay import recorded_scene as recorded_scene
+from linkage_ros.files.linkage_file import load as load
 from linkage_ros.scene.load import load_scene as load_scene
 from linkage_ros.scene.scene import Scene as Scene
-from linkage_ros.shipped import linkage_names as linkage_names, scene_names as scene_names
+from linkage_ros.resources import linkage_names as linkage_names, scene_names as scene_names
 from linkage_ros.synthesis.defects import assess as assess, Assessment as Assessment
 from linkage_ros.synthesis.design import Design as Design
 from linkage_ros.synthesis.function.generate import generate_function as generate_function
