@@ -98,13 +98,16 @@ def results_of(
     with _client(address) as client:
         _check_workers(address, client)
         waiting = parts(_threads(address, client))
-        # Futures of the standard library's: waiting for them can be given up.
-        executor = client.get_executor(pure=False)
+        loop = client.loop.asyncio_loop
         running: dict[Future[Result], Part] = {}
         while True:
             room = _AHEAD * _threads(address, client) - len(running)
             for part in islice(waiting, max(room, 0)):
-                running[executor.submit(work, part)] = part
+                task = client.submit(work, part, pure=False)
+                # A future of the standard library's: waiting for it can be given up. Those of
+                # Client.get_executor() end in a TypeError where a worker was lost.
+                result = client.gather(task, asynchronous=True)
+                running[asyncio.run_coroutine_threadsafe(result, loop)] = part
             if not running:
                 return
             for future in wait(running, _PATIENCE, FIRST_COMPLETED).done:
