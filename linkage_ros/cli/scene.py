@@ -28,7 +28,8 @@ from typing import Any
 
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.drives.drive import DRIVES
-from linkage_ros.effects.stage import bringing, EFFECTS, module_of
+from linkage_ros.effects.dispatch import bringing, module_of
+from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, listed
 from linkage_ros.faults.fault import FAULTS
 from linkage_ros.files.parameters import declared, default_of, is_required, parameter_rows, summary

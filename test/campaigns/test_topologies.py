@@ -39,8 +39,7 @@ from campaigns.topologies.run import (
 )
 from campaigns.topologies.topology import start_of, Topology
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.kinematics.singularity_margin import SingularInput
+from linkage_ros.kinematics.results import InputRange, SingularInput
 from linkage_ros.kinematics.status import Status
 import numpy as np
 import pytest
