@@ -30,12 +30,11 @@ from typing import TYPE_CHECKING
 from linkage_ros.kinematics.diagonals import CrankDiagonal
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, RelativeAngle
+from linkage_ros.kinematics.results import InputRange, LoopClosure, Position
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.branch import Branch
     from linkage_ros.kinematics.limits import Bound
-    from linkage_ros.kinematics.results import InputRange
-from linkage_ros.kinematics.results import LoopClosure, Position
 
 # The lowest value of a function between two places, by golden sections (Kiefer, 1953).
 
