@@ -169,7 +169,7 @@ def test_gaps_and_statuses_are_compared() -> None:
 
     def position(*inputs: float) -> Any:
         found = closure.position(*inputs)
-        return found._replace(gap=found.gap * 1.001)
+        return replace(found, gap=found.gap * 1.001)
 
     assert judged(topology, closure=Wrong(closure, position=position)).counts['gap']
     moved = Wrong(closure, position=lambda x: closure.position(x + 0.5))
