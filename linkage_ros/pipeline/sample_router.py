@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Which of several receivers a message is for, by the joints that it names."""
+"""Route a message to the linkages whose joints it names."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ Receiver = TypeVar('Receiver')
 
 class SampleRouter(Generic[Receiver]):
     """
-    Finds the receivers of messages; a message with the same names as one before is not parsed.
+    Finds the receivers of a message; parses a message only if its joint names are new.
 
     Parameters
     ----------
     wanted
-        For each receiver the joints of which it needs all.
+        The joints that each receiver needs; a message must name all of them.
 
     """
 
@@ -53,7 +53,7 @@ class SampleRouter(Generic[Receiver]):
         self._found: dict[bytes, tuple[Receiver, ...]] = {}
 
     def find(self, message: bytes) -> tuple[Receiver, ...]:
-        """Return the receivers of a JointState, serialized; of a malformed one all."""
+        """Return the receivers of a serialized JointState; of a malformed one, all receivers."""
         for end in self._ends.get(len(message), ()):
             known = self._found.get(message[STAMP_END:end])
             if known is not None:
