@@ -462,7 +462,7 @@ class LinkagePipeline:
 
 
 def _between_readings(member: SceneLinkage, named: set[str], moves_by_rates: bool) -> set[str]:
-    """Return the effects that combine successive readings and do not use the rates."""
+    """Return 'jitter' and 'delay' where this scene lets them work without the crank's rates."""
     found = {'jitter', 'delay'} & named
     if moves_by_rates and 'delay' in found:
         delay = module_of('delay')
