@@ -254,14 +254,14 @@ def _class_of(topic: Topic) -> Any:
         raise LinkageError(
             topic.name, f'{topic.type} is not installed', f'install the ROS package {package}'
         )
-    found = message_type(topic.type, topic.name)
+    message_class = message_type(topic.type, topic.name)
     installed = ''
     with suppress(LinkageError):
-        installed = bag_topic(topic.name, found, QoSProfile(depth=1)).type_hash
+        installed = bag_topic(topic.name, message_class, QoSProfile(depth=1)).type_hash
     if topic.type_hash and installed and topic.type_hash != installed:
         raise LinkageError(
             topic.name,
             f'{topic.type} was another when it was recorded',
             f'install the ROS package {package} of that time',
         )
-    return found
+    return message_class

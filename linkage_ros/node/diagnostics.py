@@ -425,16 +425,16 @@ def _exertions(
 ) -> dict[str, tuple[float | None, float | None]]:
     """Return rate and effort of the joints that have limits, as far as they are known."""
     linkage, reading = line.member.linkage, look.reading
-    found: dict[str, tuple[float | None, float | None]] = {}
+    exertions: dict[str, tuple[float | None, float | None]] = {}
     if reading is not None:
         for number, name in enumerate(linkage.joints):
             # A reading has rates, and efforts, for all of its joints or for none.
             rate = reading.rates[number] if reading.rates else None
-            found[name] = rate, reading.efforts[number] if reading.efforts else None
+            exertions[name] = rate, reading.efforts[number] if reading.efforts else None
     driven = look.crank.rates if look.crank is not None else ()
     for given, rate in zip(linkage.inputs, driven, strict=False):
-        found[given.joint] = rate, found.get(given.joint, (None, None))[1]
-    return {name: of for name, of in found.items() if name in linkage.limits}
+        exertions[given.joint] = rate, exertions.get(given.joint, (None, None))[1]
+    return {name: of for name, of in exertions.items() if name in linkage.limits}
 
 
 def _of(line: LinkagePipeline) -> str:

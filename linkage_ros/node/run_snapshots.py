@@ -203,12 +203,12 @@ def losses_text(where: object, topics: Sequence[TopicCounts] | Sequence[KeptCoun
     )
 
 
-def _outcome(found: RecordingSummary | RecordingError, seconds: float) -> SnapshotOutcome:
-    if isinstance(found, RecordingError):
-        return SnapshotOutcome(None, str(found), f'no snapshot: {found}; the memory goes on')
-    counts = counts_text(found)
-    if found.failure:
-        line = f'snapshot incomplete: {found.failure}: {counts}; the memory goes on'
-        return SnapshotOutcome(found, found.failure, line)
-    line = f'the last {seconds:.3f} s recorded to {found.folder}: {counts}'
-    return SnapshotOutcome(found, '', line)
+def _outcome(result: RecordingSummary | RecordingError, seconds: float) -> SnapshotOutcome:
+    if isinstance(result, RecordingError):
+        return SnapshotOutcome(None, str(result), f'no snapshot: {result}; the memory goes on')
+    counts = counts_text(result)
+    if result.failure:
+        line = f'snapshot incomplete: {result.failure}: {counts}; the memory goes on'
+        return SnapshotOutcome(result, result.failure, line)
+    line = f'the last {seconds:.3f} s recorded to {result.folder}: {counts}'
+    return SnapshotOutcome(result, '', line)

@@ -107,10 +107,10 @@ class StalenessProbe(DemoNode):
             self._crank.handle.publish_raw(self._write(time_ns(), (angle,), (rate,)))
             sleep(0.01)
         for name, crank in motions.items():
-            found = self._use(name, crank, stop)
+            errors = self._use(name, crank, stop)
             if stop.is_set():
                 return
-            print(json.dumps(found), flush=True)
+            print(json.dumps(errors), flush=True)
 
     def _use(self, name: str, crank: CrankAt, stop: Event) -> dict[str, Any]:
         """Turn the crank through a motion and return the errors of the joint states."""
@@ -122,11 +122,11 @@ class StalenessProbe(DemoNode):
         ages: list[int] = []
         held: list[float] = []
         carried: list[float] = []
-        newest, unused, said = None, 0, False
+        newest, unused, announced = None, 0, False
         while (now := time_ns()) < end and not stop.is_set():
-            if not said and now >= begin:
+            if not announced and now >= begin:
                 print(json.dumps({'begun': name}), flush=True)
-                said = True
+                announced = True
             wait = min(next_crank, next_use) - now
             if wait > 0:
                 sleep(wait * 1e-9)

@@ -445,8 +445,8 @@ class LinkagePipeline:
     @property
     def choice(self) -> Choice | None:
         """Return the chosen solver and the reason if the scene asks for an accuracy, else None."""
-        found: Choice | None = getattr(self.closure, 'choice', None)
-        return found
+        choice: Choice | None = getattr(self.closure, 'choice', None)
+        return choice
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """Take a serialized message of the drive's topic at a time, in [ns]; or return why not."""
@@ -463,12 +463,12 @@ class LinkagePipeline:
 
 def _between_readings(member: SceneLinkage, named: set[str], moves_by_rates: bool) -> set[str]:
     """Return 'jitter' and 'delay' where this scene lets them work without the crank's rates."""
-    found = {'jitter', 'delay'} & named
-    if moves_by_rates and 'delay' in found:
+    mixing = {'jitter', 'delay'} & named
+    if moves_by_rates and 'delay' in mixing:
         delay = module_of('delay')
         parameters = member.effects.get('delay') or delay.PARAMETERS()
         return set() if delay.interpolates(parameters, named) else {'delay'}
-    return set() if moves_by_rates else found
+    return set() if moves_by_rates else mixing
 
 
 def _extra(effect: Effect, writer: Any, member: str) -> AuxiliaryOutput:
@@ -512,10 +512,10 @@ def _refuse_not_imported(member: SceneLinkage) -> None:
 def _refuse_idle(member: SceneLinkage, forced: bool) -> None:
     """Refuse an effect that has nothing to act on."""
     # With several linkages, one without forces may share an effect that another one needs.
-    own = member.content
+    section = member.content
     for given, key in (
-        (member.loads and 'loads' in own, 'loads'),
-        ('friction' in member.effects and 'effects' in own, 'effects.friction'),
+        (member.loads and 'loads' in section, 'loads'),
+        ('friction' in member.effects and 'effects' in section, 'effects.friction'),
     ):
         if given and not forced:
             raise DefinitionError(

@@ -62,14 +62,14 @@ class SampleRouter(Generic[Receiver]):
         if head is None:
             return self._all
         names, end = head
-        found = tuple(to for to, joints in self._wanted.items() if joints <= names)
+        receivers = tuple(to for to, joints in self._wanted.items() if joints <= names)
         if end > _LONGEST:
-            return found
+            return receivers
         if len(self._found) >= _MOST:
             self._ends.clear()
             self._found.clear()
         ends = self._ends.setdefault(len(message), [])
         if end not in ends:
             ends.append(end)
-        self._found[message[STAMP_END:end]] = found
-        return found
+        self._found[message[STAMP_END:end]] = receivers
+        return receivers
