@@ -29,21 +29,21 @@ Write = Callable[[str, Sequence[Part]], bytes]
 
 def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> bytes:
     """
-    Return the model of a scene, with its joints named as in its messages.
+    Return the robot model of a scene, with joint names as in its messages.
 
     Parameters
     ----------
     scene
         The scene.
     closures
-        Its linkages as they are solved, deviations of their parts included.
+        Closures of its linkages, with the deviations of their parts.
     write
         `urdf` or `mjcf`.
 
     Raises
     ------
     FileError
-        Where a linkage does not make a model, with what would help.
+        A linkage cannot be a robot model; the error has the remedy.
 
     """
     parts = [
