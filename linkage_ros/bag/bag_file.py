@@ -76,7 +76,7 @@ def start(mcap: Writer, profile: str = 'ros2') -> None:
 
 
 def register(mcap: Writer, topics: Sequence[Topic]) -> list[int]:
-    """Register topics with a writer; return their channel numbers, the same for the same topics."""
+    """Register topics with a writer; return their channel numbers, equal for equal topics."""
     schemas: dict[str, int] = {}
     channels = []
     for topic in topics:
