@@ -31,10 +31,10 @@ from mcap.records import Header, Metadata
 from mcap.writer import MCAP0_MAGIC
 
 TOLD_EVERY = 4096
-"""After how many messages progress is told and a wish to stop is looked for."""
+"""Number of messages between two progress reports and checks for a stop."""
 
 _RECORD_SIZE = 31
-"""The size of a message record without the bytes of the message."""
+"""Size of a message record without the message itself [bytes]."""
 
 
 class TopicContents(NamedTuple):

@@ -53,7 +53,7 @@ from mcap.writer import MCAP0_MAGIC
 CHUNK_SIZE = 64 * 1024
 FIRST_RESERVE = 512 * 1024
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""What a system says where it would take more if there were room."""
+"""Errors by which the system reports a lack of space."""
 # Data kept in memory until the disk has it, in case an fsync fails [bytes].
 _MOST_UNSYNCED = 16 * 1024 * 1024
 

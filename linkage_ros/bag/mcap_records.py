@@ -116,20 +116,20 @@ _UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {'lz4': _lz4, 'zstd': _zs
 
 
 HEAD = Struct('<BQ')
-"""The head of each record: its kind, and the length of its content."""
+"""Head of a record: its kind, and the length of its content."""
 
 _CHUNK = Struct('<QQQII')
-"""First and last time, size when unpacked, its checksum, length of the name of its packing."""
+"""First and last time, decompressed size, its checksum, length of the compression's name."""
 
 _MESSAGE = Struct('<HIQQ')
 _LONG = Struct('<Q')
 _INT = Struct('<I')
 _LONGEST_NAME = 16
 _LONGEST_RECORD = 8 * 2**20
-"""Of those that are made of parts, each of which takes many times its bytes [bytes]."""
+"""Limit for records of many parts, each of which takes a multiple of its bytes [bytes]."""
 
 MOST_CHANNELS = 10_000
-"""How many a file may describe, and how many schemas; MCAP has numbers for 65,535."""
+"""Most channels, and most schemas, of a file; MCAP has numbers for 65,535."""
 
 
 class Source:
@@ -360,7 +360,7 @@ _ELSEWHERE = {
     Opcode.METADATA_INDEX,
     Opcode.SUMMARY_OFFSET,
 }
-"""Kinds that no data section holds."""
+"""Kinds of records that no data section contains."""
 
 
 class DataSection:
@@ -544,7 +544,7 @@ def definitions_in(content: bytes) -> Definitions:
 
 
 _FOOTER = Struct('<BQQQI')
-"""Kind, length, where the index begins and its second part, its checksum."""
+"""Kind, length, start of the index and of its second part, checksum."""
 
 _KINDS: dict[int, Any] = {
     Opcode.CHUNK_INDEX: ChunkIndex,
@@ -560,7 +560,7 @@ _PLACES = {
 }
 
 MOST_RECORDS = 1_000_000
-"""How many an index may hold: of a terabyte in rosbag2's chunks it has that many."""
+"""Most records of an index: a terabyte in rosbag2's chunks has that many."""
 
 
 class FileIndex(NamedTuple):

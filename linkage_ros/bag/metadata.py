@@ -36,11 +36,11 @@ import yaml
 METADATA_FILE = 'metadata.yaml'
 ROOT_KEY = 'rosbag2_bagfile_information'
 NO_START = 2**63 - 1
-"""The starting time [ns] that rosbag2 gives a bag without messages."""
+"""Starting time [ns] that rosbag2 writes for a bag without messages."""
 
 _NAME = '/_'
 _PLAIN = re.compile(r'/[A-Za-z0-9_/]*')
-"""Names that YAML writes as they are; to ask it costs a millisecond for each."""
+"""Names that YAML writes unquoted; asking yaml would take a millisecond for each."""
 
 
 @dataclass(frozen=True, slots=True)

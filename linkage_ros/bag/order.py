@@ -44,16 +44,16 @@ from linkage_ros.bag.reader import Bag, BagMessage, unreadable
 from linkage_ros.errors import BagError
 
 WINDOW = 1_000_000_000
-"""How far out of order messages may stand in a file without an index, in [ns]."""
+"""How far out of order the messages of a file without an index may be, in [ns]."""
 
 MOST_HELD = 2**30
-"""How many bytes may be held: of chunks whose times overlap, or of a window."""
+"""Most bytes in memory: of chunks whose times overlap, or of a window."""
 
 _BESIDE = 400
-"""The memory that a message takes beside its own bytes."""
+"""Memory of a message in addition to its bytes."""
 
 _Entry = tuple[int, int, int, int, BagMessage | None]
-"""Time, number of the file, place of the chunk, number in it from 1; a whole chunk has none."""
+"""Time, index of the file, position of the chunk, number in it from 1; 0 for a whole chunk."""
 
 
 class LogTimeOrder:

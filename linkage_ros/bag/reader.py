@@ -50,7 +50,7 @@ from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 MOST_METADATA = 8 * 2**20
-"""How long metadata may be; of a bag with thousands of topics rosbag2 writes some megabytes."""
+"""Greatest size of the metadata; for thousands of topics rosbag2 writes some megabytes."""
 
 _WITHOUT = 'move metadata.yaml away to read the folder without it'
 
@@ -236,18 +236,18 @@ def footer_metadata(file: Path) -> FooterMetadata:
 
 
 RUN_FILE = 'run.json'
-"""Name of the attachment in which a run names its scene, topics and versions."""
+"""Name of the attachment with the run's scene, topics and versions."""
 
 _RECOVER = 'linkage recover makes a whole bag of what is there'
 
 MOST_ATTACHED = 64 * 2**20
-"""How many bytes of the attachments of a file are kept in memory."""
+"""Most bytes of a file's attachments in memory."""
 
 _LONGEST_QOS, _MOST_QOS = 1024, 64
-"""Of one profile: letters, and values; rosbag2 writes some 320 and 33."""
+"""Most characters and values of one profile; rosbag2 writes some 320 and 33."""
 
 ProgressCallback = Callable[[int], None]
-"""Takes how many bytes of a file have been read, now and then; what it raises ends the reading."""
+"""Takes the number of bytes read of a file; an exception from it ends the reading."""
 
 
 class BagMessage(NamedTuple):

@@ -39,10 +39,10 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 
 POLL = 0.02
-"""How often a thread looks for what was offered, in [s]."""
+"""Period at which a thread checks the queue, in [s]."""
 
 ROOM_POLL = 1.0
-"""How often a recorder looks whether a disk that was full has room again, in [s]."""
+"""Period at which a recorder checks a full disk for space, in [s]."""
 
 BATCH, NAP = 50, 50e-6
 """
@@ -62,7 +62,7 @@ offers. To count bytes, these threads would need a lock, and a tick would wait f
 """
 
 Offered = tuple[int, int, int, bytes]
-"""A message on its way: topic, log time, publish time [ns] and its CDR bytes."""
+"""A message in the queue: topic, log time, publish time [ns] and its CDR bytes."""
 
 
 class ThreadCounter:
@@ -214,7 +214,7 @@ class Recorder:
         self, writer: BagWriter, *, capacity: int = 65536, flush_period: float = 1.0
     ) -> None:
         self.failure: RecordingError | None = None
-        """Why messages are lost, or were; a recording that went on again has one too."""
+        """Reason for lost messages; also set after a recording has continued."""
         self._recording = True
         self.folder = writer.folder
         self._writer = writer

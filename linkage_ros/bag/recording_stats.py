@@ -26,16 +26,16 @@ from linkage_ros.bag.metadata import BagSummary, metadata_text
 _PREFIX = 'linkage_ros.'
 
 STATS_RECORD = f'{_PREFIX}account'
-"""Name of the metadata record at the end of a bag's last file that holds `RecordingStats`."""
+"""Name of the metadata record with the `RecordingStats` at the end of a bag's last file."""
 
 LET_GO = f'{_PREFIX}let_go'
-"""Key in the ``custom_data`` of a bag whose first files are gone: a JSON object by topic."""
+"""Key in the ``custom_data`` of a bag whose first files were removed: counts by topic, as JSON."""
 
 FAILURE = f'{_PREFIX}failure'
-"""Key in the ``custom_data`` of a bag whose recording ended early: why."""
+"""Key in the ``custom_data`` of a bag whose recording ended early: the reason."""
 
 UNFINISHED = f'{_PREFIX}unfinished'
-"""Key in the ``custom_data`` of a bag that is being recorded, or whose recording was killed."""
+"""Key in the ``custom_data`` of a bag in recording, or of a killed recording."""
 
 UNFINISHED_DATA: Mapping[str, str] = {
     UNFINISHED: 'being recorded, or killed; counted is what was on the disk by the last flush'

@@ -55,11 +55,11 @@ from mcap.records import Attachment, Channel
 from mcap.writer import CompressionType, Writer
 
 RECOVERED = 'linkage_ros.recovered'
-"""Key in the ``custom_data`` of a recovered bag: what it was made of, and what was lost."""
+"""Key in the ``custom_data`` of a recovered bag: its origin and losses."""
 
 
 NOTHING_LOST = 'nothing lost'
-"""How that text ends where it is so."""
+"""End of that text if nothing was lost."""
 
 
 class TopicRecovery(NamedTuple):
@@ -130,7 +130,7 @@ def promised_counts(information: Mapping[str, Any]) -> dict[str, int]:
 
 
 MOST_CHANNELS = 10_000
-"""How many channels a new bag may have: its metadata, 700 bytes for each, must stay readable."""
+"""Most channels of a new bag: its metadata, 700 bytes for each, must stay readable."""
 
 
 class NewBag:

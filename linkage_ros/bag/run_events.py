@@ -27,19 +27,19 @@ from linkage_ros.bag.recording_stats import counts_in
 from linkage_ros.errors import BagError
 
 BEGUN, MID_RUN, WITH_THE_RUN = 'begun', 'mid-run', 'with the run'
-"""The key under which a bag says when it was begun, and what it says."""
+"""Key for the beginning of the bag, and its values."""
 
 CHOSEN = 'solver'
-"""The key under which it says what closes the loops, where the scene asks for an accuracy."""
+"""Key for the chosen solvers, if the scene asks for an accuracy."""
 
 OWN_EFFECTS = 'effects'
-"""The key under which it says which modules the effects are that are not of this package."""
+"""Key for the modules of user-defined effects."""
 
 SEED = 'seed'
-"""The key under which it says from what everything random came."""
+"""Key for the seed of all random numbers."""
 
 _LONGEST_ACCOUNT = 4 * 2**20
-"""In bytes; a kilobyte, but for what a bag says of the one that it was made from."""
+"""Greatest size [bytes]; usually a kilobyte, more if the bag was made from another one."""
 
 VERSIONS = ('linkage_ros', 'python', 'machine')
 
@@ -185,7 +185,7 @@ _TEXTS = (
     'withheld_topic',
     'resets_topic',
 )
-"""Keys under which a run says something of itself, which are fields of `RunAccount` too."""
+"""Keys of the account that are also fields of `RunAccount`."""
 
 
 def _are_names(values: Any) -> bool:

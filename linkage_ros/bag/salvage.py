@@ -62,7 +62,7 @@ _BEYOND = max(HEAD.size, len(MCAP0_MAGIC))
 # lookahead consumes nothing, so that no record within the bytes of another is missed.
 _BEGINNING = re.compile(rb'[\x06\x09](?=.{4}\x00{4})|' + re.escape(MCAP0_MAGIC), re.DOTALL)
 _MOST_IN_VAIN = 16
-"""How often the size of the file is read for what only looks like a chunk."""
+"""Limit for reading false candidates of chunks, in multiples of the file size."""
 
 
 def next_whole(source: Source, at: int) -> int:

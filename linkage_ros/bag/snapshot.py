@@ -41,13 +41,13 @@ from linkage_ros.bag.writer import BagWriter, TIME_END
 from linkage_ros.errors import RecordingError
 
 _HEAD = Struct('<HqqqI')
-"""Before each message: topic, time that has passed, log time, publish time [ns], size [bytes]."""
+"""Head of a message: topic, elapsed time, log time, publish time [ns], size [bytes]."""
 
 _BLOCK_SIZE = 64 * 1024
 _BLOCKS_IN_SPAN = 16
 
 _JUMP = 1_000_000_000
-"""What goes back by more is a clock that has jumped, and not messages out of order [ns]."""
+"""A larger step back of log time is a jump of the clock, not a message out of order [ns]."""
 
 
 class Extent(NamedTuple):
@@ -368,10 +368,10 @@ class SnapshotMemory:
 
 
 _AHEAD = 5000
-"""How many messages are handed to the recorder before it has written them."""
+"""Most messages handed to the recorder that it has not written yet."""
 
 _PATIENCE = 10.0
-"""How long a disk that does not answer is waited for, in [s]."""
+"""Longest wait for a disk that does not answer, in [s]."""
 
 
 class SnapshotWriting:

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 from typing import Any
 
 CHANNELS_FILE = 'channels.mcap'
-"""Attached to each of our files under this name: an MCAP file with its topics and no messages."""
+"""Name of an attachment of each of our files: an MCAP file with its topics and no messages."""
 
 INFINITE = 2**63 - 1
-"""The duration [ns] that rmw takes as 'no limit'; rosbag2 writes 9223372036 s 854775807 ns."""
+"""Duration [ns] that rmw reads as 'no limit'; rosbag2 writes 9223372036 s 854775807 ns."""
 
 # Up to metadata version 8 rosbag2 wrote the policies as the numbers of rmw's enumerations.
 _NUMBERED = {

@@ -210,8 +210,7 @@ class BagWriter:
 
     def resume(self) -> bool:
         """
-        Continue in a new file if there was no space and there is some again; return whether it
-        does.
+        Continue in a new file after a lack of space, if there is some again; return whether so.
 
         The failure stays recorded in the metadata.
         """
@@ -347,7 +346,7 @@ class BagWriter:
         return error
 
     def _lose_what_is_gone(self) -> LostError | None:
-        """Exclude messages in files that another process has truncated or removed from the counts."""
+        """Remove from the counts the messages in files that another process has cut or removed."""
         parts = self._parts()
         gone = [part for part in parts if not _is_there(self.folder / part.file, part.size)]
         if not gone:

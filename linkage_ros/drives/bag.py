@@ -63,7 +63,7 @@ class Samples:
     offsets: array[int]
     """Times since the first sample, in [ns]."""
     rejected: Counter[Rejection]
-    """How many messages were skipped, and why."""
+    """Number of skipped messages, by reason."""
 
     def __init__(self, inputs: tuple[str, ...], use: TopicParameters, needs_rate: bool) -> None:
         self._inputs = len(inputs)
@@ -246,7 +246,7 @@ class RecordedPace(Drive):
     __slots__ = ('_newest', '_period', '_start', '_topic', 'max_age', 'samples')
 
     max_age: int
-    """Age of the newest sample beyond which there is no crank, in [ns]."""
+    """Age of the newest sample above which there is no crank state, in [ns]."""
 
     def __init__(self, samples: Samples, use: TopicParameters, *, repeat: bool) -> None:
         self.samples = samples

@@ -92,7 +92,7 @@ def refuse_beyond(
 
 
 LARGEST = 1e10
-"""No value or rate of a machine's input is beyond this, in [rad], [m], [rad/s] or [m/s]."""
+"""Bound on values and rates of an input, in [rad], [m], [rad/s] or [m/s]."""
 
 Curve = Callable[[int], tuple[float, float, float]]
 """

@@ -56,7 +56,7 @@ DRIVES = {
     'bag': 'linkage_ros.drives.bag',
     'torque': 'linkage_ros.drives.torque',
 }
-"""Name of each drive, and the module that holds it."""
+"""Module of each drive, by name of the drive."""
 
 
 class CrankState(NamedTuple):
@@ -212,4 +212,4 @@ class Context:
 
 
 Reader = Callable[[bytes], Any]
-"""Makes a sample, or a Rejection, of a message."""
+"""Reads a sample, or a Rejection, from a message."""

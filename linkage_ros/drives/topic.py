@@ -27,7 +27,7 @@ from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Reje
 from linkage_ros.messages.layout import NANOSECONDS
 
 LARGEST = 1e10
-"""Angles beyond this, in [rad], are 2e-6 rad apart as doubles: none of a machine. Rates alike."""
+"""Larger angles, in [rad], are 2e-6 rad apart as doubles: no machine has them. Likewise rates."""
 
 
 TOPIC = 'crank_states'
@@ -88,9 +88,9 @@ class TopicDrive(Drive):
     __slots__ = ('_carry_forward', '_max_lead', '_needs_rate', 'max_age', 'sample')
 
     max_age: int
-    """Age of the newest sample beyond which there is no crank, in [ns]."""
+    """Age of the newest sample above which there is no crank state, in [ns]."""
     sample: tuple[int, _Values, _Values, _Values] | None
-    """The newest good sample: its stamp, in [ns], angles, rates, and as many zeros."""
+    """The newest good sample: its stamp, in [ns], angles, rates, and zeros as accelerations."""
 
     def __init__(self, use: TopicParameters, needs_rate: bool) -> None:
         self._carry_forward = use.carry_forward

@@ -42,7 +42,7 @@ from linkage_ros.messages.layout import NANOSECONDS
 TOPIC = 'crank_commands'
 
 _MADE_UP = NANOSECONDS
-"""Time that a tick makes up for, at least, in [ns]; so are two ticks of a scene."""
+"""Least time that a tick can integrate, in [ns]; two ticks of a scene are also allowed."""
 
 _NEVER = 1 << 63
 
@@ -200,13 +200,13 @@ class TorqueDrive(Drive):
     )
 
     stamp: int
-    """When the newest good command came, in [ns]; 0 before the first."""
+    """Arrival of the newest good command, in [ns]; 0 before the first."""
     max_age: int
-    """How long a command holds, in [ns]."""
+    """Validity of a command, in [ns]."""
     lost: int
-    """Time that was left out, in [ns]."""
+    """Skipped time, in [ns]."""
     saturated: int
-    """Commands that were cut to the effort limit."""
+    """Number of commands clipped to the effort limit."""
 
     def __init__(
         self,

@@ -31,10 +31,10 @@ from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.kinematics.closure import Closure
 
 _NO_TURN = -0.0
-"""What changes no number that it is added to; 0.0 would make −0.0 another."""
+"""Changes no number when added; 0.0 would turn −0.0 into 0.0."""
 
 Begin = Callable[[float], float]
-"""Returns the turn of an angle that is published first."""
+"""Returns the turns of an angle that is published first."""
 
 
 class Continuous:

@@ -48,7 +48,7 @@ from linkage_ros.files.parameters import each, Number
 from linkage_ros.kinematics.arithmetic import called, vector
 
 _SMALLEST = 1e-12
-"""A force below this part of the largest one is rounding, and has no direction."""
+"""Below this fraction of the largest force, a force is rounding error without a direction."""
 
 
 @dataclass(frozen=True, slots=True)

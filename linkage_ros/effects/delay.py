@@ -124,9 +124,9 @@ class Delay:
         self._arrived = -1
         """Time up to which readings have arrived, in [ns]."""
         self._messages: int | None = None
-        """Time of the last reading before the first silence, in [ns]; nothing before that."""
+        """Time of the last reading before the first silence, in [ns]; None before it."""
         self._on_the_way: deque[tuple[int, SensorReading]] = deque()
-        """Readings since then that have not arrived."""
+        """Later readings that have not arrived yet."""
         self.gap_begins = False
 
     def __call__(self, now: int, reading: SensorReading | None) -> SensorReading | None:

@@ -144,7 +144,7 @@ class Counter:
     )  # fmt: skip
 
     rate: float
-    """What a driver makes of the counts, in [rad/s] or [m/s]."""
+    """Rate that a driver computes from the counts, in [rad/s] or [m/s]."""
 
     def __init__(self, encoder: JointEncoder, turns: bool) -> None:
         self._encoder = encoder

@@ -48,7 +48,7 @@ from linkage_ros.messages.marker_array import (
 )
 
 ARROW_POINTS = 16
-"""Of an effort's arrow, with its head."""
+"""Number of points of an effort's arrow, with its head."""
 
 
 class Key(NamedTuple):
@@ -131,10 +131,10 @@ def rgba(code: str) -> Colour:
 
 
 ALARM = rgba('#e0241b')
-"""Of what is near a toggle."""
+"""Colour near a toggle."""
 
 _HATCHED = rgba('#7f93a6')
-"""Of the ground's lines: to be seen on white as on black."""
+"""Colour of the ground's lines: visible on white and on black."""
 
 _EDGE, _SLOT, _FORCE, _EFFORT = map(rgba, (INK, '#ffffff', '#CC79A7', '#009E73'))
 _NOWHERE: list[Place] = [(0.0, 0.0, 0.0)]
@@ -312,10 +312,10 @@ def _flat(place: complex) -> Place:
 
 _GRAVITY = 9.81
 _SHORTEST = 0.25
-"""Of the half bar: no arrow is shorter."""
+"""Least length of an arrow, in half bars."""
 
 _WIDEST = 1.7 * pi
-"""An arc that goes farther round would meet itself."""
+"""Greatest angle of an arc, in [rad]; a longer one would meet itself."""
 
 Points = Mapping[tuple[str, str], complex]
 

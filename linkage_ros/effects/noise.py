@@ -44,7 +44,7 @@ from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.files.parameters import each, number
 
 _Source = tuple[int, float, Callable[[float, float], float]]
-"""Place of the joint, how strong its noise is, and what draws it: normal(mean, deviation)."""
+"""Index of the joint, size of its noise, and its generator: normal(mean, deviation)."""
 
 
 @dataclass(frozen=True, slots=True)

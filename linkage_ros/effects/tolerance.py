@@ -52,7 +52,7 @@ TRUNCATED = 3.0
 """A deviation is at most this many standard deviations."""
 
 BEFORE = 1.0153869850528114
-"""w: standard deviation before cutting off, where that of what is left is 1."""
+"""w: standard deviation before truncation that gives 1 after it."""
 
 _KEY = 'effects.tolerance'
 _FARTHEST = 1e9

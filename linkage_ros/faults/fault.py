@@ -50,7 +50,7 @@ FAULTS = {
     'freeze': 'linkage_ros.faults.freeze',
     'silence': 'linkage_ros.faults.silence',
 }
-"""Kind of each fault, and the module that holds it."""
+"""Module of each fault, by kind."""
 
 
 @dataclass(frozen=True, slots=True)

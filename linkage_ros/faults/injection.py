@@ -60,7 +60,7 @@ class Injection:
         self.faults = faults
         self.switches = {name: Switch() for name in faults}
         self.injected = dict.fromkeys(faults, 0)
-        """How many times each has begun."""
+        """Number of times that each fault has begun."""
         self._begun: int | None = None
         self._asked: list[Change] = []
         changes = [

@@ -41,16 +41,16 @@ from linkage_ros.resources import named_file
 
 _KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose', 'masses')
 _MOST_LINKS, _MOST_POINTS = 400, 10_000
-"""More links than these, and points of all links, are no machine's; a check takes seconds then."""
+"""Bounds on the links, and on the points of all links; at these a check takes seconds."""
 
 FARTHEST = 1e9
-"""Coordinates beyond this, in [m], are no machine's; below it no square overflows."""
+"""Bound on coordinates, in [m]; below it no square overflows."""
 
 HEAVIEST = 1e12
-"""Masses beyond this, in [kg], and moments of inertia, in [kg·m²], are no machine's either."""
+"""Bound on masses, in [kg], and on moments of inertia, in [kg·m²]."""
 
 STRONGEST = 1e12
-"""Nor are efforts beyond this, in [N·m] or [N]."""
+"""Bound on efforts, in [N·m] or [N]."""
 
 
 def looks_like_linkage(content: Section) -> bool:

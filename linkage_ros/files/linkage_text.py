@@ -52,11 +52,11 @@ from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 
 _WIDTH = 99
 _WHOLE = 1e15
-"""Beyond it, whole numbers are easier to read with an exponent."""
+"""Larger integers are easier to read with an exponent."""
 
 _PLAIN = re.compile(r'[^\W\d][\w.-]*')
 _WORDS = {'yes', 'no', 'on', 'off', 'true', 'false', 'null'}
-"""What YAML takes for something other than a name; 1.1 knows more of them than 1.2."""
+"""Words that YAML does not read as strings; YAML 1.1 has more of them than 1.2."""
 
 Content = float | str | list['Content'] | dict[str, 'Content']
 
@@ -115,7 +115,7 @@ def number_text(value: float) -> str:
 
 
 _IN_ROWS = ('links', 'sliders', 'joints', 'masses')
-"""Keys whose parts have a line each, however short they are."""
+"""Keys whose parts have a line each, even if short."""
 
 
 def _content(linkage: Linkage) -> dict[str, Content]:
@@ -225,13 +225,13 @@ def _name(name: str) -> str:
 
 
 _PART = 0.96
-"""Of its range that an input swings through: at the ends of many lies a toggle, without rates."""
+"""Fraction of its range through which an input swings: many ranges end at a toggle."""
 
 _PERIOD = 4.0
-"""Of the swing, in [s]."""
+"""Period of the swing, in [s]."""
 
 _SAME = 1e-9
-"""What a start may lie beyond the end of a range and count as it, in [rad] or of a length."""
+"""Distance beyond the end of a range that still counts as the end, in [rad] or of a length."""
 
 
 def scene_text_for(closure: Closure, file: str) -> str:

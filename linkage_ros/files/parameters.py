@@ -38,7 +38,7 @@ _KEY = 'parameter'
 Schema = dict[str, Any]
 
 Parts = Mapping[str, Sequence[str]]
-"""For each kind of part the names that there are."""
+"""The existing names for each kind of part."""
 
 KINDS = {
     'joint': 'published joint',
@@ -48,10 +48,10 @@ KINDS = {
     'body': 'link or the ground',
     'point': 'point: LINK.POINT',
 }
-"""Parts that a parameter can name, and what they are called."""
+"""Kinds of parts that a parameter can name, and their terms in messages."""
 
 CHARACTER = r'[^\u0000-\u001f\u007f-\u00a0\u2028\u2029]'
-"""Pattern of a character that prints."""
+"""Pattern of a printable character."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -162,7 +162,7 @@ def _parquet(stream: BinaryIO, heads: Sequence[str], whole: Sequence[str]) -> It
 KINDS: dict[
     str, Callable[[BinaryIO, Sequence[str], Sequence[str]], AbstractContextManager[Write]]
 ] = {'.csv': _csv, '.parquet': _parquet}
-"""Ending of a file, and what writes it."""
+"""Writer for each suffix of a file."""
 
 
 _MOST = 1000

@@ -32,10 +32,10 @@ from linkage_ros.files.section import LinedDict, Section
 import yaml
 
 MOST_VALUES = 200_000
-"""How many values a text may hold, keys, lists and mappings among them: some ten seconds."""
+"""Most values in a text, including keys, lists and mappings; parsing takes some ten seconds."""
 
 DEEPEST = 100
-"""How many levels it may have."""
+"""Greatest number of nested levels."""
 
 _LONGEST_INTEGER = 100
 

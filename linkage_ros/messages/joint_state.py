@@ -234,7 +234,7 @@ class OwnJointStates:
 _COUNT = Struct('<I')
 
 _NO_FRAME = packed(declared('Time stamp, string frame_id'), {})[STAMP_END:].ljust(8, b'\0')
-"""The bytes between the stamp and the count of the names: an empty frame_id."""
+"""Bytes between the stamp and the count of the names: an empty frame_id."""
 
 _COUNT_AT = STAMP_END + len(_NO_FRAME)
 _FIRST_NAME = _COUNT_AT + _COUNT.size

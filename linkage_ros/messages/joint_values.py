@@ -59,7 +59,7 @@ UNITS = {
     FORCE_Y: ('N', 'N'),
     TORQUE: ('N·m', 'N·m'),
 }
-"""Of each quantity the unit where the joint turns, and where it slides."""
+"""Unit of each quantity for a revolute joint, and for a sliding one."""
 
 MALFORMED = Rejection.MALFORMED.value
 UNEQUAL = Rejection.UNEQUAL.value
@@ -148,10 +148,10 @@ class MessageValues:
 
 
 _Column = tuple[Numbers, Sequence[str], Sequence[tuple[int, str]]]
-"""An array, the joints of its elements, and which number of an element is which quantity."""
+"""An array, the joints of its elements, and the quantity of each number of an element."""
 
 _Parsed = tuple[Sequence[str], Sequence[_Column], int]
-"""All joints, the arrays, and how many numbers an element has."""
+"""All joints, the arrays, and the number of numbers per element."""
 
 
 def _joint_state(data: bytes, dependent: Collection[str] = ()) -> _Parsed | str:
@@ -203,7 +203,7 @@ _PARSERS: dict[str, Callable[[bytes], _Parsed | str]] = {
 }
 
 TYPES = tuple(_PARSERS)
-"""Types of messages that can be read."""
+"""Message types that can be read."""
 
 
 def _texts(names: Sequence[bytes]) -> list[str]:

@@ -40,15 +40,15 @@ NANOSECONDS = 1_000_000_000
 """A second, in [ns]."""
 
 ENCAPSULATION = b'\x00\x01\x00\x00'
-"""The first bytes of a message that is written here: little-endian, no options."""
+"""First bytes of a message written here: little-endian, no options."""
 
 STAMP_END = 12
-"""Where a stamp ends that begins a message: two numbers of four bytes."""
+"""End of the stamp at the start of a message: two numbers of four bytes."""
 
 _TEXT = 's'
 _COUNT = 'I'
 _COUNTS = {b'\x00\x00': Struct('>I'), b'\x00\x01': Struct('<I')}
-"""What reads a count, by the encapsulation."""
+"""Reader of a count, by encapsulation."""
 
 _KINDS = {
     'bool': 'B',
@@ -67,7 +67,7 @@ _KINDS = {
     'UVCoordinate': '2f',
     'string': _TEXT,
 }
-"""What a type holds: numbers of one size, as `struct` has them, or a text."""
+"""Content of a type: numbers of one size, by their `struct` format, or a string."""
 
 
 class Field(NamedTuple):

@@ -108,7 +108,7 @@ def run_demo_node(
 
 _LOOK = 0.1
 _OLDEST = 0.1
-"""A state that came longer ago is none, in [s]."""
+"""Greatest age of a joint state that is still used, in [s]."""
 
 
 class PDController(DemoNode):

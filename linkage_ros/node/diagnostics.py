@@ -46,14 +46,14 @@ OK, WARN, ERROR, STALE = (
 _RATE_TOLERANCE = 0.1
 
 CLOCK_PATIENCE = 2.0
-"""For how long ``/clock`` may be silent, in [s] of the machine."""
+"""How long ``/clock`` may be silent without a warning, in [s] of the steady clock."""
 
 _NEARNESS = {
     'transmission_angle': 'Transmission angle (rad)',
     'conditioning': 'Conditioning',
     'toggle_distance': 'Input to the nearest toggle ({unit})',
 }
-"""What is told of `Closure.singularity_margin`, and as what."""
+"""Attributes of `Closure.singularity_margin` in the diagnostics, with their keys."""
 
 
 @dataclass(frozen=True, slots=True)

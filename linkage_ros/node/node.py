@@ -129,12 +129,12 @@ class LinkageNode(LifecycleNode):
         super().__init__('linkage_node', **options)
         declare_parameters(self)
         self.failure: LinkageError | None = None
-        """Why the node could not be configured."""
+        """Reason why the node could not be configured."""
         self.recording = RunRecording(self.get_logger())
         self.scene: Scene | None = None
         self._closures: list[Closure] = []
         self.loop: TickLoop | None = None
-        """The tick of this run, or of the last; nothing before the first."""
+        """Tick loop of this run, or of the last one; None before the first."""
 
         overridable = QoSOverridingOptions.with_default_policies()
         self._joint_states = self.create_publisher(

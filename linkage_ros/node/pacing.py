@@ -30,13 +30,13 @@ from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 CATCH_UP = 20_000_000
-"""How far ticks may lag, in [ns], and all still be made up for; beyond it they are lost."""
+"""Lag up to which late ticks still run, in [ns]; beyond it they are lost."""
 
 _FINE = 20_000_000
-"""The last part of a wait, in [ns], that is slept through whole; before it a stop is heeded."""
+"""Last part of a wait, in [ns], that cannot be interrupted; a stop is checked before it."""
 
 _LONGEST_WAIT = 100_000_000
-"""How long a wait for a message may last, in [ns], before a stop is heeded."""
+"""Longest wait for a message, in [ns], between two checks for a stop."""
 
 
 def steady(rate: float) -> Pace:

@@ -36,7 +36,7 @@ from linkage_ros.errors import LinkageError
 _BATCH = 256
 _BATCH_SIZE = 2**20
 _BATCHES = 8
-"""How many batches of how many messages, or bytes, are read ahead."""
+"""Limits of reading ahead: batches, and messages and bytes per batch."""
 
 _LOOK = 0.1
 
@@ -171,10 +171,10 @@ def read_ahead(
 
 
 LATE = 10_000_000
-"""How long after it was due a message is sent that counts as late, in [ns]."""
+"""Delay after the due time beyond which a sent message counts as late, in [ns]."""
 
 _FINE = 20_000_000
-"""The last part of a wait, in [ns], that is slept through whole; before it a stop is heeded."""
+"""Last part of a wait, in [ns], that cannot be interrupted; a stop is checked before it."""
 
 _LONGEST_WAIT = 60.0  # [s]; `Event.wait` has an upper limit
 _TOLD_EVERY = 250_000_000

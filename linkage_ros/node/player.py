@@ -50,10 +50,10 @@ CLOCK = '/clock'
 _SWITCH_INTERVAL = 1e-4
 _LOOK = 0.05
 _ACQUAINTANCE = 0.3
-"""How long who listens may take to know of a publisher that knows of it already, in [s]."""
+"""Time that a subscriber may take to match a publisher that has matched it, in [s]."""
 
 _DELIVERY = 1.0
-"""How long at the end is waited for those that have not confirmed the last messages, in [s]."""
+"""Longest wait at the end for subscribers to confirm the last messages, in [s]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,7 +44,7 @@ EXIT_OK, EXIT_INCOMPLETE, EXIT_CONFIGURATION = 0, 1, 2
 _SWITCH_INTERVAL = 1e-4
 _LOOK = 0.1
 _AFTER_FAILURE = 0.01
-"""How long the executor rests, in [s], lest it does nothing but fail."""
+"""Pause of the executor after a failure, in [s], so that it does not fail continuously."""
 
 
 class View(Protocol):

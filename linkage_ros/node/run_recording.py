@@ -56,14 +56,14 @@ from linkage_ros.scene.scene import RecordParameters, Scene
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
-"""How a run is recorded that a service asks for where the scene says nothing."""
+"""Recording settings for a service call if the scene has none."""
 
 
 EXTRA = 'extra'
-"""The key of a topic of which there may be several."""
+"""Key of the auxiliary topics, of which there may be several."""
 
 DESCRIPTION = 'description_topic'
-"""The key of the topic of the robot model."""
+"""Key of the robot model's topic."""
 
 
 class RunRecording:
@@ -80,14 +80,14 @@ class RunRecording:
     def __init__(self, logger: RcutilsLogger) -> None:
         self._logger = logger
         self.ended: list[RecordingSummary] = []
-        """The recordings that have ended, and the snapshots."""
+        """Summaries of finished recordings and snapshots."""
         self.memories: list[MemorySummary] = []
-        """The memories that have ended."""
+        """Summaries of finished memories."""
         self.failure = ''
-        """Why a recording is not whole, or could not be started; '' while all are."""
+        """Reason why a recording is incomplete or could not be started; '' otherwise."""
         self._seen: tuple[RecordingError, bool] | None = None
         self.snapshots: RunSnapshots | None = None
-        """The memory; nothing where a bag is written as the run goes."""
+        """The memory; None when a bag is recorded continuously."""
 
     def start(
         self,

@@ -27,7 +27,7 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 
 Answer = Callable[[bool, str], None]
-"""Takes whether something went well, and what came of it, as one line."""
+"""Takes whether the call succeeded, and the outcome as one line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,11 +97,11 @@ class RunSnapshots:
     def __init__(self, memory: SnapshotMemory, new_bag: Callable[[bool], BagWriter]) -> None:
         self.memory = memory
         self.written = self.failed = 0
-        """How many there are; one that was written in part has failed."""
+        """Number of written snapshots; a partly written one counts as failed."""
         self.last = ''
-        """The folder of the last one that was written."""
+        """Folder of the last written snapshot."""
         self.failure = ''
-        """Why the last one failed; '' if it did not."""
+        """Reason why the last snapshot failed; '' if it did not."""
         self._new_bag = new_bag
         self._writing: SnapshotWriting | None = None
         self._answer: Answer

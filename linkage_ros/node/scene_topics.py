@@ -43,16 +43,16 @@ if TYPE_CHECKING:
     from linkage_ros.faults.injection import Change
 
 CRANK_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Sensor data, but deeper: at a slow tick every sample still gets into the bag."""
+"""Sensor data QoS with a deeper queue: even at a slow tick every sample gets into the bag."""
 
 OUTPUT_QOS = QoSProfile(depth=10)
-"""Reliable, volatile, as robot_state_publisher and RViz take it."""
+"""Reliable and volatile, as robot_state_publisher and RViz expect."""
 
 _DESCRIPTION_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""As robot_state_publisher and RViz take a robot model, at whatever time they start."""
+"""As robot_state_publisher and RViz expect of a robot model, whenever they start."""
 
 _CHANGES_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""One who joins later has to know which faults are on."""
+"""A late subscriber has to know which faults are on."""
 
 Inject = Callable[[str, SetBool.Request, SetBool.Response], SetBool.Response]
 
@@ -77,13 +77,13 @@ class SceneTopics:
         self._changes: Publisher | None = None
         self._description: Publisher | None = None
         self.description = b''
-        """The message with the robot model, serialized; empty where the scene asks for none."""
+        """Serialized message with the robot model; empty if the scene asks for none."""
         self._injectors: list[Any] = []
         self.extras: list[Publisher] = []
-        """Publishers of the pipeline's extras."""
+        """Publishers of the pipeline's auxiliary topics."""
         self._crank_name = ''
         self.crank: Subscription | None = None
-        """To the topic that the drives listen to; nothing where they listen to none."""
+        """Subscription to the drives' topic; None without one."""
 
     def connect(self, pipeline: Pipeline) -> None:
         """

@@ -47,9 +47,9 @@ class ClockGuard:
     def __init__(self, source: TimeSource) -> None:
         self._pass_on: Callable[[ClockMessage], None] = source.clock_callback
         self.refused = 0
-        """How many messages held no time."""
+        """Number of messages without a valid time."""
         self.heard = 0
-        """When the last came that held one, by the steady clock, in [ns]; 0 before the first."""
+        """Arrival of the last valid message, by the steady clock, in [ns]; 0 before the first."""
         # For a subscription made later, and for an existing one.
         source.clock_callback = self._look  # type: ignore[method-assign, assignment]
         if source._clock_sub is not None:  # noqa: SLF001 (rclpy offers no other way)

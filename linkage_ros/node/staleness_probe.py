@@ -49,7 +49,7 @@ from sensor_msgs.msg import JointState
 
 _MATCHING = 20.0  # [s]
 _LEAD = 300_000_000
-"""Before the first use the crank stands where the motion starts, in [ns]."""
+"""Time that the crank rests at the start of the motion before the first use, in [ns]."""
 
 
 class TableRequest(NamedTuple):

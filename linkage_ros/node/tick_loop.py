@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 _STEPS = 5
-"""Bits that are kept of a duration: a bin is at most 1/32 wide of its value."""
+"""Leading bits kept of a duration: the width of a bin is at most 1/32 of its value."""
 
 
 class DurationHistogram:
@@ -134,7 +134,7 @@ def recorded_topics(pipeline: Pipeline) -> RecordedTopics:
 
 
 _LONGEST_DRAIN = 20_000_000
-"""How long a tick takes messages at most, in [ns]: huge ones, each read for the first time."""
+"""Longest time that a tick takes messages, in [ns]; reached with huge, unparsed messages."""
 
 
 @dataclass(slots=True)
@@ -150,26 +150,26 @@ class Counts:
     clock_jumps: int = 0
     resets: int = 0
     received: int = 0
-    """Messages on the drives' topic: used + superseded + ignored + those rejected."""
+    """Messages on the drives' topic: used + superseded + ignored + rejected."""
     used: int = 0
     superseded: int = 0
-    """Good ones of which the same tick took a newer."""
+    """Good messages followed by a newer one in the same tick."""
     ignored: int = 0
-    """Those that do not name the crank: others may share the topic."""
+    """Messages without the crank's joints: other publishers may share the topic."""
     missed: int = 0
-    """Numbers left out where one publisher counts its messages."""
+    """Gaps in the sequence numbers of a single publisher."""
     rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
     lateness: DurationHistogram = field(default_factory=DurationHistogram)
     last: Tick | None = None
     unclosed: dict[Status, int] = field(default_factory=lambda: dict.fromkeys(Status, 0))
     last_unclosed: dict[Status, tuple[int, Position]] = field(default_factory=dict)
-    """Number of the linkage and its position, where one had the status last."""
+    """Index and position of the linkage that had each status last."""
 
 
 _Taken = tuple[bytes, dict[str, Any]]
 Take = Callable[[], _Taken | None]
 Pace = Callable[['TickLoop', Event], None]
-"""Runs a tick loop until the event: waits, and calls `tick_at` or `tick_samples`."""
+"""Runs a tick loop until the event is set: waits, and calls `tick_at` or `tick_samples`."""
 
 
 def _take_nothing() -> None:
@@ -221,7 +221,7 @@ class TickLoop:
         self.injection = self._pipeline.injection
         self._publish_change = publish_change
         self.topics = recorded_topics(self._pipeline)
-        """The handles by which it offers messages to the recorder."""
+        """Handles under which the tick offers messages to the recorder."""
         self._publish_extras = tuple(zip(self.topics.extras, publish_extras, strict=True))
         self._stopping = Event()
         self._thread: Thread | None = None
@@ -229,7 +229,7 @@ class TickLoop:
         self.recorder: Recorder | None = None
         self.reset_requested = False
         self.several_publishers = False
-        """Whether more than one was seen on the drives' topic: their numbers go apart."""
+        """Whether the drives' topic ever had several publishers, each with its own numbers."""
         self.failure = ''
         self._begun = 0
         self.seconds = 0.0

@@ -36,10 +36,10 @@ _SAID = (
     'FASTDDS_DEFAULT_PROFILES_FILE',
     'RMW_FASTRTPS_PUBLICATION_MODE',
 )
-"""With one of these the user says how messages are carried."""
+"""Environment variables with which the user configures the transports."""
 
 _PROFILES = 'DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml'
-"""With one of these in the working folder, too."""
+"""Files in the working folder with the same purpose."""
 
 _SHARED = re.compile(r'/(?:fastrtps|fastdds)_port\d+$', re.MULTILINE)
 

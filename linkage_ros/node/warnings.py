@@ -52,7 +52,7 @@ _REMEDIES = {
 
 
 _PATIENCE = 2.0
-"""How long nobody is told that the crank has not come yet, in [s]."""
+"""Time without a warning about a missing crank, in [s]."""
 
 
 class Warnings:

@@ -68,16 +68,16 @@ if TYPE_CHECKING:
     from linkage_ros.solvers.solver import Choice
 
 _WITHHOLDING = {'rate_limit', 'dropout', 'delay', 'jitter'}
-"""Effects that may leave a tick without a message."""
+"""Effects that may suppress the message of a tick."""
 
 _GOING_ON = {'backlash'}
-"""Effects that go on where a linkage is open."""
+"""Effects that keep running while a loop is open."""
 
 _KINEMATIC = ('velocity', 'acceleration')
-"""Stages of the mechanism that a compiled linkage does itself, by its derivatives."""
+"""Stages of the mechanism that a compiled linkage computes itself, by its derivatives."""
 
 _OF_FORCES = {'pin_forces'}
-"""Effects whose messages are made of the forces in the joints alone."""
+"""Effects whose messages contain joint forces only."""
 
 
 class LinkageTick(NamedTuple):
@@ -225,7 +225,7 @@ class LinkagePipeline:
         computed = named | {need for effect in starting for need in needs(effect)}
         effects = [effect_of(name) for name in in_order(computed)]
         self.stages = tuple(effect.name for effect in effects)
-        """Names of the effects that are computed, in physical order."""
+        """Names of the computed effects, in physical order."""
         forced = drive == 'torque' or not computed.isdisjoint(FORCE_EFFECTS)
         _refuse_idle(member, forced)
         _refuse_solver(member, forced)
@@ -251,7 +251,7 @@ class LinkagePipeline:
 
         # Crank.
         self.topic: str = getattr(drive_module, 'TOPIC', '')
-        """Topic that the drive listens to; '' for none."""
+        """Topic of the drive; '' for none."""
         self.drive: Drive = drive_module.build(drive_parameters, context)
         self._read_message = drive_module.reader(context) if self.topic else None
         self._spoil = injection.build('message') if injection is not None else []
@@ -595,7 +595,7 @@ class Pipeline:
 
             injection = Injection(scene.faults)
         self.injection = injection
-        """The faults; nothing where the scene has none."""
+        """The faults; None if the scene has none."""
         self.lines = [
             LinkagePipeline(scene, member, closures[number] if closures else None, injection)
             for number, member in enumerate(scene.members)
@@ -609,7 +609,7 @@ class Pipeline:
             )
         _refuse_stamps(scene)
         self.topic = topics[0] if topics else ''
-        """The topic that the drives listen to; '' for none."""
+        """The topic of the drives; '' for none."""
         # Among the drives, only the topic drive keeps no state from earlier ticks.
         self._goes_on = any(
             line.member.drive[0] != 'topic' or not _GOING_ON.isdisjoint(line.stages)
@@ -620,13 +620,13 @@ class Pipeline:
             or injection is not None
             or any(not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines)
         )
-        """Whether there may be ticks without a message of which a replay has to know."""
+        """Whether ticks without a message may matter to a replay."""
         self._routes = SampleRouter({line: line.member.inputs for line in self.lines})
         self._offered = 0
         self._newest: dict[LinkagePipeline, int] = {}
         self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
         self.tick = self._ticking()
-        """Ticks at a time, in [ns]."""
+        """Computes the tick at a time, in [ns]."""
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """

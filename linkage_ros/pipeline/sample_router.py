@@ -24,10 +24,10 @@ from linkage_ros.messages.joint_state import head_of
 from linkage_ros.messages.layout import STAMP_END
 
 _MOST = 1000
-"""How many kinds of messages are remembered; a bound against one who sends ever new names."""
+"""Most kinds of messages in the cache; a limit against ever new names."""
 
 _LONGEST = 100_000
-"""Where names may end at most that are remembered, in bytes; a bound against huge messages."""
+"""Greatest end of the names for the cache [bytes]; a limit against huge messages."""
 
 Receiver = TypeVar('Receiver')
 
@@ -49,7 +49,7 @@ class SampleRouter(Generic[Receiver]):
         self._all = tuple(wanted)
         self._wanted = {to: {joint.encode() for joint in joints} for to, joints in wanted.items()}
         self._ends: dict[int, list[int]] = {}
-        """For each length of a message where the names may end in it."""
+        """Possible ends of the names, by length of the message."""
         self._found: dict[bytes, tuple[Receiver, ...]] = {}
 
     def find(self, message: bytes) -> tuple[Receiver, ...]:

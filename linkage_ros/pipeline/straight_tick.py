@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 _CRANK = ', '.join(CrankState._fields)
 
 Plain = Callable[[int, CrankState | None], Any]
-"""Does a tick at a time, in [ns], from the crank on, step by step."""
+"""Computes a tick at a time, in [ns], step by step from the given crank state on."""
 
 
 class Seen(NamedTuple):

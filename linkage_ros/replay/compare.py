@@ -111,13 +111,13 @@ class TopicComparison:
     def __init__(self, name: str, message_type: str) -> None:
         self.name = name
         self.recorded = self.same = self.but_turns = self.different = 0
-        """Messages in the bag; of these the same, the same but for whole turns, and others."""
+        """Messages in the bag: the same, the same up to whole turns, and different."""
         self.gone = self.not_recorded = 0
-        """Messages in the bag of which there is none now, and the other way round."""
+        """Messages in the bag that were not reproduced, and the reverse."""
         self.deviations: dict[Key, Deviation] = {}
         self.only_recorded: dict[str, None] = {}
         self.only_now: dict[str, None] = {}
-        """Joints that only one of the two has."""
+        """Joints that only one of the two runs has."""
         self._then, self._now = MessageValues(message_type), MessageValues(message_type)
         self._last: tuple[Key, ...] = ()
         self._in_last = 0
@@ -204,12 +204,12 @@ class Comparison:
     ) -> None:
         self.topics = [TopicComparison(name, kind) for name, kind in topics]
         self.ticks = self.differing = 0
-        """How many ticks were compared, and how many of them differ."""
+        """Numbers of compared and of different ticks."""
         self.withheld = 0
-        """How many ticks are without a message, then and now."""
+        """Numbers of ticks without a message, recorded and now."""
         self.first: First | None = None
         self.last: At | None = None
-        """The last tick that differs."""
+        """Last tick that differs."""
         self._turning = turning or {}
 
     def add(self, at: At, recorded: Sequence[bytes], now: Sequence[bytes]) -> None:

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 
 _LARGEST_LEAD = 2 * 3600 * 1_000_000_000
-"""No sample that was taken was as far ahead of its tick, in [ns]."""
+"""Bound on the lead of a sample's stamp over its tick, in [ns]."""
 
 
 class Remade(NamedTuple):
@@ -110,9 +110,9 @@ class Counterfactual:
         self._pipeline = Pipeline(scene, None, self._injection)
         self._closures = self._pipeline.closures
         self.extras = self._pipeline.extras
-        """Its topics beside the joint states."""
+        """Auxiliary topics of the scene."""
         self.withholds = self._pipeline.withholds
-        """Whether there may be ticks of which a replay has to know, and without a message."""
+        """Whether ticks without a message may matter to a replay."""
         self._seen = self._last = 0  # the log times of the last event, and of what was written
         self._period = round(1e9 / scene.rate) if scene.rate else 0
         theirs = recorded.rate if recorded is not None else 0.0

@@ -40,9 +40,8 @@ IDENTICAL, DIFFERENT, UNTOLD = 'identical', 'different', 'cannot be told'
 
 _NEVER_FOUND_AGAIN = ('rate_limit', 'noise', 'jitter', 'dropout')
 """
-Effects whose memory does not come back: generators, and the time of the first tick. So with an
-incremental encoder, which counts from where it was switched on, and with markers that leave a
-trace.
+Effects whose state is not recovered: random generators, and the time of the first tick. So for an
+incremental encoder, which counts from power-on, and for markers with a trail.
 """
 
 

@@ -51,19 +51,19 @@ from linkage_ros.scene.scene import (
 from linkage_ros.solvers.registry import SOLVERS
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
-"""Names of the files of a scene where a bag carries them; further linkages are numbered."""
+"""Names of a scene's files in a bag; further linkage files are numbered."""
 
 LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
-"""Ticks a second, in [Hz]: of these the higher is what a core was measured to hold."""
+"""Bounds of the tick rate, in [Hz]; the higher was measured as what one core sustains."""
 
 _MOST_LINKAGES = 400
-"""A hundred take a core at 1 kHz."""
+"""A hundred linkages at 1 kHz fill a core."""
 
 FINEST_ACCURACY, COARSEST_ACCURACY = 1e-12, 1e-2
 """Bounds of `accuracy`, in [rad] or [m]."""
 
 STRONGEST_SPRING, STIFFEST = 1e9, 1e12
-"""No machine has larger loads, in [N], [m], [kg·m²], or larger stiffness, in [N/m] or [N·s/m]."""
+"""Bounds on loads, in [N], [m], [kg·m²], and on stiffness, in [N/m] or [N·s/m]."""
 
 _WHEN = ('at', 'seconds')
 
@@ -294,10 +294,10 @@ _OF_A_MEMBER = (
     'accuracy',
     'beyond_limits',
 )
-"""What an entry of ``linkages`` may say for itself, and the scene for all that do not."""
+"""Keys of an entry of ``linkages``; the scene has them for the entries without."""
 
 _OF_A_SCENE = ('rate', 'angles', 'seed', 'faults', 'record', 'robot_description', *_OF_A_MEMBER)
-"""What a scene may say beside the linkages that it names."""
+"""Keys of a scene beside the linkages."""
 
 
 def _member(

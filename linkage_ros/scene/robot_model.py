@@ -24,7 +24,7 @@ from linkage_ros.robot_models.part import Part, PartError
 from linkage_ros.scene.scene import Scene
 
 Write = Callable[[str, Sequence[Part]], bytes]
-"""Writes a model of a name and its linkages."""
+"""Writes the robot model of some linkages, with a name."""
 
 
 def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> bytes:

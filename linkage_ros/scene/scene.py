@@ -37,10 +37,10 @@ Each file begins with the scene, the linkages and the types, and costs the disk 
 """
 
 LEASTS: Mapping[str, float] = {**SPLITS, 'snapshot_seconds': 0.1}
-"""What may be 0, for never, and else has to be so much at least."""
+"""Least value of a setting that may also be 0, for never."""
 
 AS_THE_RUN_GOES = ('queue', 'flush_period', *SPLITS, 'keep_files')
-"""What has no meaning where a run is kept in memory, and written in one go."""
+"""Settings without effect if the run is kept in memory and written at once."""
 
 _DEFAULT = Storage()
 
