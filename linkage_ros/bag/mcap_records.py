@@ -518,10 +518,10 @@ class DataSection:
             at = end
 
     def _crc_to(self, end: int) -> int:
-        found = 0
+        crc = 0
         for place in range(0, end, _WINDOW):
-            found = crc32(self.source.read(place, min(_WINDOW, end - place)), found)
-        return found
+            crc = crc32(self.source.read(place, min(_WINDOW, end - place)), crc)
+        return crc
 
     def _fits(self, at: int, inner: int, end: int, crc: int) -> bool:
         """Return whether a record ends where its content does; required without a checksum."""
@@ -605,7 +605,7 @@ def index_of(source: Source) -> FileIndex:
     if crc and crc32(footer[:-4], crc32(content)) != crc:
         raise DamagedError("its index's checksum does not fit")
     definitions = Definitions()
-    found: dict[Any, list[Any]] = {kind: [] for kind in _KINDS.values()}
+    by_kind: dict[Any, list[Any]] = {kind: [] for kind in _KINDS.values()}
     places = set()
     at = number = 0
     while at < len(content):
@@ -624,7 +624,7 @@ def index_of(source: Source) -> FileIndex:
                 if place in places:
                     raise DamagedError(f'its index names the record at byte {place:,} twice')
                 places.add(place)
-            found[_KINDS[opcode]].append(record)
+            by_kind[_KINDS[opcode]].append(record)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             definitions.add(opcode, content[at:end])
         at = end
@@ -632,8 +632,8 @@ def index_of(source: Source) -> FileIndex:
         start=start,
         checked=bool(crc),
         definitions=definitions,
-        chunks=tuple(found[ChunkIndex]),
-        attachments=tuple(found[AttachmentIndex]),
-        metadata=tuple(found[MetadataIndex]),
-        statistics=found[Statistics][-1] if found[Statistics] else None,
+        chunks=tuple(by_kind[ChunkIndex]),
+        attachments=tuple(by_kind[AttachmentIndex]),
+        metadata=tuple(by_kind[MetadataIndex]),
+        statistics=by_kind[Statistics][-1] if by_kind[Statistics] else None,
     )

@@ -128,10 +128,10 @@ class LogTimeOrder:
                 held -= len(message.data) + _BESIDE
                 yield message
                 continue
-            for index, found in enumerate(self._read(number, place), 1):
-                if found.log_time >= since:
-                    held = self._hold(held, found)
-                    heappush(heap, (found.log_time, number, place, index, found))
+            for index, following in enumerate(self._read(number, place), 1):
+                if following.log_time >= since:
+                    held = self._hold(held, following)
+                    heappush(heap, (following.log_time, number, place, index, following))
 
     def _ordered(self, messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
         """Yield messages by log time, each as soon as one is a window later."""
@@ -165,10 +165,10 @@ class LogTimeOrder:
         try:
             with file.open('rb') as stream:
                 content = content_of(chunk_at(Source(stream), place))
-            found = messages_in(content, self._definitions[number])
+            messages = messages_in(content, self._definitions[number])
             return [
                 BagMessage(each.channel.topic, each.log_time, each.publish_time, each.data)
-                for each in found
+                for each in messages
             ]
         except OSError as error:
             raise unreadable(file, error) from None

@@ -307,10 +307,10 @@ class Bag:
         """
         for file in self.files:
             until_damage = self.truncated and file == self.files[-1]
-            for found in _contents(file, Definitions(), _untold, until_damage=until_damage):
-                if isinstance(found, Message):
+            for record in _contents(file, Definitions(), _untold, until_damage=until_damage):
+                if isinstance(record, Message):
                     yield BagMessage(
-                        found.channel.topic, found.log_time, found.publish_time, found.data
+                        record.channel.topic, record.log_time, record.publish_time, record.data
                     )
 
 
@@ -397,7 +397,7 @@ def _description(
                 )
     definitions = Definitions()
     contents = _contents(file, definitions, told, until_damage=not finished)
-    return definitions, *_kept(found for found in contents if isinstance(found, Attachment))
+    return definitions, *_kept(record for record in contents if isinstance(record, Attachment))
 
 
 def _kept(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str]]:
@@ -430,9 +430,9 @@ def _contents(
             while not data.finished:
                 told(at)
                 records, end = data.take(at)
-                for found in records:
-                    messages += isinstance(found, Message)
-                    yield found
+                for record in records:
+                    messages += isinstance(record, Message)
+                    yield record
                 at = end
         except DamagedError as error:
             if until_damage and not finished:

@@ -386,12 +386,12 @@ def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> l
             files = _in_order(named, [file for file in there if file not in named])
     else:
         files = [path]
-    found = []
+    present = []
     for file in files:
         try:
             if file.is_file():
                 with file.open('rb'):
-                    found.append(file)
+                    present.append(file)
                 continue
             reason = 'is no file' if file.exists() else 'does not exist'
         except OSError as error:
@@ -401,10 +401,10 @@ def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> l
         findings.losses.append((file.name, Loss(0, 0, reason)))
     findings.remarks += [
         f'{file.name} is still being written; what comes after this is not in the new bag'
-        for file in found
+        for file in present
         if is_in_use(file)
     ]
-    return found
+    return present
 
 
 def _in_order(named: Sequence[Path], others: Sequence[Path]) -> list[Path]:
@@ -420,10 +420,10 @@ def _foretaste(path: Path, files: Sequence[Path], stopped: Stopped) -> tuple[str
     for file in files:
         with file.open('rb') as stream:
             salvage = Salvage(Source(stream))
-            for found in salvage.found():
+            for record in salvage.found():
                 anything = True
-                if isinstance(found, Message):
-                    ros = found.channel.message_encoding == 'cdr'
+                if isinstance(record, Message):
+                    ros = record.channel.message_encoding == 'cdr'
                     return 'ros2' if ros else salvage.data.profile, salvage.data.compression
                 if stopped():
                     break
@@ -455,8 +455,8 @@ def _save(file: Path, bag: NewBag, findings: _Findings) -> Iterator[int]:
         salvage = Salvage(Source(stream))
         definitions = salvage.data.definitions
         told = 0
-        for found in salvage.found():
-            bag.add(found, definitions)
+        for record in salvage.found():
+            bag.add(record, definitions)
             if salvage.seen != told:
                 told = salvage.seen
                 yield told

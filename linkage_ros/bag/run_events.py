@@ -142,19 +142,19 @@ def run_account(bag: Bag) -> RunAccount:
         raise BagError(
             bag.path, f'carries no {RUN_FILE}', 'name a bag that linkage_ros has recorded'
         )
-    said = run_said(bag)
-    extras = said.get('extra_topics', [])
+    account = run_said(bag)
+    extras = account.get('extra_topics', [])
     texts = {
         key: value
-        for key, value in said.items()
+        for key, value in account.items()
         if key in (*_TEXTS, BEGUN, *VERSIONS) and isinstance(value, str)
     }
     missing = {'scene', 'joint_states_topic'} - set(texts)
-    wrong = (said.keys() & {*_TEXTS, BEGUN}) - set(texts)
-    solvers = said.get(CHOSEN, {})
+    wrong = (account.keys() & {*_TEXTS, BEGUN}) - set(texts)
+    solvers = account.get(CHOSEN, {})
     topics = [value for key, value in texts.items() if key.endswith('_topic')]
     named = _are_names(topics) and _are_names(extras)
-    seed = said.get(SEED, 0)
+    seed = account.get(SEED, 0)
     if missing or wrong or not named or not isinstance(solvers, dict) or type(seed) is not int:
         raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag')
     # Only displayed; the name of a file may contain any character.
@@ -166,14 +166,16 @@ def run_account(bag: Bag) -> RunAccount:
         begun=texts.get(BEGUN, ''),
         versions={key: texts[key] for key in VERSIONS if key in texts},
         solvers=solvers,
-        own_effects=_own_effects(said),
+        own_effects=_own_effects(account),
         seed=seed,
     )
 
 
-def _own_effects(said: Mapping[str, Any]) -> dict[str, str]:
-    found = said.get(OWN_EFFECTS)
-    return {name: str(which) for name, which in found.items()} if isinstance(found, dict) else {}
+def _own_effects(account: Mapping[str, Any]) -> dict[str, str]:
+    modules = account.get(OWN_EFFECTS)
+    return (
+        {name: str(which) for name, which in modules.items()} if isinstance(modules, dict) else {}
+    )
 
 
 _TEXTS = (
@@ -199,10 +201,10 @@ def run_said(bag: Bag) -> dict[str, Any]:
     """Return the run's account as stored in its bag; empty if it is damaged."""
     try:
         text = bag.attachments[RUN_FILE]
-        said = json.loads(text) if len(text) <= _LONGEST_ACCOUNT else {}
+        account = json.loads(text) if len(text) <= _LONGEST_ACCOUNT else {}
     except (KeyError, ValueError, RecursionError):
         return {}
-    return said if isinstance(said, dict) else {}
+    return account if isinstance(account, dict) else {}
 
 
 def recorded_events(

@@ -120,9 +120,9 @@ def _end_of_file_at(source: Source, at: int) -> int:
     place = at + len(MCAP0_MAGIC)
     while place < source.size:
         window, size = _window(source, place)
-        found = window.find(MCAP0_MAGIC)
-        if found >= 0:
-            end = place + found + len(MCAP0_MAGIC)
+        offset = window.find(MCAP0_MAGIC)
+        if offset >= 0:
+            end = place + offset + len(MCAP0_MAGIC)
             return end if end < source.size else 0
         place += size
     return 0
@@ -254,17 +254,17 @@ class Salvage:
     def _counted(self, records: Iterable[Found], end: int) -> Iterator[Found]:
         """Pass on the records, and compute the length of the message indexes after them."""
         counts: Counter[int] = Counter()
-        for found in records:
-            if isinstance(found, Message):
-                counts[found.channel.id] += 1
-            yield found
+        for record in records:
+            if isinstance(record, Message):
+                counts[record.channel.id] += 1
+            yield record
         if counts:
             self._messages += counts.total()
             self._indexes_end = end + sum(15 + 16 * count for count in counts.values())
 
-    def _wanted(self, found: Iterable[Found]) -> Iterator[Found]:
+    def _wanted(self, items: Iterable[Found]) -> Iterator[Found]:
         """Pass on the records for the caller; keep those for internal use."""
-        for one in found:
+        for one in items:
             if isinstance(one, Attachment) and one.name == CHANNELS_FILE:
                 self._spare = definitions_in(one.data)
             else:

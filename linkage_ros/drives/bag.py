@@ -126,14 +126,15 @@ def read_samples(
     if topic and topic not in of_type:
         known = listed(of_type) or 'no other'
         raise BagError(bag.path, f'holds no topic {topic!r} of {_TYPE}', f'it holds {known}')
-    own = topic or _crank_topic_of_run(bag)
-    found = {
-        name: Samples(inputs, use, needs_rate) for name in ([own] if own in of_type else of_type)
+    crank_topic = topic or _crank_topic_of_run(bag)
+    samples_of = {
+        name: Samples(inputs, use, needs_rate)
+        for name in ([crank_topic] if crank_topic in of_type else of_type)
     }
     for name, _, _, data in bag.messages():
-        if name in found:
-            found[name].add(data)
-    good = {name: samples for name, samples in found.items() if len(samples)}
+        if name in samples_of:
+            samples_of[name].add(data)
+    good = {name: samples for name, samples in samples_of.items() if len(samples)}
     if len(good) == 1:
         (samples,) = good.values()
         return samples
@@ -145,16 +146,16 @@ def read_samples(
         )
     raise BagError(
         bag.path,
-        f'holds no crank sample of {listed(inputs)}{_why(found)}',
+        f'holds no crank sample of {listed(inputs)}{_why(samples_of)}',
         'name another bag, or its topic as drive.bag.topic',
     )
 
 
-def _why(found: Mapping[str, Samples]) -> str:
+def _why(samples_of: Mapping[str, Samples]) -> str:
     """Return the most frequent reason for rejected messages, for each topic."""
     reasons = (
         f'{name}: {samples.rejected.most_common(1)[0][0].value}'
-        for name, samples in found.items()
+        for name, samples in samples_of.items()
         if samples.rejected
     )
     return ''.join(f', {reason}' for reason in reasons)
@@ -162,8 +163,8 @@ def _why(found: Mapping[str, Samples]) -> str:
 
 def _crank_topic_of_run(bag: Bag) -> str:
     """Return the crank topic from the run's account in a bag; '' if the bag has none."""
-    said = run_said(bag).get('crank_topic')
-    return said if isinstance(said, str) else ''
+    name = run_said(bag).get('crank_topic')
+    return name if isinstance(name, str) else ''
 
 
 @dataclass(frozen=True, slots=True)

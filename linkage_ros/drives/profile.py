@@ -87,15 +87,15 @@ def extent(parameters: Profile) -> tuple[float, float]:
     """Return the least and the greatest value of an input, in [rad] or [m]."""
     values = [value for _, value in parameters.table]
     gain = values[-1] - values[0] if parameters.repeat else 0.0
-    found = list(values)
+    extremes = list(values)
     if parameters.interpolation == 'cubic':  # the others stay between their rows
         times = [time for time, _ in parameters.table]
         seconds = [after - before for before, after in pairwise(times)]
         for value, (c1, c2, c3, _, _) in zip(
             values, _polynomials(parameters, seconds), strict=False
         ):
-            found += [value + x * (c1 + x * (c2 + x * c3)) for x in _turns_at(c1, c2, c3)]
-    return (-inf if gain < 0.0 else min(found)), (inf if gain > 0.0 else max(found))
+            extremes += [value + x * (c1 + x * (c2 + x * c3)) for x in _turns_at(c1, c2, c3)]
+    return (-inf if gain < 0.0 else min(extremes)), (inf if gain > 0.0 else max(extremes))
 
 
 def _turns_at(c1: float, c2: float, c3: float) -> list[float]:
@@ -105,9 +105,9 @@ def _turns_at(c1: float, c2: float, c3: float) -> list[float]:
         return []
     # Of the two forms of a root, use the one without cancellation (Press et al., section 5.6).
     q = -(c2 + copysign(sqrt(root), c2))
-    found = [q / (3.0 * c3)] if c3 else []
-    found += [c1 / q] if q else []
-    return [x for x in found if 0.0 < x < 1.0]
+    roots = [q / (3.0 * c3)] if c3 else []
+    roots += [c1 / q] if q else []
+    return [x for x in roots if 0.0 < x < 1.0]
 
 
 def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:

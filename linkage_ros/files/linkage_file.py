@@ -279,14 +279,14 @@ def _closable(content: Section, linkage: Linkage, name: str, shorthand: str = ''
 def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
     """Return an expanded shorthand, with the limits that the shorthand gives to its joints."""
     driven, joints = written_out['input'], written_out['joints']
-    own = content.section('joints', required=False)
-    for name in own:
+    limited = content.section('joints', required=False)
+    for name in limited:
         if name not in joints:
-            raise own.error(
+            raise limited.error(
                 name, f'{quoted(name)} is no joint of it', f'name one of {listed(joints)}'
             )
     places = [(driven, content.section('input', required=False))]
-    places += [(joints[name], own.section(name)) for name in own]
+    places += [(joints[name], limited.section(name)) for name in limited]
     for joint, of in places:
         _limits(of)
         of.finish()

@@ -169,11 +169,11 @@ def _joint(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
 
 
 def _limits(limits: Limits) -> dict[str, Content]:
-    found: dict[str, Content] = {'limits': [limits.low, limits.high]} if limits.bounded else {}
+    bounds: dict[str, Content] = {'limits': [limits.low, limits.high]} if limits.bounded else {}
     for key in ('velocity', 'effort'):
         if isfinite(value := getattr(limits, key)):
-            found[key] = value
-    return found
+            bounds[key] = value
+    return bounds
 
 
 def _pose(linkage: Linkage) -> dict[str, Content]:

@@ -72,10 +72,10 @@ def read_regular(file: str | Path, largest: int) -> bytes:
         return stream.read(largest + 1)
 
 
-def _check(found: os.stat_result, file: str | Path) -> None:
-    if stat.S_ISREG(found.st_mode):
+def _check(status: os.stat_result, file: str | Path) -> None:
+    if stat.S_ISREG(status.st_mode):
         return
-    if stat.S_ISDIR(found.st_mode):
+    if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(file))
-    what = next((said for kind, said in _KINDS if kind(found.st_mode)), 'is no file')
+    what = next((reason for kind, reason in _KINDS if kind(status.st_mode)), 'is no file')
     raise OSError(EINVAL, f'{what}, not a regular file', str(file))

@@ -78,18 +78,18 @@ class JointEffortReader:
                 order, seconds, nanoseconds, names, rates, efforts, effort = unpack_from(data)
                 if (order, names, rates, efforts) == fixed:
                     return EffortCommand(seconds * NANOSECONDS + nanoseconds, effort)
-        found = _pattern(data, self._joint, self._dependent)
-        if isinstance(found, Rejection):
-            return found
-        self._known = found.size, found.unpack_from, found.fixed
+        layout = _pattern(data, self._joint, self._dependent)
+        if isinstance(layout, Rejection):
+            return layout
+        self._known = layout.size, layout.unpack_from, layout.fixed
         return self.read(data)
 
 
 def _pattern(data: bytes, joint: bytes, dependent: Collection[bytes]) -> Pattern | Rejection:
-    found = arrays_of(data)
-    if isinstance(found, Rejection):
-        return found
-    _, names, arrays = found
+    arrays_or_reason = arrays_of(data)
+    if isinstance(arrays_or_reason, Rejection):
+        return arrays_or_reason
+    _, names, arrays = arrays_or_reason
     efforts = arrays[-1]
     if not efforts.length:
         return Rejection.NO_EFFORT

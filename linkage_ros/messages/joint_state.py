@@ -121,10 +121,10 @@ class JointStateReader:
                         return Rejection.STAMP_INVALID
                     stamp = seconds * NANOSECONDS + nanoseconds
                     return CrankSample(stamp, pick_positions(values), pick_rates(values) or None)
-        found = _pattern(data, self._joints)
-        if isinstance(found, Rejection):
-            return found
-        self._known = *found[:4], *found.picks
+        layout = _pattern(data, self._joints)
+        if isinstance(layout, Rejection):
+            return layout
+        self._known = *layout[:4], *layout.picks
         return self.read(data)
 
 
@@ -139,10 +139,10 @@ def arrays_of(data: bytes) -> tuple[str, list[bytes], list[Numbers]] | Rejection
 
 
 def _pattern(data: bytes, joints: Sequence[bytes]) -> Pattern | Rejection:
-    found = arrays_of(data)
-    if isinstance(found, Rejection):
-        return found
-    _, names, arrays = found
+    arrays_or_reason = arrays_of(data)
+    if isinstance(arrays_or_reason, Rejection):
+        return arrays_or_reason
+    _, names, arrays = arrays_or_reason
     positions, rates, efforts = arrays
     if not names or not positions.length:
         return Rejection.EMPTY
@@ -248,19 +248,19 @@ def _names(joints: Sequence[str]) -> bytes:
 
 def head_of(data: bytes) -> tuple[set[bytes], int] | None:
     """Return the names in a message and the end of the names; None if malformed."""
-    found = arrays_of(data)
-    if isinstance(found, Rejection):
+    arrays_or_reason = arrays_of(data)
+    if isinstance(arrays_or_reason, Rejection):
         return None
-    _, names, arrays = found
+    _, names, arrays = arrays_or_reason
     return set(names), arrays[0].count_at
 
 
 def with_every_number(data: bytes, value: float) -> bytes:
     """Replace every position, rate and effort of a message; return a malformed one unchanged."""
-    found = arrays_of(data)
-    if isinstance(found, Rejection):
+    arrays_or_reason = arrays_of(data)
+    if isinstance(arrays_or_reason, Rejection):
         return data
-    order, _, arrays = found
+    order, _, arrays = arrays_or_reason
     spoilt = bytearray(data)
     for _, n, first in arrays:
         Struct(f'{order}{n}d').pack_into(spoilt, first, *(value,) * n)

@@ -127,12 +127,12 @@ class MessageValues:
                     stamp = values[1] * NANOSECONDS + values[2]
                     return Values(stamp, keys, joints, pick(values))
         try:
-            found = self._parse(data)
+            parsed_or_reason = self._parse(data)
         except MalformedError:
             return MALFORMED
-        if isinstance(found, str):
-            return found
-        names, columns, width = found
+        if isinstance(parsed_or_reason, str):
+            return parsed_or_reason
+        names, columns, width = parsed_or_reason
         if len(set(names)) != len(names):
             return TWICE
         places = {

@@ -140,19 +140,19 @@ def parsed(data: bytes, fields: Iterable[Field], most: int = 2**32) -> dict[str,
     """
     byte_order(data)
     try:
-        found, end = _parse(data, 4, fields, _COUNTS[data[:2]], most)
+        values, end = _parse(data, 4, fields, _COUNTS[data[:2]], most)
     except StructError:
         raise MalformedError('ends too early') from None
     if end > len(data):
         raise MalformedError('ends too early')
-    return found
+    return values
 
 
 def _parse(
     data: bytes, at: int, fields: Iterable[Field], number: Struct, most: int
 ) -> tuple[dict[str, Any], int]:
     """Return the fields from a position on, and the position of their end."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for name, kind, many in fields:
         count, count_at = 1, at
         if many:
@@ -163,7 +163,7 @@ def _parse(
             size, total = _sizes(kind)
             first = at + (4 - at) % size if count else at
             at = first + total * count
-            found[name] = Numbers(count_at if many else first, count, first)
+            values[name] = Numbers(count_at if many else first, count, first)
             continue
         if count > most:
             raise MalformedError(f'more than {most:,} elements')
@@ -179,8 +179,8 @@ def _parse(
             else:
                 element, at = _parse(data, at, kind, number, most)
                 elements.append(element)
-        found[name] = elements if many else elements[0]
-    return found, at
+        values[name] = elements if many else elements[0]
+    return values, at
 
 
 @cache
@@ -399,8 +399,8 @@ class ArrayWriter:
         values = dict.fromkeys((self._arrays[array] for array in numbers), (0.0,) * len(joints))
         within = {self._within: [values]} if self._within else values
         message = packed(self._fields, {**self._names, **within})
-        found = parsed(message, self._fields)
-        places = found[self._within][0] if self._within else found
+        places_by_name = parsed(message, self._fields)
+        places = places_by_name[self._within][0] if self._within else places_by_name
         pack, constants = packing(
             message, [(places[field].first, f'{len(joints)}d') for field in values]
         )

@@ -215,7 +215,7 @@ class Comparison:
     def add(self, at: At, recorded: Sequence[bytes], now: Sequence[bytes]) -> None:
         """Add a tick: a message for each topic, empty if there is none."""
         self.ticks += 1
-        found: First | None = None
+        first_difference: First | None = None
         silent = not any(recorded)
         if silent and not any(now):
             self.withheld += 1
@@ -237,10 +237,10 @@ class Comparison:
                 else:
                     topic.gone += 1
                     difference = First(at, topic.name, 'published then, nothing now')
-            found = found or difference
-        if found:
+            first_difference = first_difference or difference
+        if first_difference:
             self.differing += 1
-            self.first = self.first or found
+            self.first = self.first or first_difference
             self.last = at
 
     def settle(self) -> None:
@@ -268,7 +268,7 @@ def _unturned(
     then: Values, numbers: Mapping[Key, float], turning: Mapping[str, bool]
 ) -> dict[Key, float]:
     """Return the positions, with whole-turn differences replaced by the recorded values."""
-    found = {}
+    unturned = {}
     for key, recorded in zip(then.keys, then.numbers, strict=True):
         if key[1] == POSITION and turning.get(key[0]) and key in numbers:
             apart = recorded - numbers[key]
@@ -276,8 +276,8 @@ def _unturned(
             # Both are the same angle plus turns, each rounded once.
             rounding = 2.0 * ulp(max(abs(recorded), abs(numbers[key])))
             if turns and abs(apart - turns * tau) <= rounding:
-                found[key] = recorded
-    return found
+                unturned[key] = recorded
+    return unturned
 
 
 def _why(then: Values, again: Values) -> str:

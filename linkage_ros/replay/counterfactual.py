@@ -141,8 +141,8 @@ class Counterfactual:
 
     def withheld(self, tick: Tick) -> bool:
         """Return whether a tick without a message is one that a replay has to know of."""
-        said = tick.message or tick.extras
-        return self.withholds and not said and self._pipeline.remembers(tick)
+        published = tick.message or tick.extras
+        return self.withholds and not published and self._pipeline.remembers(tick)
 
     def _on_samples(self, events: Iterable[Event]) -> Iterator[Done]:
         made: Remade | None = None  # its recorded messages may follow
@@ -338,12 +338,12 @@ def find_crank_topic(
     for topic, _, _, data in messages if readers else ():
         if not wanting.get(topic):
             continue
-        found = [
+        candidates = [
             number for number in wanting[topic]
             if not isinstance(readers[topic][number].read(data), Rejection)
         ]  # fmt: skip
-        wanting[topic].difference_update(found)
-        if not found:
+        wanting[topic].difference_update(candidates)
+        if not candidates:
             head = head_of(data)
             names |= dict.fromkeys(
                 name.decode('utf-8', 'backslashreplace')

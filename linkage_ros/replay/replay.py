@@ -184,10 +184,12 @@ def read_change(message: bytes) -> tuple[str, bool]:
 
     """
     try:
-        said = json.loads(text_of(message))
+        content = json.loads(text_of(message))
     except RecursionError:
         raise ValueError('too deep') from None
-    name, on = (said.get('fault'), said.get('injected')) if isinstance(said, dict) else (0, 0)
+    name, on = (
+        (content.get('fault'), content.get('injected')) if isinstance(content, dict) else (0, 0)
+    )
     if not isinstance(name, str) or not isinstance(on, bool):
         raise ValueError('not a change')
     return name, on
@@ -205,8 +207,8 @@ def turn(bag: Bag, injection: Injection, message: bytes) -> None:
 
 def versions_here() -> dict[str, str]:
     """Return the versions of the installed software, in the form of a run's account."""
-    found = (__version__, platform.python_version(), platform.machine())
-    return dict(zip(VERSIONS, found, strict=True))
+    here = (__version__, platform.python_version(), platform.machine())
+    return dict(zip(VERSIONS, here, strict=True))
 
 
 def own_effects_here(scene: Scene) -> dict[str, str]:

@@ -79,10 +79,10 @@ class ReplayVerification(NamedTuple):
     @property
     def verdict(self) -> str:
         """Return `IDENTICAL`, `DIFFERENT` or `UNTOLD`."""
-        found = self.comparison
-        if self.untold and not found.ticks:
+        comparison = self.comparison
+        if self.untold and not comparison.ticks:
             return UNTOLD
-        if found.differing:
+        if comparison.differing:
             return UNTOLD if self.lost else DIFFERENT
         return IDENTICAL
 
@@ -147,13 +147,13 @@ def beginning_text(proof: ReplayVerification) -> str:
 
 def turning_joints(scene: Scene) -> dict[str, bool]:
     """Return for each joint of a scene, published or driven, whether it is a revolute joint."""
-    found: dict[str, bool] = {}
+    revolute: dict[str, bool] = {}
     for member in scene.members:
         driven = [not given.slider for given in member.linkage.inputs]
-        found |= dict(zip(member.inputs, driven, strict=True))
+        revolute |= dict(zip(member.inputs, driven, strict=True))
         kinds = [isinstance(joint, RevoluteJoint) for joint in member.linkage.joints.values()]
-        found |= dict(zip(member.joints, kinds, strict=True))
-    return found
+        revolute |= dict(zip(member.joints, kinds, strict=True))
+    return revolute
 
 
 def _lost(scene: Scene) -> tuple[str, ...]:

@@ -248,10 +248,12 @@ def _scene(
         for entry in entries:
             linkage_content, data = open_linkage(entry)
             files[f'linkage_{len(files)}.yaml'] = data
-            own = entry.ros_name(entry.text('name'))
-            if own in [member.name for member in members]:
-                raise entry.error('name', f'{quoted(own)} is taken', 'give each its own')
-            members.append(_member(own, linkage_content, entry, content, folder, trust_effects))
+            member_name = entry.ros_name(entry.text('name'))
+            if member_name in [member.name for member in members]:
+                raise entry.error('name', f'{quoted(member_name)} is taken', 'give each its own')
+            members.append(
+                _member(member_name, linkage_content, entry, content, folder, trust_effects)
+            )
             entry.finish(_OF_A_MEMBER)
     else:
         linkage_content, files[LINKAGE_FILE] = open_linkage(content)
@@ -380,7 +382,7 @@ def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
 
 def _silent(content: Section, linkage: Linkage) -> bool:
     """Return whether nothing is published while a joint is beyond its limits."""
-    said = content.choice('beyond_limits', ('publish', 'silent'), 'publish')
+    policy = content.choice('beyond_limits', ('publish', 'silent'), 'publish')
     if (
         'beyond_limits' in content
         and 'linkages' not in content
@@ -391,7 +393,7 @@ def _silent(content: Section, linkage: Linkage) -> bool:
             'no joint of the linkage has limits',
             'leave it out, or write limits: [low, high] into the linkage file',
         )
-    return said == 'silent'
+    return policy == 'silent'
 
 
 def _rate(content: Section) -> float:

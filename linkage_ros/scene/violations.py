@@ -63,13 +63,13 @@ def violations(content: Section, schema: Schema) -> list[FileError]:
     broken = list(Draft202012Validator(schema).iter_errors(whole))
     # A value of the wrong type breaks further rules, which are not worth reporting.
     mistyped = {tuple(error.absolute_path) for error in broken if error.validator == 'type'}
-    found = [
+    errors = [
         FileError(content.file, _dotted(path), reason, remedy, _line(whole, path))
         for error in broken
         if error.validator == 'type' or tuple(error.absolute_path) not in mistyped
         for path, reason, remedy in _said(error, schema)
     ]
-    return sorted(found, key=lambda error: (error.line, error.key))
+    return sorted(errors, key=lambda error: (error.line, error.key))
 
 
 def _said(error: ValidationError, whole: Schema) -> Iterator[_Said]:
@@ -146,10 +146,10 @@ def _expected(error: ValidationError) -> str:
 
 
 def _bounds(schema: Mapping[str, Any]) -> str:
-    said = ' and '.join(
+    bounds = ' and '.join(
         f'{word} {schema[key]:g}' for key, word in _BOUNDS.items() if key in schema
     )
-    return f', {said}' if said else ''
+    return f', {bounds}' if bounds else ''
 
 
 def _meaning(schema: Schema, whole: Schema) -> str:
