@@ -53,8 +53,8 @@ def compression_type(name: str, folder: Path) -> CompressionType:
 
     Raises
     ------
-    Its library is not installed; ``folder`` is the target of the recording.
-        Its library is missing here; ``folder`` is what was to be recorded to.
+    RecordingError
+        Its library is not installed; ``folder``, the target of the recording, is in the message.
 
     """
     kind = COMPRESSION_TYPES[name]

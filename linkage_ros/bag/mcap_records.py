@@ -234,7 +234,7 @@ def strict(kind: Any, content: bytes) -> Any:
         again: bytes = builder.end()  # type: ignore[no-untyped-call]
     except Exception as error:  # noqa: BLE001 (damage makes mcap raise many kinds)
         raise DamagedError(f'is no {kind.__name__}: {error}') from None
-    # mcap reads a string that is cut as what is left of it; written again, it is another.
+    # mcap reads a truncated string as its remains; written again, the record differs.
     if again != HEAD.pack(again[0], len(content)) + content:
         raise DamagedError(f'is no {kind.__name__}')
     return record
