@@ -459,7 +459,7 @@ class DataSection:
         return found, end
 
     def chunk(self, chunk: Chunk, *, fits: bool = True) -> Iterable[Message]:
-        """Return a chunk's messages; with `fits` it must begin and end where its record does."""
+        """Return a chunk's messages; `fits`: it begins and ends where its record does."""
         if self._unpacked > max(MOST_UNPACKED, MOST_TIMES * self.source.size):
             raise DamagedError(
                 f'would make more than {self._unpacked:,} bytes of a file of '

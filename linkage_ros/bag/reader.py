@@ -56,7 +56,7 @@ _WITHOUT = 'move metadata.yaml away to read the folder without it'
 
 
 def custom_of(information: Mapping[str, Any]) -> dict[str, str]:
-    """Return the ``custom_data`` of a bag's metadata; only its entries that are strings."""
+    """Return the ``custom_data`` of a bag's metadata: its plain values, as strings."""
     custom = information.get('custom_data')
     entries = custom.items() if isinstance(custom, dict) else ()
     # No lists: with aliases a small file could expand to fill memory.

@@ -42,7 +42,7 @@ from linkage_ros.messages.layout import NANOSECONDS
 TOPIC = 'crank_commands'
 
 _MADE_UP = NANOSECONDS
-"""Least time that a tick can integrate, in [ns]; two ticks of a scene are also allowed."""
+"""Time that one tick integrates at most, in [ns]; two periods if these are longer."""
 
 _NEVER = 1 << 63
 
