@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Bags: MCAP files in folders that other people's tools open."""
+"""Bags: folders of MCAP files in the format of rosbag2."""

@@ -14,10 +14,10 @@
 
 
 """
-One file of a bag, complete in itself: attachments, types, messages, index.
+Write one file of a bag, complete in itself: attachments, types, messages, index.
 
-From the first error of the disk on, mcap's ``Writer`` goes on into memory (`disk.RecordFile`), and
-`BagFile.finish` ends the file with the records and indexes that it makes.
+After the first disk error, mcap's ``Writer`` continues in memory (`disk.RecordFile`), and
+`BagFile.finish` ends the file with the records and indexes that it produces.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ _LIBRARIES = {'lz4': 'lz4', 'zstd': 'zstandard'}
 
 def compression_type(name: str, folder: Path) -> CompressionType:
     """
-    Return mcap's compression of a name.
+    Return mcap's compression for a name.
 
     Raises
     ------
     RecordingError
-        Its library is missing here; ``folder`` is what was to be recorded to.
+        Its library is not installed; ``folder``, the target of the recording, is in the message.
 
     """
     kind = COMPRESSION_TYPES[name]
@@ -71,12 +71,12 @@ def compression_type(name: str, folder: Path) -> CompressionType:
 
 
 def start(mcap: Writer, profile: str = 'ros2') -> None:
-    """Begin a file, as all of ours begin."""
+    """Begin a file of this package."""
     mcap.start(profile=profile, library=f'linkage_ros {__version__}')
 
 
 def register(mcap: Writer, topics: Sequence[Topic]) -> list[int]:
-    """Tell a writer of topics; return their channels' numbers, the same for the same topics."""
+    """Register topics with a writer; return their channel numbers, equal for equal topics."""
     schemas: dict[str, int] = {}
     channels = []
     for topic in topics:
@@ -92,7 +92,7 @@ def register(mcap: Writer, topics: Sequence[Topic]) -> list[int]:
 
 
 def channels_file(topics: Sequence[Topic]) -> bytes:
-    """Return an MCAP file that has these topics, and no messages."""
+    """Return an MCAP file with these topics and without messages."""
     file = BytesIO()
     mcap = Writer(
         file,
@@ -112,34 +112,34 @@ def channels_file(topics: Sequence[Topic]) -> bytes:
 
 class BagFile:
     """
-    An MCAP file, open for writing.
+    MCAP file that is open for writing.
 
     Parameters
     ----------
     path
-        Where it goes; nothing is there yet.
+        Path of the file, which must not exist.
     topics
-        What will be written; a topic's number is its place in this sequence.
+        Topics of the messages; the index in this sequence is the topic's number.
     attachments
-        Name to (media type, content), written first, so that a killed bag still explains itself.
+        Name to (media type, content); written first, so that the bag of a killed process has them.
     compression
-        How chunks are packed.
+        Compression of chunks.
 
     Attributes
     ----------
     counts
-        Messages by topic.
+        Number of messages, by topic.
     first
         Log time of the first message [ns]; None before it.
     finished
-        Whether it has been ended.
+        Whether its end is written.
     forgotten
-        Whether another process has taken it away.
+        Whether another process has removed it.
 
     Raises
     ------
     OSError
-        It cannot be made or written to. Nothing is left behind.
+        It cannot be created or written. Nothing is left behind.
 
     """
 
@@ -168,33 +168,33 @@ class BagFile:
 
     @property
     def error(self) -> OSError | None:
-        """Return what the disk said first; from then on records wait in memory."""
+        """Return the first disk error; since then records wait in memory."""
         return self._file.error
 
     @property
     def in_doubt(self) -> bool:
-        """Return whether the disk has ever failed to keep what it had taken."""
+        """Return whether the disk has ever failed to keep data that it had accepted."""
         return self._file.in_doubt
 
     @property
     def ended(self) -> bool:
-        """Return whether its end is on the disk, so that others find all that is counted."""
+        """Return whether its end is on the disk, so that readers find all counted messages."""
         return self._file.ended
 
     @property
     def size(self) -> int:
-        """Return the size of the file by now [bytes]."""
+        """Return the current size of the file [bytes]."""
         return self._file.size
 
     @property
     def has_chunks(self) -> bool:
-        """Return whether messages have been handed to the system by now."""
+        """Return whether messages have been passed to the operating system."""
         return self._file.position > self._begun
 
     def add(
         self, topic: int, log_time: int, publish_time: int, data: bytes, sequence: int
     ) -> None:
-        """Add a message, whose times fit into 63 bits; never raises, but look at `error`."""
+        """Add a message with 63-bit times; never raises: check `error`."""
         self._mcap.add_message(self._channels[topic], log_time, data, publish_time, sequence)
         self.counts[topic] += 1
         self._start, self._end = min(self._start, log_time), max(self._end, log_time)
@@ -203,9 +203,9 @@ class BagFile:
 
     def flush(self) -> bool:
         """
-        Bring to the disk what was added; return whether there was anything; OSError if not.
+        Write added messages to the disk; return whether there were any. Raises OSError on failure.
 
-        mcap before 1.6 cannot close a chunk early: there, whole chunks only are safe.
+        mcap before 1.6 cannot close a chunk early: with it, only full chunks are safe.
         """
         self._file.look()
         if hasattr(self._mcap, 'flush'):
@@ -220,20 +220,20 @@ class BagFile:
         self._file.sync()
         if hasattr(self._mcap, 'flush'):
             self._safe = (tuple(self.counts), self._start, self._end)
-        # The index at the end grows by about this much with each chunk.
+        # Each chunk adds about this much to the index at the end.
         self._reserve.grow(FIRST_RESERVE + chunks * (90 + 10 * len(self.counts)))
         return True
 
     def finish(self, records: Mapping[str, Mapping[str, str]]) -> OSError | None:
         """
-        End the file as well as the disk allows; return what went wrong, now or before.
+        End the file as well as the disk allows; return the error, if any, now or before.
 
-        What the disk does not keep in the end is counted no longer, although it may be there.
+        Messages that the disk does not keep in the end are not counted, even if they are there.
 
         Parameters
         ----------
         records
-            Metadata records that come last, by name.
+            Metadata records for the end of the file, by name.
 
         """
         self.finished = True
@@ -265,18 +265,18 @@ class BagFile:
         return error
 
     def forget(self) -> None:
-        """Count none of its messages: another process has taken it away."""
+        """Set all counts to 0, since another process has removed the file."""
         self.forgotten = True
         self.counts = [0] * len(self.counts)
         self._start, self._end = NO_START, 0
 
     def abandon(self) -> None:
-        """Let go of the file, of which nothing is wanted."""
+        """Close the file without an end; its content is not needed."""
         self._reserve.release()
         self._file.close()
 
     def summary(self, topics: tuple[Topic, ...]) -> BagSummary:
-        """Return what the file holds by now."""
+        """Return a summary of the current content."""
         return BagSummary(
             folder=self.path.parent,
             file=self.path.name,
@@ -294,7 +294,7 @@ class BagFile:
         attachments: Mapping[str, tuple[str, bytes]],
         compression: CompressionType,
     ) -> None:
-        # Our stream stands in for a binary file: mcap asks it for write, tell and flush only.
+        # This stream replaces a binary file: mcap only uses write, tell and flush.
         self._mcap = Writer(
             cast('IO[bytes]', self._file), chunk_size=CHUNK_SIZE, compression=compression
         )
@@ -308,7 +308,7 @@ class BagFile:
         self._file.sync()
 
     def _count_only(self, kept: Statistics) -> None:
-        """Forget the messages that did not reach the file."""
+        """Count only the messages that reached the file."""
         self.counts = [kept.channel_message_counts.get(channel, 0) for channel in self._channels]
         if kept.message_count:
             self._start, self._end = kept.message_start_time, kept.message_end_time
@@ -316,7 +316,7 @@ class BagFile:
             self._start, self._end = NO_START, 0
 
     def _count_safe(self) -> None:
-        """Forget the messages that came after the last flush that succeeded."""
+        """Count only the messages before the last successful flush."""
         if sum(self._safe[0]) < sum(self.counts):
             counts, self._start, self._end = self._safe
             self.counts = list(counts)

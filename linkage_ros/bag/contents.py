@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The contents of a bag: messages, sizes and times by topic, and the layout of its files."""
+"""Contents of a bag: messages, sizes and times by topic, and the layout of its files."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from mcap.records import Header, Metadata
 from mcap.writer import MCAP0_MAGIC
 
 TOLD_EVERY = 4096
-"""After how many messages progress is told and a wish to stop is looked for."""
+"""Number of messages between two progress reports and checks for a stop."""
 
 _RECORD_SIZE = 31
-"""The size of a message record without the bytes of the message."""
+"""Size of a message record without the message itself [bytes]."""
 
 
 class TopicContents(NamedTuple):
     """
-    The messages of a topic in a bag.
+    Messages of one topic in a bag.
 
     Attributes
     ----------
@@ -62,14 +62,14 @@ class TopicContents(NamedTuple):
 
     @property
     def rate(self) -> float | None:
-        """Return the mean number of messages per second; None if they take no time."""
+        """Return the mean number of messages per second; None if they all have one time."""
         span = self.last - self.first
         return (self.messages - 1) * 1e9 / span if span > 0 else None
 
 
 class Contents(NamedTuple):
     """
-    The contents of a bag.
+    Contents of a bag.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Contents(NamedTuple):
     begin, end
         Least and greatest log time, in [ns]; None without messages.
     damage
-        The damage at which reading ended, on one line; '' if all was read.
+        Damage at which reading ended, on one line; '' if all was read.
     stopped
         Whether reading was stopped early.
 
@@ -108,14 +108,14 @@ def contents_of(
     stopped: Callable[[], bool] = lambda: False,
 ) -> Contents:
     """
-    Read all messages of a bag and count them; memory does not grow with them.
+    Count all messages of a bag; memory does not grow with them.
 
     Parameters
     ----------
     bag
-        The bag. Where it is damaged, what lies before the damage is counted.
+        The bag. If it is damaged, the messages before the damage are counted.
     told
-        Called now and then with the number of bytes read.
+        Progress callback; receives the number of bytes read, now and then.
     stopped
         Returns whether to stop.
 
@@ -126,7 +126,7 @@ def contents_of(
     try:
         for number, (name, log_time, _, data) in enumerate(bag.messages(), 1):
             tally = tallies.get(name)
-            if tally is None:  # its channel is not in the index
+            if tally is None:  # its channel is missing in the index
                 tally = tallies[name] = _Tally(Topic(name, '', '', ''))
             size = len(data)
             tally.count += 1
@@ -157,19 +157,19 @@ def contents_of(
 
 class Layout(NamedTuple):
     """
-    The layout of an MCAP file.
+    Layout of an MCAP file.
 
     Attributes
     ----------
     library
-        The library that wrote it; '' if the file does not name one.
+        Library that wrote it; '' if the file does not name one.
     compressions
-        For each compression of its chunks ('none' is one): stored bytes, and bytes after
-        decompression as the file states them.
+        For each compression of its chunks ('none' is one): bytes stored, and bytes after
+        decompression as stated in the file.
     content
-        Bytes of all its records when decompressed.
+        Size of all its records after decompression [bytes].
     rosbag2
-        The last metadata record of rosbag2; None if there is none.
+        Last metadata record of rosbag2; None if there is none.
 
     """
 
@@ -202,7 +202,7 @@ def layout_of(file: Path) -> Layout:
                 if end > source.size or opcode in (Opcode.DATA_END, Opcode.FOOTER):
                     break
                 length = unpacked = end - at - HEAD.size
-                # What is damaged is passed over; reading the messages says so.
+                # Damage is ignored here; reading the messages reports it.
                 with suppress(DamagedError):
                     if opcode == Opcode.CHUNK:
                         head = chunk_head(source, at)

@@ -14,12 +14,12 @@
 
 
 """
-A bag's file on a disk that may fill: whole records, room for the index, and an end that fits.
+File of a bag on a disk that may fill: whole records, space for the index, and an end that fits.
 
-mcap's ``Writer`` loses its balance when its stream raises, so `RecordFile` never does: from the
-first error on it keeps the records in memory. They go into the room that `Reserve` set aside. If
-even that is too little (a limit on the file's size, another process that was faster),
-`RecordFile.cut_back` ends the file with the last chunk after which an index still fits. A minimal
+mcap's ``Writer`` becomes inconsistent if its stream raises, so `RecordFile` never does: after the
+first error it keeps the records in memory. They are then written to the space that `Reserve` has
+held. If even that is too little (a limit on the file's size, another process that was faster),
+`RecordFile.cut_back` ends the file after the last chunk where an index still fits. A minimal
 footer without an index was rejected: rosbags refuses such a file when log times are out of order.
 """
 
@@ -48,36 +48,36 @@ from mcap.records import (
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
-# Closing a chunk holds the interpreter for the time that its message index takes to build, 0.5 ms
-# for 64 KiB of joint states; mcap's default of 1 MiB would hold it, and a tick, for 10 ms.
+# Closing a chunk holds the GIL while its message index is built: 0.5 ms for 64 KiB of joint
+# states. mcap's default of 1 MiB would hold it, and a tick, for 10 ms.
 CHUNK_SIZE = 64 * 1024
 FIRST_RESERVE = 512 * 1024
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""What a system says where it would take more if there were room."""
-# What is kept in memory until the disk has it, lest a failing fsync lose it [bytes].
+"""Errors by which the system reports a lack of space."""
+# Data kept in memory until the disk has it, in case an fsync fails [bytes].
 _MOST_UNSYNCED = 16 * 1024 * 1024
 
 
 class LostError(OSError):
-    """Another process has cut, moved or removed a file of the recording."""
+    """Another process has truncated, moved or removed a file of the recording."""
 
 
 class RecordFile:
     """
-    A file of whole records; writing to it never raises, and leaves what failed in `error`.
+    File of whole records; writing to it never raises but stores the failure in `error`.
 
-    After the first error, records wait in memory for `drain`. Before each write the file is
-    looked at: what another process has cut off would else come back as a hole full of zeros.
+    After the first error, records wait in memory for `drain`. Each write first checks the file: if
+    another process has truncated it, the write would leave a hole of zeros.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.position = 0  # where the next record goes once the waiting ones are on the disk
-        self.size = 0  # the end of the last record that the system took as a whole [bytes]
+        self.position = 0  # of the next record, once the waiting ones are on the disk
+        self.size = 0  # end of the last record that the system accepted completely [bytes]
         self.error: OSError | None = None
-        self.ended = False  # whether its last record, and so its index, is with the system
-        self.in_doubt = False  # whether the system has ever failed to bring it to the disk
-        self._unsynced: list[tuple[int, bytes]] = []  # since the last sync, with the offsets
+        self.ended = False  # whether the system has its last record, and so its index
+        self.in_doubt = False  # whether the system has ever failed to write it to the disk
+        self._unsynced: list[tuple[int, bytes]] = []  # (offset, data) since the last sync
         self._unsynced_size = 0
         self._waiting: list[bytes] = []
         self._is_cut = False
@@ -99,14 +99,14 @@ class RecordFile:
         return self.position
 
     def flush(self) -> None:
-        """Do nothing: no buffer is between `write` and the system."""
+        """Do nothing: there is no buffer between `write` and the system."""
 
     def look(self) -> None:
         """
-        Raise LostError where another process has cut, moved or removed the file.
+        Raise LostError if another process has truncated, moved or removed the file.
 
-        What it was cut to, 0 where it was removed, is its `size` from then on. Once it is in
-        `error`, nothing more is looked for.
+        Its `size` is then the size of the truncated file, or 0 if it was removed. After an `error`
+        no further check is made.
         """
         if self.error:
             return
@@ -125,10 +125,10 @@ class RecordFile:
 
     def sync(self) -> None:
         """
-        Bring what was written to the disk.
+        Write the data to the disk (fsync).
 
-        After a failure the system may have let go of what it could not write, and yet succeed the
-        next time. So all since the last success is written again before it is asked again.
+        After a failure the system may have dropped data that it could not write, and still succeed
+        the next time. So all data since the last success is written again before the next fsync.
         """
         if self.in_doubt:
             for offset, data in self._unsynced:
@@ -145,11 +145,11 @@ class RecordFile:
         os.close(self._descriptor)
 
     def keep_tail(self) -> None:
-        """Remember what is written from here on; it holds the index that `cut_back` needs."""
+        """Keep in memory what is written from now on: the index that `cut_back` needs."""
         self._tail = []
 
     def drain(self) -> None:
-        """Write the waiting records; raises OSError, and can be called again then."""
+        """Write the waiting records; raises OSError, and can then be called again."""
         if self.error and self._is_cut:
             raise self.error
         while self._waiting:
@@ -164,12 +164,12 @@ class RecordFile:
 
     def cut_back(self) -> Statistics:
         """
-        End the file with as many chunks as leave room for an index; return what is then in it.
+        End the file with as many chunks as leave space for an index; return their statistics.
 
-        The index overwrites the end of the file in place, which takes no new room on the disk; in
-        a file that another process has cut there is no need for that. Where not even that works
-        the file stays without an end, but with whole records only; so it does where there is no
-        room for an index at all.
+        The index overwrites the end of the file in place, which needs no new space on the disk; in
+        a file that another process has truncated this is not needed. If even that fails, or if
+        there is no space for any index, the file stays without an end, but with whole records
+        only.
         """
         stream = BytesIO(b''.join(self._tail or []))
         records = list(StreamReader(stream, skip_magic=True, emit_chunks=True).records)
@@ -178,7 +178,7 @@ class RecordFile:
             for r in records
             if isinstance(r, ChunkIndex) and r.chunk_start_offset + r.chunk_length <= self.size
         ]
-        # The last one may lack its message indexes; who reads without an end does not need them.
+        # The last chunk may lack its message indexes; readers of a file without an end need none.
         chunks = [chunk for chunk in whole if _end_of(chunk) <= self.size]
         while chunks:
             start = _end_of(chunks[-1])
@@ -193,7 +193,7 @@ class RecordFile:
         return _statistics(records, chunks or whole)
 
     def _end_with(self, ending: bytes, start: int) -> bool:
-        """Write an ending over what is there; return False if all there is stays untouched."""
+        """Write an ending over existing content; return False if nothing was changed."""
         try:
             count = os.pwrite(self._descriptor, ending, start)
         except OSError as error:
@@ -204,7 +204,7 @@ class RecordFile:
         self.size = start
         with suppress(OSError):
             if not count:
-                # A file system that copies on write needs the room first.
+                # A copy-on-write file system needs the space first.
                 os.ftruncate(self._descriptor, start)
             self._put(ending[count:], start + count)
             self._unsynced.append((start, ending))
@@ -223,12 +223,12 @@ class RecordFile:
 
 class Reserve:
     """
-    Room on the disk, held by a nameless file: it is free again on `release` and on a kill.
+    Disk space held by an unnamed file; `release`, or the end of the process, frees it.
 
     Raises
     ------
     OSError
-        There is not as much room.
+        There is not enough space.
 
     """
 
@@ -239,17 +239,17 @@ class Reserve:
 
     def grow(self, size: int) -> None:
         if size > self._size:
-            size += CHUNK_SIZE  # asks the system once in a while only
+            size += CHUNK_SIZE  # to ask the system rarely
             os.posix_fallocate(self._file.fileno(), 0, size)
             self._size = size
 
     def release(self) -> None:
-        with suppress(OSError):  # nothing is in it
+        with suppress(OSError):  # the file holds no data
             self._file.close()
 
 
 def _is_named(file: os.stat_result, path: Path) -> bool:
-    """Return whether this is the file of that name; so it is where the disk does not answer."""
+    """Return whether the path still names this file; True if the disk does not answer."""
     try:
         return os.path.samestat(file, path.stat())
     except (FileNotFoundError, NotADirectoryError):
@@ -263,10 +263,10 @@ def _end_of(chunk: ChunkIndex) -> int:
 
 
 def _statistics(records: Sequence[McapRecord], chunks: Sequence[ChunkIndex]) -> Statistics:
-    """Return the statistics of these chunks, of which only the indexes need to be known."""
+    """Return the statistics of these chunks from their indexes alone."""
     counts: dict[int, int] = {}
     for chunk in chunks:
-        # The message indexes lie one after the other: 15 bytes, and 16 for each message.
+        # The message indexes are contiguous: 15 bytes, and 16 for each message.
         end = _end_of(chunk)
         for channel, start in sorted(
             chunk.message_index_offsets.items(), key=itemgetter(1), reverse=True
@@ -287,7 +287,7 @@ def _statistics(records: Sequence[McapRecord], chunks: Sequence[ChunkIndex]) -> 
 
 
 def _ending(records: Sequence[McapRecord], chunks: Sequence[ChunkIndex], start: int) -> bytes:
-    """Return all that follows the last of these chunks: end of data, index, footer, magic."""
+    """Return the bytes after the last of these chunks: end of data, index, footer, magic."""
     builder = RecordBuilder()
     DataEnd(0).write(builder)
     summary_start = start + builder.count

@@ -14,12 +14,12 @@
 
 
 """
-The records of an MCAP file: a record is accepted only if length, content and CRC agree.
+Read the records of an MCAP file; accept a record only if length, content and CRC agree.
 
-mcap's own reader accepts what is left of a record in a file that was cut, and checks the CRC of
-chunks only. Here a record ends where its length says, its content fills it, and every CRC is
-checked. `DataSection` reads the part of a file that holds the messages, `index_of` its index.
-No record, packed or unpacked, may take more memory than `LARGEST`.
+mcap's own reader accepts the remains of a record in a truncated file, and checks only the CRC of
+chunks. Here a record ends where its length says, its content fills it, and every CRC is checked.
+`DataSection` reads the part of a file with the messages, `index_of` its index. No record,
+compressed or decompressed, may take more memory than `LARGEST`.
 """
 
 from __future__ import annotations
@@ -57,26 +57,26 @@ rosbag2 makes chunks of less than 1 MiB. A few kilobytes that claim to be gigaby
 
 
 class DamagedError(Exception):
-    """A record that is not whole, or not what it says; the text says why."""
+    """An incomplete or invalid record; the text gives the reason."""
 
 
 def unpacked(data: bytes, compression: str, size: int) -> bytes:
     """
-    Return the content of a chunk.
+    Decompress a chunk.
 
     Parameters
     ----------
     data
-        As it stands in the file.
+        Bytes of the chunk in the file.
     compression
         '', 'lz4' or 'zstd'.
     size
-        What it says to be when unpacked [bytes]; no byte more is unpacked to find out.
+        Stated size after decompression [bytes]; no further byte is decompressed.
 
     Raises
     ------
     DamagedError
-        It is of another size, or one that is not allowed, or cannot be unpacked.
+        The size is wrong or not allowed, or decompression fails.
 
     """
     if size > LARGEST:
@@ -90,7 +90,7 @@ def unpacked(data: bytes, compression: str, size: int) -> bytes:
             raise DamagedError(
                 f'is packed with {compression}, and Python knows no {compression} here'
             ) from None
-        except Exception as error:  # noqa: BLE001 (each library has its own)
+        except Exception as error:  # noqa: BLE001 (each library has its own exceptions)
             raise DamagedError(f'cannot be unpacked: {error}') from None
     else:
         raise DamagedError(f'is packed in an unknown way, {compression!r}')
@@ -116,31 +116,31 @@ _UNPACKERS: dict[str, Callable[[bytes, int], bytes]] = {'lz4': _lz4, 'zstd': _zs
 
 
 HEAD = Struct('<BQ')
-"""The head of each record: its kind, and the length of its content."""
+"""Head of a record: its kind, and the length of its content."""
 
 _CHUNK = Struct('<QQQII')
-"""First and last time, size when unpacked, its checksum, length of the name of its packing."""
+"""First and last time, decompressed size, its checksum, length of the compression's name."""
 
 _MESSAGE = Struct('<HIQQ')
 _LONG = Struct('<Q')
 _INT = Struct('<I')
 _LONGEST_NAME = 16
 _LONGEST_RECORD = 8 * 2**20
-"""Of those that are made of parts, each of which takes many times its bytes [bytes]."""
+"""Limit for records of many parts, each of which takes a multiple of its bytes [bytes]."""
 
 MOST_CHANNELS = 10_000
-"""How many a file may describe, and how many schemas; MCAP has numbers for 65,535."""
+"""Most channels, and most schemas, of a file; MCAP has numbers for 65,535."""
 
 
 class Source:
-    """A file that is open for reading, as large as it was when it was opened."""
+    """A file open for reading, with its size at the time of opening."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
         self.size = stream.seek(0, SEEK_END)
 
     def read(self, at: int, length: int) -> bytes:
-        """Return so many bytes from there on; raises DamagedError where they are not there."""
+        """Return `length` bytes from position `at`; raise DamagedError if they are missing."""
         if length > LARGEST:
             raise DamagedError(f'would be {length:,} bytes; no more than {LARGEST:,} are taken')
         if not 0 <= at <= self.size - length:
@@ -149,20 +149,20 @@ class Source:
             self._stream.seek(at)
             data = self._stream.read(length)
         except OSError as error:
-            # A disk that cannot read one place may well read the others.
+            # A disk that fails to read one place may read the others.
             raise DamagedError(f'cannot be read: {error.strerror or error}') from None
         if len(data) < length:
             raise DamagedError('goes beyond the end of the file')
         return data
 
     def head(self, at: int) -> tuple[int, int]:
-        """Return a record's kind and the place of its end, which may be beyond the file's."""
+        """Return a record's kind and the position of its end, which may be beyond the file's."""
         opcode, length = HEAD.unpack(self.read(at, HEAD.size))
         return opcode, at + HEAD.size + length
 
 
 class Message(NamedTuple):
-    """A message as its record has it; times in [ns]."""
+    """A message as in its record; times in [ns]."""
 
     channel: Channel
     sequence: int
@@ -172,7 +172,7 @@ class Message(NamedTuple):
 
 
 class ChunkHead(NamedTuple):
-    """The head of a chunk: size [bytes] and CRC (0: none) of what it holds, where its data are."""
+    """Head of a chunk: size [bytes] and CRC (0: none) of its content, position of its data."""
 
     size: int
     crc: int
@@ -182,7 +182,7 @@ class ChunkHead(NamedTuple):
 
 
 class Chunk(NamedTuple):
-    """A chunk: as in its head, its data, and where they end, whatever its record's length is."""
+    """A chunk: fields of its head, its data, and their end, which may not be its record's end."""
 
     size: int
     crc: int
@@ -192,7 +192,7 @@ class Chunk(NamedTuple):
 
 
 class Definitions:
-    """The schemas and channels of a file by their numbers; a number never means two of them."""
+    """Schemas and channels of a file by number; no number may have two definitions."""
 
     def __init__(self) -> None:
         self.schemas: dict[int, Schema] = {}
@@ -211,7 +211,7 @@ class Definitions:
             raise DamagedError(f'describes more than {MOST_CHANNELS:,} channels or schemas')
 
     def complete(self, others: Definitions) -> None:
-        """Add the schemas and channels that are not known yet."""
+        """Add the schemas and channels whose numbers are new."""
         self.schemas = others.schemas | self.schemas
         self.channels = others.channels | self.channels
 
@@ -221,7 +221,7 @@ class Definitions:
 
 
 def strict(kind: Any, content: bytes) -> Any:
-    """Return a record of this kind; its fields fill the content to the last byte."""
+    """Parse a record of this kind; its fields must fill the content to the last byte."""
     if len(content) > _LONGEST_RECORD:
         raise DamagedError(
             f'is a {kind.__name__} of {len(content):,} bytes; no more than {_LONGEST_RECORD:,} '
@@ -232,16 +232,16 @@ def strict(kind: Any, content: bytes) -> Any:
         builder = RecordBuilder()
         record.write(builder)
         again: bytes = builder.end()  # type: ignore[no-untyped-call]
-    except Exception as error:  # noqa: BLE001 (mcap raises a dozen kinds, as the damage has it)
+    except Exception as error:  # noqa: BLE001 (damage makes mcap raise many kinds)
         raise DamagedError(f'is no {kind.__name__}: {error}') from None
-    # mcap reads a string that is cut as what is left of it; written again, it is another.
+    # mcap reads a truncated string as its remains; written again, the record differs.
     if again != HEAD.pack(again[0], len(content)) + content:
         raise DamagedError(f'is no {kind.__name__}')
     return record
 
 
 def chunk_head(source: Source, at: int) -> ChunkHead:
-    """Return the head of the chunk whose record begins there."""
+    """Return the head of the chunk whose record begins at a position."""
     begin = at + HEAD.size
     _, _, size, crc, letters = _CHUNK.unpack(source.read(begin, _CHUNK.size))
     if letters > _LONGEST_NAME:
@@ -254,13 +254,13 @@ def chunk_head(source: Source, at: int) -> ChunkHead:
 
 
 def chunk_at(source: Source, at: int) -> Chunk:
-    """Return the chunk whose record begins there; its content is not looked at."""
+    """Return the chunk whose record begins at a position, without checking its content."""
     size, crc, compression, begin, length = chunk_head(source, at)
     return Chunk(size, crc, compression, source.read(begin, length), begin + length)
 
 
 def content_of(chunk: Chunk) -> bytes:
-    """Return the content of a chunk; its CRC agrees, if it has one."""
+    """Decompress the content of a chunk, and check its CRC if it has one."""
     content = unpacked(chunk.data, chunk.compression, chunk.size)
     if chunk.crc and crc32(content) != chunk.crc:
         raise DamagedError('its checksum does not fit')
@@ -268,7 +268,7 @@ def content_of(chunk: Chunk) -> bytes:
 
 
 def attachment_at(source: Source, at: int) -> tuple[Attachment, int, int]:
-    """Return the attachment whose record begins there, where its content ends, and its CRC."""
+    """Return the attachment that begins at a position, its content's end, and its CRC."""
     begin = end = at + HEAD.size + 16
     for _ in ('name', 'media type'):
         (letters,) = _INT.unpack(source.read(end, _INT.size))
@@ -279,7 +279,7 @@ def attachment_at(source: Source, at: int) -> tuple[Attachment, int, int]:
     (crc,) = _INT.unpack(source.read(end, _INT.size))
     if crc and crc32(content) != crc:
         raise DamagedError('its checksum does not fit')
-    # Zeros of its content may stand where a damaged length looks for the checksum.
+    # If the length is damaged, zeros of the content may take the place of the checksum.
     if not crc and source.head(at)[1] != end + _INT.size:
         raise DamagedError('is not as long as it says')
     try:
@@ -308,7 +308,7 @@ def is_whole_attachment(source: Source, at: int) -> bool:
 
 
 def messages_in(content: bytes, definitions: Definitions) -> Iterator[Message]:
-    """Yield the messages of a chunk's content; its schemas and channels go to the definitions."""
+    """Yield the messages of a chunk's content; add its schemas and channels to `definitions`."""
     at, size = 0, len(content)
     while at < size:
         try:
@@ -323,13 +323,13 @@ def messages_in(content: bytes, definitions: Definitions) -> Iterator[Message]:
             yield message_of(content, at, end, definitions)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             definitions.add(opcode, content[at:end])
-        elif not opcode:  # millions of them fit into what was zeros
+        elif not opcode:  # a zeroed area may hold millions of such records
             raise DamagedError('holds a record of no kind')
         at = end
 
 
 def message_of(content: bytes, at: int, end: int, definitions: Definitions) -> Message:
-    """Return the message that fills these bytes."""
+    """Parse the message in this range of bytes."""
     if end - at < _MESSAGE.size:
         raise DamagedError('holds a message without its times')
     number, sequence, log_time, publish_time = _MESSAGE.unpack_from(content, at)
@@ -360,16 +360,16 @@ _ELSEWHERE = {
     Opcode.METADATA_INDEX,
     Opcode.SUMMARY_OFFSET,
 }
-"""Kinds that no data section holds."""
+"""Kinds of records that no data section contains."""
 
 
 class DataSection:
     """
-    Takes records of a file from given places; remembers what decides about the next ones.
+    Reads records of a file at given positions; keeps the state that the next records depend on.
 
-    What has a checksum is given only where that fits. Messages outside of chunks, and chunks
-    without a checksum, are given where the whole data section has one that fits, or nothing in
-    the file has any: then they are counted in `unchecked`.
+    Content with a checksum is returned only if the checksum matches. Messages outside of chunks,
+    and chunks without a checksum, are returned if the whole data section has a matching checksum,
+    or if the file has no checksum at all; then they are counted in `unchecked`.
 
     Parameters
     ----------
@@ -378,7 +378,7 @@ class DataSection:
     definitions
         Schemas and channels that are known already.
     index_start
-        Where the index of the file begins, just behind the data section; 0 if not known.
+        Position of the file's index, directly after the data section; 0 if unknown.
 
     """
 
@@ -386,7 +386,7 @@ class DataSection:
         self.source = source
         self.definitions = definitions
         self.finished = False
-        self.loose = True  # whether messages may stand outside of chunks
+        self.loose = True  # whether messages may be outside of chunks
         self.unchecked = 0
         self.unknown: list[tuple[int, int]] = []
         self.misfits: list[int] = []
@@ -400,19 +400,19 @@ class DataSection:
 
     def take(self, at: int) -> tuple[Iterable[Found], int]:
         """
-        Take the record that begins there.
+        Read the record at a position.
 
         Returns
         -------
         found
-            What it holds, to be looked at before the next one is taken: channels are among it.
+            Its content, to be consumed before the next call, since it may define channels.
         end
-            Where the next one begins.
+            Position of the next record.
 
         Raises
         ------
         DamagedError
-            It is not whole, or not what it says; also when what was found is looked at.
+            It is incomplete or invalid; also raised while `found` is consumed.
 
         """
         opcode, end = self.source.head(at)
@@ -459,7 +459,7 @@ class DataSection:
         return found, end
 
     def chunk(self, chunk: Chunk, *, fits: bool = True) -> Iterable[Message]:
-        """Return a chunk's messages; it begins and ends where its record does, if it fits."""
+        """Return a chunk's messages; `fits`: it begins and ends where its record does."""
         if self._unpacked > max(MOST_UNPACKED, MOST_TIMES * self.source.size):
             raise DamagedError(
                 f'would make more than {self._unpacked:,} bytes of a file of '
@@ -470,7 +470,7 @@ class DataSection:
         if not chunk.crc and content:
             if not fits:
                 raise DamagedError('is not as long as it says')
-            # No writer gives a checksum to some chunks only.
+            # No writer gives a checksum to only some of the chunks.
             if self._crc_seen and not self.covered():
                 raise DamagedError('has no checksum, others have')
             known = Definitions()
@@ -485,12 +485,12 @@ class DataSection:
 
     def covered(self) -> bool:
         """
-        Return whether the whole data section has a checksum.
+        Return whether a checksum covers the whole data section.
 
         Raises
         ------
         DamagedError
-            It does not fit.
+            The checksum does not match.
 
         """
         if self._misfit:
@@ -518,13 +518,13 @@ class DataSection:
             at = end
 
     def _crc_to(self, end: int) -> int:
-        found = 0
+        crc = 0
         for place in range(0, end, _WINDOW):
-            found = crc32(self.source.read(place, min(_WINDOW, end - place)), found)
-        return found
+            crc = crc32(self.source.read(place, min(_WINDOW, end - place)), crc)
+        return crc
 
     def _fits(self, at: int, inner: int, end: int, crc: int) -> bool:
-        """Say whether a record ends where its content does; without a checksum it has to."""
+        """Return whether a record ends where its content does; required without a checksum."""
         if inner == end:
             return True
         if not crc:
@@ -534,7 +534,7 @@ class DataSection:
 
 
 def definitions_in(content: bytes) -> Definitions:
-    """Return the schemas and channels that stand in a small MCAP file, as far as it is one."""
+    """Return the schemas and channels of a small MCAP file, as far as it can be read."""
     definitions = Definitions()
     data, at = DataSection(Source(BytesIO(content)), definitions), len(MCAP0_MAGIC)
     with suppress(DamagedError):
@@ -544,7 +544,7 @@ def definitions_in(content: bytes) -> Definitions:
 
 
 _FOOTER = Struct('<BQQQI')
-"""Kind, length, where the index begins and its second part, its checksum."""
+"""Kind, length, start of the index and of its second part, checksum."""
 
 _KINDS: dict[int, Any] = {
     Opcode.CHUNK_INDEX: ChunkIndex,
@@ -560,25 +560,25 @@ _PLACES = {
 }
 
 MOST_RECORDS = 1_000_000
-"""How many an index may hold: of a terabyte in rosbag2's chunks it has that many."""
+"""Most records of an index: a terabyte in rosbag2's chunks has that many."""
 
 
 class FileIndex(NamedTuple):
     """
-    The index of a file.
+    Index of a file.
 
     Attributes
     ----------
     start
-        Where it begins, and the data end.
+        Position of its start, which is the end of the data.
     checked
-        Whether it has a checksum. It fits then.
+        Whether it has a checksum, which then matches.
     definitions
-        All schemas and channels, where it repeats them.
+        All schemas and channels, if it repeats them.
     chunks, attachments, metadata
-        Where they are.
+        Positions of chunks, attachments and metadata.
     statistics
-        The counts that the file states; None if it states none.
+        Counts stated by the file; None if it states none.
 
     """
 
@@ -592,7 +592,7 @@ class FileIndex(NamedTuple):
 
 
 def index_of(source: Source) -> FileIndex:
-    """Return a file's index, an empty one where it was written without; or DamagedError."""
+    """Return a file's index, empty if the file has none; raise DamagedError if it is damaged."""
     footer_at = source.size - _FOOTER.size - len(MCAP0_MAGIC)
     footer = source.read(footer_at, _FOOTER.size)
     opcode, length, start, _, crc = _FOOTER.unpack(footer)
@@ -605,7 +605,7 @@ def index_of(source: Source) -> FileIndex:
     if crc and crc32(footer[:-4], crc32(content)) != crc:
         raise DamagedError("its index's checksum does not fit")
     definitions = Definitions()
-    found: dict[Any, list[Any]] = {kind: [] for kind in _KINDS.values()}
+    by_kind: dict[Any, list[Any]] = {kind: [] for kind in _KINDS.values()}
     places = set()
     at = number = 0
     while at < len(content):
@@ -624,7 +624,7 @@ def index_of(source: Source) -> FileIndex:
                 if place in places:
                     raise DamagedError(f'its index names the record at byte {place:,} twice')
                 places.add(place)
-            found[_KINDS[opcode]].append(record)
+            by_kind[_KINDS[opcode]].append(record)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             definitions.add(opcode, content[at:end])
         at = end
@@ -632,8 +632,8 @@ def index_of(source: Source) -> FileIndex:
         start=start,
         checked=bool(crc),
         definitions=definitions,
-        chunks=tuple(found[ChunkIndex]),
-        attachments=tuple(found[AttachmentIndex]),
-        metadata=tuple(found[MetadataIndex]),
-        statistics=found[Statistics][-1] if found[Statistics] else None,
+        chunks=tuple(by_kind[ChunkIndex]),
+        attachments=tuple(by_kind[AttachmentIndex]),
+        metadata=tuple(by_kind[MetadataIndex]),
+        statistics=by_kind[Statistics][-1] if by_kind[Statistics] else None,
     )

@@ -14,7 +14,7 @@
 
 
 """
-``metadata.yaml``: what rosbag2 reads of a bag before it opens the file.
+Write ``metadata.yaml``, which rosbag2 reads before it opens a bag's files.
 
 The keys and their order are rosbag2's, metadata version 9 (Jazzy; ``rosbag2_storage/yaml.hpp``).
 """
@@ -36,40 +36,40 @@ import yaml
 METADATA_FILE = 'metadata.yaml'
 ROOT_KEY = 'rosbag2_bagfile_information'
 NO_START = 2**63 - 1
-"""The starting time [ns] that rosbag2 gives a bag without messages."""
+"""Starting time [ns] that rosbag2 writes for a bag without messages."""
 
 _NAME = '/_'
 _PLAIN = re.compile(r'/[A-Za-z0-9_/]*')
-"""Names that YAML writes as they are; to ask it costs a millisecond for each."""
+"""Names that YAML writes unquoted; asking yaml would take a millisecond for each."""
 
 
 @dataclass(frozen=True, slots=True)
 class BagSummary:
     """
-    What a bag holds, or one of its files.
+    Summary of a bag, or of one of its files.
 
     Parameters
     ----------
     folder
         The bag's folder.
     file
-        Name of the MCAP file in it; of several the last.
+        Name of its MCAP file; of several the last.
     topics
         The topics, in the order of their numbers.
     counts
         Messages in the file, for each topic.
     refused
-        Messages that were not written because a time of theirs does not fit, for each topic.
+        Messages that were not written because one of their times is out of range, for each topic.
     start
         Least log time [ns]; `NO_START` without messages.
     duration
-        Greatest less least log time [ns].
+        Greatest minus least log time [ns].
     size
         Size of the MCAP file, or files [bytes].
     parts
-        The files one by one, where there are several.
+        Summaries of the files, if there are several.
     let_go
-        Messages in files that made way for newer ones, for each topic; () for none.
+        Messages in files that were removed to keep newer ones, for each topic; () for none.
 
     """
 
@@ -87,7 +87,7 @@ class BagSummary:
 
 @lru_cache
 def qos_text(qos: QosProfile) -> str:
-    """Return an MCAP channel's ``offered_qos_profiles``: YAML, a list of the one profile."""
+    """Return an MCAP channel's ``offered_qos_profiles``: YAML, a list of one profile."""
     return _dump([qos.to_mapping()]).strip()
 
 
@@ -98,11 +98,11 @@ def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool 
     Parameters
     ----------
     summary
-        What the bag holds.
+        Summary of the bag.
     custom
-        Goes to ``custom_data``.
+        Content of ``custom_data``.
     root
-        Whether the root key is there: rosbag2 has it in the file, and leaves it out in the MCAP
+        Whether to write the root key: rosbag2 writes it in the file, and omits it in the MCAP
         file's own ``serialized_metadata``.
 
     """
@@ -127,7 +127,8 @@ def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool 
             _dump(
                 {
                     'custom_data': dict(custom) or None,
-                    # As rosbag2 has it, from the environment; the definitions are Jazzy's anyway.
+                    # rosbag2 takes it from the environment; the message definitions are Jazzy's
+                    # anyway.
                     'ros_distro': os.environ.get('ROS_DISTRO') or 'jazzy',
                 }
             ),
@@ -139,7 +140,7 @@ def metadata_text(summary: BagSummary, custom: Mapping[str, str], *, root: bool 
 def together(
     parts: Sequence[BagSummary], refused: Sequence[int], let_go: Sequence[int]
 ) -> BagSummary:
-    """Return what a bag of these files holds; of one file, just that."""
+    """Return the summary of a bag of these files; of a single file, its own summary."""
     last = parts[-1]
     start = min(part.start for part in parts)
     ends = [part.start + part.duration for part in parts if any(part.counts)]
@@ -159,18 +160,18 @@ def together(
 
 def write_metadata(summary: BagSummary, custom: Mapping[str, str]) -> None:
     """
-    Write ``metadata.yaml`` so that at every instant a whole one is there, the old or the new.
+    Write ``metadata.yaml`` atomically: at every instant the whole old or new file is there.
 
     Raises
     ------
     OSError
-        As the system gives it; the old file, if there was one, is untouched.
+        As the system raises it; an old file is unchanged.
 
     """
     target = summary.folder / METADATA_FILE
     temporary = target.with_suffix('.yaml.tmp')
     try:
-        # Not buffered: Python's buffers ask a disk that takes nothing again and again, for ever.
+        # Unbuffered: Python's buffers would retry forever on a disk that accepts nothing.
         with temporary.open('wb', buffering=0) as file:
             rest = memoryview(metadata_text(summary, custom).encode())
             while rest:
@@ -187,7 +188,7 @@ def write_metadata(summary: BagSummary, custom: Mapping[str, str]) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Bring the names in a folder to the disk: without it a power cut can lose a whole file."""
+    """Sync a folder's names to the disk: without it a power cut can lose a whole file."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -201,7 +202,7 @@ def _topic_text(topic: Topic) -> str:
     return _described(topic)
 
 
-# Types and names stay what they are: a bag of a thousand files is told again for each.
+# Types and names are constant: a bag of a thousand files repeats them for each.
 @lru_cache(maxsize=256)
 def _described(topic: Topic) -> str:
     metadata = {
@@ -215,7 +216,7 @@ def _described(topic: Topic) -> str:
 
 
 def _file_text(file: str, duration: int, start: int, messages: int) -> str:
-    # The keys of a file stand in another order than those of the whole, as rosbag2 writes them.
+    # The keys of a file are in another order than those of the bag, as rosbag2 writes them.
     return _path_text(file) + _indented(
         f'starting_time:\n  nanoseconds_since_epoch: {start}\n'
         f'duration:\n  nanoseconds: {duration}\n'
@@ -223,7 +224,7 @@ def _file_text(file: str, duration: int, start: int, messages: int) -> str:
     )
 
 
-# By the name alone: the counts of the newest file are others each second.
+# Cached by name only: the counts of the newest file change each second.
 @lru_cache(maxsize=8192)
 def _path_text(file: str) -> str:
     return _dump([{'path': file}])

@@ -14,12 +14,11 @@
 
 
 """
-The messages of a bag in the order of their log times; equal times in the order of the file.
+Read the messages of a bag by log time; messages with equal times in file order.
 
 A file with an index is read chunk by chunk, each chunk when its time has come: memory holds only
 the chunks whose times overlap, and chunks before a given start are not read. A file without an
-index (its recording was killed, or wrote none) is read from its beginning, and sorted within a
-window.
+index (its recording was killed, or wrote none) is read from its start, and sorted within a window.
 """
 
 from __future__ import annotations
@@ -45,21 +44,21 @@ from linkage_ros.bag.reader import Bag, BagMessage, unreadable
 from linkage_ros.errors import BagError
 
 WINDOW = 1_000_000_000
-"""How far out of order messages may stand in a file without an index, in [ns]."""
+"""How far out of order the messages of a file without an index may be, in [ns]."""
 
 MOST_HELD = 2**30
-"""How many bytes may be held: of chunks whose times overlap, or of a window."""
+"""Most bytes in memory: of chunks whose times overlap, or of a window."""
 
 _BESIDE = 400
-"""The memory that a message takes beside its own bytes."""
+"""Memory of a message in addition to its bytes."""
 
 _Entry = tuple[int, int, int, int, BagMessage | None]
-"""Time, number of the file, place of the chunk, number in it from 1; a whole chunk has none."""
+"""Time, index of the file, position of the chunk, number in it from 1; 0 for a whole chunk."""
 
 
 class LogTimeOrder:
     """
-    The order of a bag's messages in time.
+    Messages of a bag, ordered by log time.
 
     Parameters
     ----------
@@ -69,9 +68,9 @@ class LogTimeOrder:
     Attributes
     ----------
     begin
-        The least log time, in [ns]; None without messages.
+        Least log time, in [ns]; None without messages.
     end
-        The greatest, in [ns]; None if the whole bag must be read to know it.
+        Greatest log time, in [ns]; None if this requires reading the whole bag.
 
     Raises
     ------
@@ -83,7 +82,7 @@ class LogTimeOrder:
     def __init__(self, bag: Bag) -> None:
         self._files, self._path = bag.files, bag.path
         self._definitions: dict[int, Definitions] = {}
-        self._chunks: list[tuple[int, _Entry]] = []  # each with its last time
+        self._chunks: list[tuple[int, _Entry]] = []  # with the last time of each
         unindexed = []
         for number, file in enumerate(bag.files):
             index = _index(file)
@@ -92,7 +91,7 @@ class LogTimeOrder:
                 continue
             self._definitions[number] = index.definitions
             for chunk in index.chunks:
-                # One that holds definitions only has no times.
+                # A chunk of definitions only has no times.
                 if chunk.message_end_time or chunk.message_index_offsets:
                     place = chunk.message_start_time, number, chunk.chunk_start_offset, 0, None
                     self._chunks.append((chunk.message_end_time, place))
@@ -108,7 +107,7 @@ class LogTimeOrder:
         Raises
         ------
         BagError
-            A file is damaged; the messages before the damage have been given by then.
+            A file is damaged; the messages before the damage have been yielded by then.
 
         """
         yield from merge(
@@ -129,13 +128,13 @@ class LogTimeOrder:
                 held -= len(message.data) + _BESIDE
                 yield message
                 continue
-            for index, found in enumerate(self._read(number, place), 1):
-                if found.log_time >= since:
-                    held = self._hold(held, found)
-                    heappush(heap, (found.log_time, number, place, index, found))
+            for index, following in enumerate(self._read(number, place), 1):
+                if following.log_time >= since:
+                    held = self._hold(held, following)
+                    heappush(heap, (following.log_time, number, place, index, following))
 
     def _ordered(self, messages: Iterator[BagMessage]) -> Iterator[BagMessage]:
-        """Yield messages in the order of their times, each as soon as one is a window later."""
+        """Yield messages by log time, each as soon as one is a window later."""
         heap: list[tuple[int, int, BagMessage]] = []
         numbers = count()
         held = 0
@@ -150,7 +149,7 @@ class LogTimeOrder:
             yield heappop(heap)[2]
 
     def _hold(self, held: int, message: BagMessage) -> int:
-        """Return how many bytes are held with one message more."""
+        """Count the bytes held with one more message."""
         held += len(message.data) + _BESIDE
         if held > MOST_HELD:
             raise BagError(
@@ -161,15 +160,15 @@ class LogTimeOrder:
         return held
 
     def _read(self, number: int, place: int) -> list[BagMessage]:
-        """Return the messages of the chunk at a place of a file."""
+        """Return the messages of one chunk of a file."""
         file = self._files[number]
         try:
             with file.open('rb') as stream:
                 content = content_of(chunk_at(Source(stream), place))
-            found = messages_in(content, self._definitions[number])
+            messages = messages_in(content, self._definitions[number])
             return [
                 BagMessage(each.channel.topic, each.log_time, each.publish_time, each.data)
-                for each in found
+                for each in messages
             ]
         except OSError as error:
             raise unreadable(file, error) from None

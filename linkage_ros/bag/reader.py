@@ -50,16 +50,16 @@ from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 MOST_METADATA = 8 * 2**20
-"""How long metadata may be; of a bag with thousands of topics rosbag2 writes some megabytes."""
+"""Greatest size of the metadata; for thousands of topics rosbag2 writes some megabytes."""
 
 _WITHOUT = 'move metadata.yaml away to read the folder without it'
 
 
 def custom_of(information: Mapping[str, Any]) -> dict[str, str]:
-    """Return the ``custom_data`` of a bag's metadata: of what is there, what is plain text."""
+    """Return the ``custom_data`` of a bag's metadata: its plain values, as strings."""
     custom = information.get('custom_data')
     entries = custom.items() if isinstance(custom, dict) else ()
-    # Not of lists: aliases make a small file's text as long as memory.
+    # No lists: with aliases a small file could expand to fill memory.
     return {str(k): str(v) for k, v in entries if not isinstance(v, dict | list | set | tuple)}
 
 
@@ -102,7 +102,7 @@ def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
         return [path]
     named = information.get('relative_file_paths')
     if isinstance(named, list) and named:
-        # By name only, as rosbag2 does: old bags carry the folder too, which may have moved.
+        # By name only, as rosbag2 does: old bags also name the folder, which may have moved.
         names = [_name_of(path, PurePosixPath(str(name))) for name in named]
     else:
         names = [file.name for file in sorted(path.glob('*.mcap'), key=by_number)]
@@ -120,7 +120,7 @@ def files_of(path: Path, information: Mapping[str, Any]) -> list[Path]:
 
 
 def by_number(file: Path) -> tuple[int, str]:
-    """Return the key to sort files by: NAME_2.mcap stands before NAME_10.mcap."""
+    """Return a key to sort files by number: NAME_2.mcap comes before NAME_10.mcap."""
     return len(file.name), file.name
 
 
@@ -131,7 +131,7 @@ def _name_of(folder: Path, path: PurePosixPath) -> str:
 
 
 def is_empty(file: Path) -> bool:
-    """Return whether a file is there, and nothing in it."""
+    """Return whether a file exists and is empty."""
     try:
         return file.stat().st_size == 0
     except OSError:
@@ -139,11 +139,11 @@ def is_empty(file: Path) -> bool:
 
 
 def is_finished(file: Path) -> bool:
-    """Return whether the file is MCAP to its end; raise if not even its beginning is."""
+    """Return whether an MCAP file is complete; raise if it is not an MCAP file."""
     length = len(MCAP0_MAGIC)
     try:
         if file.exists() and not file.is_file():
-            # To open a pipe would wait for somebody to write to it.
+            # Opening a pipe would wait for a writer.
             raise BagError(file, 'is no file', "name a bag's folder, or its file")
         with file.open('rb') as stream:
             start = stream.read(length)
@@ -171,17 +171,18 @@ def unreadable(file: Path, error: OSError) -> BagError:
 
 def is_in_use(file: Path) -> bool:
     """
-    Return whether some process has a file open for writing; False if that cannot be known.
+    Return whether a process has a file open for writing; False if that cannot be known.
 
-    A lease for reading is granted where nobody has. It is asked of the system and given back at
-    once; nothing is locked. Only a file's owner may ask, and not of every file system.
+    The system grants a read lease only if no process does. The lease is returned at once; nothing
+    is locked. Only a file's owner may ask, and not every file system supports it.
     """
     try:
         descriptor = os.open(file, os.O_RDONLY)
     except OSError:
         return False
     try:
-        # Who opens the file between the two lines has us told, by default with a deadly signal.
+        # A process that opens the file between the two lines causes a signal, by default a fatal
+        # one.
         fcntl(descriptor, F_SETSIG, SIGURG)
         fcntl(descriptor, F_SETLEASE, F_RDLCK)
         fcntl(descriptor, F_SETLEASE, F_UNLCK)
@@ -196,14 +197,14 @@ def is_in_use(file: Path) -> bool:
 
 class FooterMetadata(NamedTuple):
     """
-    The metadata that our writer puts at the end of a file.
+    Metadata that our writer puts at the end of a file.
 
     Attributes
     ----------
     custom
-        ``custom_data`` of the bag, as it was when the file was ended.
+        ``custom_data`` of the bag at the end of the file.
     accounted
-        Whether the statistics are there, the last record of a recording.
+        Whether it has the statistics, the last record of a recording.
 
     """
 
@@ -220,37 +221,37 @@ def footer_metadata(file: Path) -> FooterMetadata:
             source = Source(stream)
             records = index_of(source).metadata
             accounted = any(each.name == STATS_RECORD for each in records)
-            # Where there are several, the last says what came of it in the end.
+            # Of several records, the last one has the final outcome.
             said = [each for each in records if each.name == 'rosbag2'][-1:]
             for each in said:
                 content = source.read(each.offset, each.length)
-                # What others say there may take seconds to understand, and tells us nothing.
+                # Other records may take seconds to parse, and are not needed.
                 if b'linkage_ros.' in content:
                     head = HEAD.size
                     record = strict(Metadata, content[head:])
                     custom = custom_of(serialized_metadata(record))
     except (DamagedError, OSError):
-        pass  # to be met, and told, when the messages are read
+        pass  # reading the messages reports the error
     return FooterMetadata(custom, accounted)
 
 
 RUN_FILE = 'run.json'
-"""Name of the attachment in which a run names its scene, topics and versions."""
+"""Name of the attachment with the run's scene, topics and versions."""
 
 _RECOVER = 'linkage recover makes a whole bag of what is there'
 
 MOST_ATTACHED = 64 * 2**20
-"""How many bytes of the attachments of a file are kept in memory."""
+"""Most bytes of a file's attachments in memory."""
 
 _LONGEST_QOS, _MOST_QOS = 1024, 64
-"""Of one profile: letters, and values; rosbag2 writes some 320 and 33."""
+"""Most characters and values of one profile; rosbag2 writes some 320 and 33."""
 
 ProgressCallback = Callable[[int], None]
-"""Takes how many bytes of a file have been read, now and then; what it raises ends the reading."""
+"""Takes the number of bytes read of a file; an exception from it ends the reading."""
 
 
 class BagMessage(NamedTuple):
-    """One message: the topic's name, when it was received and made [ns], and its CDR bytes."""
+    """A message: name of the topic, log and publish time [ns], and its CDR bytes."""
 
     topic: str
     log_time: int
@@ -266,20 +267,20 @@ class Bag:
     Parameters
     ----------
     path
-        As it was named.
+        Path as given by the user.
     files
         Its MCAP files, in the order of recording.
     topics
         Its topics.
     attachments
-        Name to content, up to 64 MiB of them.
+        Content by name, up to 64 MiB in total.
     passed_over
-        Names of the attachments that are not read, since they are beyond that.
+        Names of the attachments that are not read, since they exceed this limit.
     custom
-        ``custom_data`` of its metadata, or where these are missing of its last file.
+        ``custom_data`` of its metadata; without metadata, that of its last file.
     truncated
-        Whether an end is missing, since its recording was killed or still runs: of a file, or of
-        the bag, where all of its files are whole and the next one never came.
+        Whether an end is missing, since the recording was killed or is still running: the end of a
+        file, or a further file of a bag whose files are complete.
 
     """
 
@@ -295,21 +296,21 @@ class Bag:
         """
         Iterate over the messages in the order in which they were written.
 
-        That is the order of the file, not of the log times: a replay wants to see what the
-        recorder saw. A truncated bag ends with its last whole chunk.
+        This is the file order, not the order of log times: a replay needs the order of the
+        recorder. A truncated bag ends with its last whole chunk.
 
         Raises
         ------
         BagError
-            The file is damaged; the messages before the damage have been given by then.
+            A file is damaged; the messages before the damage have been yielded by then.
 
         """
         for file in self.files:
             until_damage = self.truncated and file == self.files[-1]
-            for found in _contents(file, Definitions(), _untold, until_damage=until_damage):
-                if isinstance(found, Message):
+            for record in _contents(file, Definitions(), _untold, until_damage=until_damage):
+                if isinstance(record, Message):
                     yield BagMessage(
-                        found.channel.topic, found.log_time, found.publish_time, found.data
+                        record.channel.topic, record.log_time, record.publish_time, record.data
                     )
 
 
@@ -324,14 +325,14 @@ def read_bag(
     path
         The bag's folder, or an MCAP file.
     allow_truncated
-        Whether a bag whose recording was killed will do, as far as it goes.
+        Whether to accept the bag of a killed recording, as far as it goes.
     told
-        Is told of the reading of files without an index, which are read to their end.
+        Progress callback for files without an index, which are read to their end.
 
     Raises
     ------
     BagError
-        It is missing, empty, not an MCAP file, damaged, or truncated and that will not do.
+        It is missing, empty, not an MCAP file, damaged, or truncated although that is not allowed.
 
     """
     path = Path(path)
@@ -339,7 +340,7 @@ def read_bag(
     files = files_of(path, information)
     begun = allow_truncated and len(files) > 1 and is_empty(files[-1])
     if begun:
-        # Killed between making the next file and writing to it.
+        # Killed after creating the next file and before writing to it.
         files.pop()
     whole = [is_finished(file) for file in files]
     if not all(whole) and not allow_truncated:
@@ -362,9 +363,9 @@ def read_bag(
                 attachments.setdefault(attachment.name, attachment.data)
     ending = footer_metadata(files[-1])
     custom = custom_of(information) if information else ending.custom
-    # Where the account is there, nothing is missing but the last words of the metadata.
+    # With the final statistics, only the last update of the metadata is missing.
     unfinished = UNFINISHED in custom and not ending.accounted
-    # A file that was named by itself is whole, wherever its recording went on.
+    # A file given by itself is complete, even if its recording continues in another file.
     if unfinished and path.is_dir() and not allow_truncated:
         raise BagError(path, 'is not finished: its recording was killed, or still runs', _RECOVER)
     return Bag(
@@ -382,7 +383,7 @@ def _description(
     file: Path, told: ProgressCallback, *, finished: bool
 ) -> tuple[Definitions, list[Attachment], list[str]]:
     """
-    Return schemas and channels, attachments, and names of those that are not kept in memory.
+    Return schemas and channels, attachments, and the names of attachments not kept in memory.
 
     They come from the file's index, if it has one.
     """
@@ -396,11 +397,11 @@ def _description(
                 )
     definitions = Definitions()
     contents = _contents(file, definitions, told, until_damage=not finished)
-    return definitions, *_kept(found for found in contents if isinstance(found, Attachment))
+    return definitions, *_kept(record for record in contents if isinstance(record, Attachment))
 
 
 def _kept(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str]]:
-    """Return the attachments that are kept in memory, and the names of those that do not fit."""
+    """Return the attachments that fit into memory, and the names of the others."""
     kept, beyond, left = [], [], MOST_ATTACHED
     for attachment in attachments:
         if len(attachment.data) <= left:
@@ -414,7 +415,7 @@ def _kept(attachments: Iterable[Attachment]) -> tuple[list[Attachment], list[str
 def _contents(
     file: Path, definitions: Definitions, told: ProgressCallback, *, until_damage: bool
 ) -> Iterator[Found]:
-    """Yield messages, attachments and metadata in the order of the file; checksums fit."""
+    """Yield messages, attachments and metadata in file order, with checksums verified."""
     finished = is_finished(file)
     with _translated(file), file.open('rb') as stream:
         source = Source(stream)
@@ -429,9 +430,9 @@ def _contents(
             while not data.finished:
                 told(at)
                 records, end = data.take(at)
-                for found in records:
-                    messages += isinstance(found, Message)
-                    yield found
+                for record in records:
+                    messages += isinstance(record, Message)
+                    yield record
                 at = end
         except DamagedError as error:
             if until_damage and not finished:
@@ -462,7 +463,7 @@ def _translated(file: Path) -> Iterator[None]:
 
 
 def topic_of(channel: Channel, schema: Schema | None) -> Topic:
-    """Return the topic that a channel is."""
+    """Return the topic of a channel."""
     return Topic(
         name=channel.topic,
         type=schema.name if schema else '',
@@ -474,15 +475,15 @@ def topic_of(channel: Channel, schema: Schema | None) -> Topic:
 
 @lru_cache(maxsize=256)
 def _qos(text: str) -> QosProfile:
-    """Return the first of the profiles; the default if there is none, or none to be understood."""
-    # One for each publisher: of /tf there may be hundreds.
+    """Return the first profile; the default if there is none or it is invalid."""
+    # The list has one profile per publisher: for /tf possibly hundreds.
     first = text.partition('\n- ')[0]
     try:
         if len(first) > _LONGEST_QOS:
             raise ValueError
         return QosProfile.from_mapping(bounded_yaml(first, _MOST_QOS)[0])
-    except Exception:  # noqa: BLE001 (whatever yaml and the numbers in it raise)
-        # A QoS nobody understands is no reason to withhold the messages.
+    except Exception:  # noqa: BLE001 (yaml and its numbers raise many kinds)
+        # An invalid QoS is no reason to refuse the messages.
         return QosProfile(understood=not text)
 
 

@@ -14,12 +14,12 @@
 
 
 """
-Record from the hot path: hand over and forget.
+Record on a separate thread; the caller only hands messages over.
 
-``offer`` is two length checks and an append. A thread of the recorder's own does the rest. A disk
-that stalls or fills stops that thread only: the queue fills, and further messages are counted.
-After a full disk the recording goes on in a new file of the bag as soon as there is room; whatever
-it ends by, the bag says what became of all that was offered until `Recorder.stop`.
+``offer`` is two length checks and an append. The recorder's thread does the rest. A disk that
+stalls or fills stops only that thread: the queue fills, and further messages are counted as
+dropped. After a full disk the recording continues in a new file of the bag as soon as there is
+space. However it ends, the bag states the outcome of all messages offered until `Recorder.stop`.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 
 POLL = 0.02
-"""How often a thread looks for what was offered, in [s]."""
+"""Period at which a thread checks the queue, in [s]."""
 
 ROOM_POLL = 1.0
-"""How often a recorder looks whether a disk that was full has room again, in [s]."""
+"""Period at which a recorder checks a full disk for space, in [s]."""
 
 BATCH, NAP = 50, 50e-6
 """
@@ -62,15 +62,15 @@ offers. To count bytes, these threads would need a lock, and a tick would wait f
 """
 
 Offered = tuple[int, int, int, bytes]
-"""A message on its way: topic, log time, publish time [ns] and its CDR bytes."""
+"""A message in the queue: topic, log time, publish time [ns] and its CDR bytes."""
 
 
 class ThreadCounter:
     """
-    A counter that several threads count up without a lock.
+    A counter that several threads increment without a lock.
 
-    Stepping an `itertools.count` is one C call, which threads cannot tear apart as they can
-    ``n += 1``. It can only be read by stepping it, so the steps made for reading are taken off.
+    A step of an `itertools.count` is one C call, atomic for threads unlike ``n += 1``. Reading the
+    counter takes a step too, so the steps made by reading are subtracted.
     """
 
     __slots__ = ('_reading', '_readings', 'add')
@@ -89,19 +89,19 @@ class ThreadCounter:
 
 class MessageQueue:
     """
-    Messages on their way to one thread, and how many of each topic were offered and dropped.
+    Queue of messages to one thread, with counts of offered and dropped messages by topic.
 
     Parameters
     ----------
     topics
-        How many topics there are.
+        Number of topics.
     capacity
-        Messages that may wait, each of up to `PLACE`; a larger one counts as so many more.
+        Messages that may wait, each of up to `PLACE` bytes; a larger one counts as several.
 
     Attributes
     ----------
     open
-        Whether messages are taken; else they are dropped.
+        Whether messages are accepted; else they are dropped.
     received, dropped
         A counter for each topic.
 
@@ -118,17 +118,17 @@ class MessageQueue:
 
     def offer(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
         """
-        Hand over one message, from any thread; never blocks, never raises for the disk's sake.
+        Hand over one message, from any thread; never blocks, and never raises on a disk error.
 
         Parameters
         ----------
         topic
             The topic's number.
         log_time, publish_time
-            When it was received, and when its source made it [ns].
+            Time of reception, and time at the source [ns].
         data
-            The CDR bytes. They are kept, not copied: a buffer that is reused must be given as
-            ``bytes(buffer)``.
+            The CDR bytes. They are kept, not copied: pass ``bytes(buffer)`` for a buffer that is
+            reused.
 
         """
         self._add_received[topic]()
@@ -141,11 +141,11 @@ class MessageQueue:
             self._waiting.extend(((topic, log_time, publish_time, data), *(None,) * places))
 
     def __len__(self) -> int:
-        """Return how many places are taken."""
+        """Return the number of occupied places."""
         return len(self._waiting)
 
     def take(self, most: int) -> Iterator[Offered]:
-        """Yield the messages that wait, of so many places."""
+        """Yield the waiting messages, of at most this number of places."""
         for _ in range(min(most, len(self._waiting))):
             if message := self._waiting.popleft():
                 yield message
@@ -154,11 +154,11 @@ class MessageQueue:
 @dataclass(frozen=True, slots=True)
 class TopicCounts:
     """
-    What became of one topic's messages.
+    Counts of one topic's messages.
 
-    ``received == recorded + dropped + let_go + waiting``, at every instant. Waiting is what is in
-    the queue or in the hands of the recorder's thread, let go what was recorded in a file that
-    made way for a newer one.
+    At every instant ``received == recorded + dropped + let_go + waiting``. Waiting messages are in
+    the queue or with the recorder's thread; let_go messages were recorded in a file that was
+    removed for a newer one.
     """
 
     name: str
@@ -172,19 +172,19 @@ class TopicCounts:
 @dataclass(frozen=True, slots=True)
 class RecordingSummary:
     """
-    How a recording went.
+    Outcome of a recording.
 
     Parameters
     ----------
     folder
-        The bag.
+        Folder of the bag.
     topics
-        Counts for each topic, in the order of their numbers; nothing waits any more, so
+        Counts for each topic, in the order of their numbers; no message waits any more, so
         ``received == recorded + dropped + let_go``.
     size
         Size of the MCAP files [bytes].
     failure
-        Why messages are missing, on one line; None where no disk has failed.
+        Reason for missing messages, on one line; None if no disk has failed.
 
     """
 
@@ -196,17 +196,17 @@ class RecordingSummary:
 
 class Recorder:
     """
-    A bag that is written on a thread of its own.
+    Writes a bag on its own thread.
 
     Parameters
     ----------
     writer
-        The open bag, the recorder's from here on.
+        The open bag, which the recorder owns from now on.
     capacity
-        Messages that may wait, each of up to 16 KiB; a larger one counts as so many more. The
-        default is 16 s of two topics at 2 kHz, about 25 MB, and 1 GiB at most.
+        Messages that may wait, each of up to 16 KiB; a larger one counts as several. The default
+        is 16 s of two topics at 2 kHz, about 25 MB, and 1 GiB at most.
     flush_period
-        What a power cut may cost [s], as long as the disk answers within a tenth of it.
+        Time whose messages a power cut may lose [s], if the disk answers within a tenth of it.
 
     """
 
@@ -214,7 +214,7 @@ class Recorder:
         self, writer: BagWriter, *, capacity: int = 65536, flush_period: float = 1.0
     ) -> None:
         self.failure: RecordingError | None = None
-        """Why messages are lost, or were; a recording that went on again has one too."""
+        """Reason for lost messages; also set after a recording has continued."""
         self._recording = True
         self.folder = writer.folder
         self._writer = writer
@@ -222,22 +222,23 @@ class Recorder:
         self._queue = MessageQueue(len(writer.topics), capacity)
         self.offer = self._queue.offer
         """Hands over one message, as `MessageQueue.offer`."""
-        # The thread's own: what the writer took, and what did not get there. One tuple, so that
-        # another thread never sees a message in both, or in neither.
+        # Written by the recorder's thread: counts of messages taken by the writer, and of lost
+        # ones. One tuple, so that another thread never sees a message in both counts, or in
+        # neither.
         self._done = ([0] * len(writer.topics), [0] * len(writer.topics))
         self._safe = (0,) * len(writer.topics)
         self._custom: dict[str, str] = {}
         writer.account = self._account
         self._summary: RecordingSummary | None = None
         self._stopping = threading.Event()
-        # A daemon: a disk that never answers must not keep the process from ending.
+        # A daemon thread: a disk that never answers must not keep the process alive.
         self._thread = threading.Thread(target=self._run, name='bag recorder', daemon=True)
         self._thread.start()
 
     def inspect(self) -> tuple[TopicCounts, ...]:
-        """Return the counts as they are now; after a failure, ``recorded`` is what was kept."""
+        """Return the current counts; after a failure, ``recorded`` counts the messages kept."""
         counts = []
-        # First, so that nothing is let go that was not taken.
+        # Read first, so that no message is let go before it is recorded.
         let_go = self._writer.let_go
         opened = self._writer.opened
         taken, lost = self._done
@@ -245,7 +246,7 @@ class Recorder:
             gone = let_go[number]
             recorded = taken[number] + opened[number] - gone
             dropped = self._queue.dropped[number].value() + lost[number]
-            # Last, so that a message on its way is waiting, and never gone twice.
+            # Read last, so that a message in transit counts as waiting, and never twice.
             received = self._queue.received[number].value() + opened[number]
             waiting = received - recorded - dropped - gone
             counts.append(TopicCounts(topic.name, received, recorded, dropped, waiting, gone))
@@ -255,15 +256,15 @@ class Recorder:
         self, custom: Mapping[str, str] | None = None, *, timeout: float = 10.0
     ) -> RecordingSummary:
         """
-        Write what waits, close the bag and say how it went; raises nothing.
+        Write the waiting messages, close the bag and return the outcome; raises nothing.
 
         Parameters
         ----------
         custom
-            Goes to ``custom_data`` of the bag's metadata, beside the account.
+            Additional entries for ``custom_data`` of the bag's metadata.
         timeout
-            How long a disk that does not answer is waited for [s]. After that the summary counts
-            as recorded only what a flush has brought to the disk.
+            Longest wait for a disk that does not answer [s]. After it, the summary counts only
+            flushed messages as recorded.
 
         """
         if self._summary:
@@ -296,12 +297,12 @@ class Recorder:
 
     @property
     def recording(self) -> bool:
-        """Return whether messages get into the bag; not after a failure, until there is room."""
+        """Return whether messages reach the bag; False after a failure, until there is space."""
         return self._recording
 
     @property
     def ended(self) -> bool:
-        """Return whether it has failed for good, so that no more messages are taken."""
+        """Return whether it has failed for good, and accepts no more messages."""
         return self.failure is not None and not self._queue.open
 
     def _run(self) -> None:
@@ -311,7 +312,7 @@ class Recorder:
                 if self._goes_on():
                     self._record()
                 going = False
-            except Exception as error:  # noqa: BLE001, PERF203 (nothing ends it in silence)
+            except Exception as error:  # noqa: BLE001, PERF203 (no error may end it silently)
                 self._fail(error)
         try:
             self._writer.close(self._custom)
@@ -321,7 +322,7 @@ class Recorder:
         self._lose_queue()
 
     def _goes_on(self) -> bool:
-        """Wait after a failure until there is room again; return False where nobody waits."""
+        """Wait after a failure until there is space again; return False when stopped."""
         while not self._recording:
             patience = ROOM_POLL if self._writer.out_of_room else None
             if self._stopping.wait(patience):
@@ -330,27 +331,27 @@ class Recorder:
         return True
 
     def _record(self) -> None:
-        """Write what is offered until the recorder is to stop."""
+        """Write the offered messages until the recorder is to stop."""
         due = time.monotonic() + self._flush_after
         stopping = False
         while not stopping:
-            # Asked before the queue is emptied: what was offered until then is written.
+            # Checked before the queue is emptied: messages offered until then are written.
             stopping = self._stopping.wait(max(0.0, min(POLL, due - time.monotonic())))
             more = True
             while more:
                 more = self._write_batch()
                 now = time.monotonic()
-                # A backlog first, lest a slow disk leave time for nothing but flushes.
+                # A backlog comes first, else a slow disk would only flush.
                 if now >= due + self._flush_after * more:
                     self._writer.flush()
                     self._safe = tuple(self._done[0])
-                    # What came while it lasted is not with the system yet.
+                    # Messages that arrived during the flush have not reached the system yet.
                     due = max(now + self._flush_after, time.monotonic())
                 if more:
                     time.sleep(NAP)
 
     def _account(self, summary: BagSummary) -> RecordingStats:
-        """Return what became of all messages, once no more are taken; `dropped` is the rest."""
+        """Return the final statistics, when no more are taken; `dropped` is the remainder."""
         received = [
             tally.value() + opened
             for tally, opened in zip(self._queue.received, self._writer.opened, strict=True)
@@ -366,7 +367,7 @@ class Recorder:
         queue, write, (taken, lost) = self._queue, self._writer.write, self._done
         for message in queue.take(BATCH):
             topic = message[0]
-            # Until the writer has answered, the message is counted nowhere, and so it waits.
+            # Until the writer returns, the message is not counted, and so it waits.
             try:
                 kept = write(*message)
             except BaseException:
@@ -376,7 +377,7 @@ class Recorder:
         return bool(queue)
 
     def _fail(self, error: Exception) -> None:
-        """Keep the failure, and count as recorded only what the writer could keep."""
+        """Store the failure, and count only the messages kept by the writer as recorded."""
         self._recording = False
         if not isinstance(error, RecordingError):
             reason = f'the recording ended early: {type(error).__name__}: {error}'
@@ -388,7 +389,7 @@ class Recorder:
         self.failure = error
 
     def _count_kept(self) -> None:
-        """Count as lost what the writer has taken and could not keep."""
+        """Count messages as lost that the writer took and could not keep."""
         kept = self._writer.kept
         taken, lost = self._done
         lost = [gone + had - has for gone, had, has in zip(lost, taken, kept, strict=True)]
@@ -396,7 +397,7 @@ class Recorder:
         self._safe = kept
 
     def _lose_queue(self) -> None:
-        """Count what waits as lost."""
+        """Count the waiting messages as lost."""
         _, lost = self._done
         while self._queue:
             for topic, *_ in self._queue.take(BATCH):

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Statistics of a recording, written into the bag: counts of messages, and how it ended."""
+"""Statistics of a recording in the bag: counts of messages, and how it ended."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from linkage_ros.bag.metadata import BagSummary, metadata_text
 _PREFIX = 'linkage_ros.'
 
 STATS_RECORD = f'{_PREFIX}account'
-"""Name of the metadata record at the end of a bag's last file that holds `RecordingStats`."""
+"""Name of the metadata record with the `RecordingStats` at the end of a bag's last file."""
 
 LET_GO = f'{_PREFIX}let_go'
-"""Key in the ``custom_data`` of a bag whose first files are gone: a JSON object by topic."""
+"""Key in the ``custom_data`` of a bag whose first files were removed: counts by topic, as JSON."""
 
 FAILURE = f'{_PREFIX}failure'
-"""Key in the ``custom_data`` of a bag whose recording ended early: why."""
+"""Key in the ``custom_data`` of a bag whose recording ended early: the reason."""
 
 UNFINISHED = f'{_PREFIX}unfinished'
-"""Key in the ``custom_data`` of a bag that is being recorded, or whose recording was killed."""
+"""Key in the ``custom_data`` of a bag in recording, or of a killed recording."""
 
 UNFINISHED_DATA: Mapping[str, str] = {
     UNFINISHED: 'being recorded, or killed; counted is what was on the disk by the last flush'
@@ -49,11 +49,11 @@ class RecordingStats(NamedTuple):
     Attributes
     ----------
     received
-        Messages that were offered to the recorder.
+        Messages offered to the recorder.
     recorded
         Messages in the bag.
     dropped
-        Messages for which the disk was too slow or too full, or that no bag can hold.
+        Messages for which the disk was too slow or too full, or whose times do not fit into a bag.
     let_go
         Messages in files that were removed to keep newer ones.
 
@@ -74,11 +74,11 @@ def custom_data(
     Parameters
     ----------
     custom
-        Its other entries.
+        Further entries.
     summary
-        The contents of the bag.
+        Summary of the bag.
     account
-        The statistics; None while they are not known.
+        The statistics; None while they are unknown.
 
     """
     entries = dict(custom)
@@ -93,7 +93,7 @@ def custom_data(
 def last_records(
     custom: Mapping[str, str], summary: BagSummary, account: RecordingStats | None
 ) -> dict[str, dict[str, str]]:
-    """Return by their names the metadata records that end a file; arguments as `custom_data`."""
+    """Return the metadata records at the end of a file, by name; arguments as `custom_data`."""
     text = metadata_text(summary, custom_data(custom, summary, account), root=False)
     records = {'rosbag2': {'serialized_metadata': text}}
     if account:
@@ -111,7 +111,7 @@ def counts_in(custom: Mapping[str, str], word: str) -> dict[str, int]:
     custom
         The ``custom_data``.
     word
-        Which counts: 'received', 'dropped' or 'let_go'.
+        Kind of counts: 'received', 'dropped' or 'let_go'.
 
     """
     try:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Make a whole bag of what a damaged one still holds; the damaged one is read, nothing else."""
+"""Recover a whole bag from a damaged one, which is only read."""
 
 from __future__ import annotations
 
@@ -55,15 +55,15 @@ from mcap.records import Attachment, Channel
 from mcap.writer import CompressionType, Writer
 
 RECOVERED = 'linkage_ros.recovered'
-"""Key in the ``custom_data`` of a recovered bag: what it was made of, and what was lost."""
+"""Key in the ``custom_data`` of a recovered bag: its origin and losses."""
 
 
 NOTHING_LOST = 'nothing lost'
-"""How that text ends where it is so."""
+"""End of that text if nothing was lost."""
 
 
 class TopicRecovery(NamedTuple):
-    """How many messages of a topic were saved, and how many there were; None if unknown."""
+    """Numbers of messages of a topic: saved, and originally present (None if unknown)."""
 
     name: str
     saved: int
@@ -72,22 +72,22 @@ class TopicRecovery(NamedTuple):
 
 class Recovery(NamedTuple):
     """
-    What became of a damaged bag.
+    Outcome of a recovery.
 
     Attributes
     ----------
     folder
         The new bag.
     topics
-        What was saved of each, and what was to be there.
+        Saved and original messages of each topic.
     attachments
-        Names of those that were saved.
+        Names of the saved attachments.
     losses
-        What is lost, with the name of its file.
+        Losses, each with the name of its file.
     repaired
-        What was damaged or missing and cost nothing, each on a line.
+        Damage or missing parts without loss, one line each.
     remarks
-        What else one has to know, each on a line.
+        Further remarks, one line each.
 
     """
 
@@ -100,16 +100,16 @@ class Recovery(NamedTuple):
 
     @property
     def missing(self) -> int:
-        """Return how many messages were promised and are not there."""
+        """Return the number of messages that the bag should have and that are missing."""
         return sum(max((topic.promised or 0) - topic.saved, 0) for topic in self.topics)
 
     @property
     def whole(self) -> bool:
-        """Return whether nothing was lost."""
+        """Return whether there is no loss."""
         return not self.losses and not self.missing
 
     def in_short(self, path: Path) -> str:
-        """Return in a line what became of the bag of this name."""
+        """Return the outcome for the bag of this name, as one line."""
         saved = sum(topic.saved for topic in self.topics)
         lost = NOTHING_LOST
         if not self.whole:
@@ -119,32 +119,32 @@ class Recovery(NamedTuple):
 
 
 def promised_counts(information: Mapping[str, Any]) -> dict[str, int]:
-    """Return how many messages of each topic ``metadata.yaml`` promises, if it does."""
+    """Return the message count of each topic in ``metadata.yaml``, if it has them."""
     counts = {}
     try:
         for each in information['topics_with_message_count']:
             counts[str(each['topic_metadata']['name'])] = int(each['message_count'])
-    except Exception:  # noqa: BLE001 (it may say anything)
+    except Exception:  # noqa: BLE001 (its content may be anything)
         return {}
     return counts if any(counts.values()) else {}
 
 
 MOST_CHANNELS = 10_000
-"""How many channels a new bag may have: its metadata, 700 bytes for each, must stay readable."""
+"""Most channels of a new bag: its metadata, 700 bytes for each, must stay readable."""
 
 
 class NewBag:
     """
-    A new bag, open for writing.
+    A new bag that is open for writing.
 
     Parameters
     ----------
     folder
-        Where it goes; it is there, and empty.
+        Its folder, which exists and is empty.
     profile
         The profile of its file: 'ros2'.
     compression
-        How its chunks are packed: '', 'lz4' or 'zstd'.
+        Compression of chunks: '', 'lz4' or 'zstd'.
 
     Attributes
     ----------
@@ -153,14 +153,14 @@ class NewBag:
     attachments
         Content by name.
     information
-        What rosbag2 wrote of itself into the file that this is made of.
+        Metadata that rosbag2 wrote into the damaged file.
 
     Raises
     ------
     OSError
-        As the system gives it, here and from all that writes.
+        As the system raises it, here and in all methods that write.
     BagError
-        From `add` and `describe`: there are more than `MOST_CHANNELS`.
+        From `add` and `describe`: more than `MOST_CHANNELS` channels.
 
     """
 
@@ -190,17 +190,17 @@ class NewBag:
         return tuple(self._topics)
 
     def begin_file(self) -> None:
-        """Forget the numbers of channels: they are those of a file."""
+        """Forget the channel numbers, which are valid for one file."""
         self._numbers.clear()
 
     def add(self, found: Found, definitions: Definitions) -> None:
-        """Add what was found in a file, of which these schemas and channels are known."""
+        """Add an item found in a file, with the file's schemas and channels so far."""
         if isinstance(found, Message):
             if not self._numbers:
                 self.describe(definitions)
             number = self._numbers.get(found.channel.id)
             if number is None:
-                # Not all that are known by now: of thousands, each comes with its first message.
+                # Not all channels known so far: each of thousands comes with its first message.
                 number = self._number_of(found.channel, definitions)
                 self._numbers[found.channel.id] = number
             self._mcap.add_message(
@@ -210,7 +210,7 @@ class NewBag:
             self._start = min(self._start, found.log_time)
             self._end = max(self._end, found.log_time)
         elif isinstance(found, Attachment):
-            # Files of one bag repeat them.
+            # The files of one bag repeat them.
             if self.attachments.get(found.name) != found.data:
                 self.attachments.setdefault(found.name, found.data)
                 self._mcap.add_attachment(
@@ -222,13 +222,13 @@ class NewBag:
             self.information = serialized_metadata(found)
 
     def describe(self, definitions: Definitions) -> None:
-        """Take over all channels, those without a message too."""
+        """Add all channels, also those without a message."""
         for channel in definitions.channels.values():
             if channel.id not in self._numbers:
                 self._numbers[channel.id] = self._number_of(channel, definitions)
 
     def close(self, custom: Mapping[str, str]) -> BagSummary:
-        """Finish the bag, and return what it holds."""
+        """Finish the bag, and return its summary."""
         summary = self._summary()
         text = metadata_text(summary, custom, root=False)
         self._mcap.add_metadata('rosbag2', {'serialized_metadata': text})
@@ -242,12 +242,12 @@ class NewBag:
         return summary
 
     def abandon(self) -> None:
-        """Let go of the file; what is in it is of no use."""
+        """Close the file; its content is not needed."""
         with suppress(OSError):
             self._file.close()
 
     def _number_of(self, channel: Channel, definitions: Definitions) -> int:
-        """Return the number that a channel has here, the same for the same one of each file."""
+        """Return a channel's number in the new bag, the same for equal channels of all files."""
         schema = definitions.schema_of(channel)
         kind = (schema.name, schema.encoding, schema.data) if schema else None
         described = (channel.topic, channel.message_encoding, kind, *channel.metadata.items())
@@ -287,19 +287,19 @@ Stopped = Callable[[], bool]
 
 
 class _Findings:
-    """Losses, repairs and remarks, collected on the way."""
+    """Collected losses, repairs and remarks."""
 
     def __init__(self) -> None:
         self.losses: list[tuple[str, Loss]] = []
         self.repaired: list[str] = []
         self.remarks: list[str] = []
         self.promised: Counter[str] = Counter()
-        self.all_promised = True  # whether the index of each file could be believed
+        self.all_promised = True  # whether the index of each file is trusted
 
 
 def recovered_name(path: Path) -> Path:
-    """Return the folder that a bag is recovered to if none is named: beside it."""
-    whole = Path(os.path.abspath(path))  # noqa: PTH100 (a link keeps the name it goes by)
+    """Return the default folder for the recovered bag, beside the bag."""
+    whole = Path(os.path.abspath(path))  # noqa: PTH100 (keeps the name of a link)
     return whole.with_name(f'{whole.name if path.is_dir() else whole.stem}_recovered')
 
 
@@ -310,23 +310,23 @@ def recover(
     stopped: Stopped = lambda: False,
 ) -> Recovery | None:
     """
-    Save what is whole of a bag into a new one.
+    Save the whole parts of a bag to a new bag.
 
     Parameters
     ----------
     path
         The bag's folder, or an MCAP file.
     target
-        The new folder; without it `recovered_name`.
+        The new folder; by default `recovered_name`.
     told
-        Takes how many bytes have been seen, and of how many.
+        Progress callback; receives the number of bytes examined and the total.
     stopped
-        Whether to stop: then nothing is left behind, and nothing returned.
+        Returns whether to stop; then nothing is left behind, and the result is None.
 
     Raises
     ------
     BagError
-        It is no bag, leads out of its folder, has too many channels, or nothing of it is whole.
+        It is no bag, leads out of its folder, has too many channels, or no part of it is whole.
         Nothing was written.
     RecordingError
         The new folder exists or cannot be written to. Nothing is left behind.
@@ -353,7 +353,7 @@ def recover(
                         return None
             recovery = _recovery(target, bag, information, findings)
             custom = custom_of(information or bag.information)
-            # The old one had no end; the new one has.
+            # Unlike the old bag, the new one has an end.
             custom = {key: text for key, text in custom.items() if key != UNFINISHED}
             bag.close({**custom, RECOVERED: recovery.in_short(path)})
         finally:
@@ -362,7 +362,7 @@ def recover(
 
 
 def _information(path: Path, findings: _Findings) -> dict[str, Any]:
-    """Return what the metadata says; what is damaged says nothing."""
+    """Return the metadata; empty if damaged."""
     if not path.is_dir():
         return {}
     try:
@@ -375,23 +375,23 @@ def _information(path: Path, findings: _Findings) -> dict[str, Any]:
 
 
 def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> list[Path]:
-    """Return the files of a bag: those that are named, and those that lie there."""
+    """Return the files of a bag: those in its metadata, and others in its folder."""
     if path.is_dir():
         named = files_of(path, information) if information else []
         there = files_of(path, {}) if any(path.glob('*.mcap')) or not named else []
         if [file for file in there if file in named] == named:
-            # By their numbers: one that made way in a ring may be left, before those named.
+            # By number: a file removed from a ring may remain, from before the named ones.
             files = there
         else:
             files = _in_order(named, [file for file in there if file not in named])
     else:
         files = [path]
-    found = []
+    present = []
     for file in files:
         try:
             if file.is_file():
                 with file.open('rb'):
-                    found.append(file)
+                    present.append(file)
                 continue
             reason = 'is no file' if file.exists() else 'does not exist'
         except OSError as error:
@@ -401,29 +401,29 @@ def _files(path: Path, information: Mapping[str, Any], findings: _Findings) -> l
         findings.losses.append((file.name, Loss(0, 0, reason)))
     findings.remarks += [
         f'{file.name} is still being written; what comes after this is not in the new bag'
-        for file in found
+        for file in present
         if is_in_use(file)
     ]
-    return found
+    return present
 
 
 def _in_order(named: Sequence[Path], others: Sequence[Path]) -> list[Path]:
-    """Put files that nobody names to those that are: a ring that was killed left older ones."""
+    """Insert unnamed files among the named ones: a killed ring recording leaves older files."""
     place = by_number(named[0]) if named else (0, '')
     older = [file for file in others if by_number(file) < place]
     return [*older, *named, *(file for file in others if file not in older)]
 
 
 def _foretaste(path: Path, files: Sequence[Path], stopped: Stopped) -> tuple[str, str]:
-    """Return profile and compression for the new bag; or BagError, where there is nothing."""
+    """Return profile and compression for the new bag; raise BagError if no part is whole."""
     profile, anything, reason = '', False, 'holds no file'
     for file in files:
         with file.open('rb') as stream:
             salvage = Salvage(Source(stream))
-            for found in salvage.found():
+            for record in salvage.found():
                 anything = True
-                if isinstance(found, Message):
-                    ros = found.channel.message_encoding == 'cdr'
+                if isinstance(record, Message):
+                    ros = record.channel.message_encoding == 'cdr'
                     return 'ros2' if ros else salvage.data.profile, salvage.data.compression
                 if stopped():
                     break
@@ -449,14 +449,14 @@ def _why_nothing(file: Path, salvage: Salvage) -> str:
 
 
 def _save(file: Path, bag: NewBag, findings: _Findings) -> Iterator[int]:
-    """Copy what is whole of a file; yield now and then how many of its bytes have been seen."""
+    """Copy the whole parts of a file; yield the number of bytes examined, now and then."""
     bag.begin_file()
     with file.open('rb') as stream:
         salvage = Salvage(Source(stream))
         definitions = salvage.data.definitions
         told = 0
-        for found in salvage.found():
-            bag.add(found, definitions)
+        for record in salvage.found():
+            bag.add(record, definitions)
             if salvage.seen != told:
                 told = salvage.seen
                 yield told
@@ -501,10 +501,10 @@ def _recovery(
 
 def _true_promise(promised: Mapping[str, int], name: str, saved: int, exact: bool) -> int | None:
     """
-    Return how many messages there were; None where that is unknown.
+    Return the original number of messages; None if unknown.
 
-    What a bag counts that is not finished is what was on the disk by the last flush: there were as
-    many at least. Where more are there than it says, it does not know how many there were.
+    An unfinished bag counts the messages on the disk at the last flush: there were at least as
+    many. If more were saved than it states, the number is unknown.
     """
     count = promised.get(name, 0)
     known = saved < count or (exact and bool(promised) and saved == count)
@@ -513,7 +513,7 @@ def _true_promise(promised: Mapping[str, int], name: str, saved: int, exact: boo
 
 @contextmanager
 def _new_folder(target: Path) -> Iterator[None]:
-    """Make a folder, which goes away again if what is done in it fails."""
+    """Create a folder; remove it again if the body fails."""
     remedy = 'name a folder on a disk with room, with -o'
     try:
         target.mkdir(parents=True)

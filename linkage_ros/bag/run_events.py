@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The events of a run, in the order of its bag: samples, faults, resets, results of ticks."""
+"""Events of a run, in the order of its bag: samples, faults, resets, results of ticks."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ from linkage_ros.bag.recording_stats import counts_in
 from linkage_ros.errors import BagError
 
 BEGUN, MID_RUN, WITH_THE_RUN = 'begun', 'mid-run', 'with the run'
-"""The key under which a bag says when it was begun, and what it says."""
+"""Key for the beginning of the bag, and its values."""
 
 CHOSEN = 'solver'
-"""The key under which it says what closes the loops, where the scene asks for an accuracy."""
+"""Key for the chosen solvers, if the scene asks for an accuracy."""
 
 OWN_EFFECTS = 'effects'
-"""The key under which it says which modules the effects are that are not of this package."""
+"""Key for the modules of user-defined effects."""
 
 SEED = 'seed'
-"""The key under which it says from what everything random came."""
+"""Key for the seed of all random numbers."""
 
 _LONGEST_ACCOUNT = 4 * 2**20
-"""In bytes; a kilobyte, but for what a bag says of the one that it was made from."""
+"""Greatest size [bytes]; usually a kilobyte, more if the bag was made from another one."""
 
 VERSIONS = ('linkage_ros', 'python', 'machine')
 
 
 class SampleEvent(NamedTuple):
-    """A crank message that a tick took, by its clock and by that of the source, in [ns]."""
+    """Crank message that a tick took, with the tick's time and the source's, in [ns]."""
 
     log_time: int
     publish_time: int
@@ -53,7 +53,7 @@ class SampleEvent(NamedTuple):
 
 
 class FaultEvent(NamedTuple):
-    """A message that a fault has begun or ended, and when, in [ns]."""
+    """Message that a fault begins or ends, with its time, in [ns]."""
 
     log_time: int
     publish_time: int
@@ -61,7 +61,7 @@ class FaultEvent(NamedTuple):
 
 
 class Reset(NamedTuple):
-    """A message that all was forgotten before this tick, and when, in [ns]."""
+    """Message that the pipeline was reset before this tick, with its time, in [ns]."""
 
     log_time: int
     publish_time: int
@@ -70,15 +70,15 @@ class Reset(NamedTuple):
 
 class TickEvent(NamedTuple):
     """
-    What a tick made.
+    Result of a tick.
 
     Attributes
     ----------
     log_time, time
-        When it was, and for when it solved, in [ns].
+        Time of the tick, and time it solved for, in [ns].
     messages
-        The joint state and the extras, each empty where there is none; all are where the bag says
-        that there was a tick without a message.
+        The joint state and the auxiliary messages, each empty if there is none; all are empty for
+        a tick that the bag records as one without messages.
 
     """
 
@@ -92,24 +92,24 @@ Event = SampleEvent | FaultEvent | Reset | TickEvent
 
 class RunAccount(NamedTuple):
     """
-    What a run's account of itself says; of topics that there are not, ''.
+    The run's account in its bag; '' for missing topics.
 
     Attributes
     ----------
     scene, scene_folder
-        The scene's name, and to what the paths in it are relative.
+        Name of the scene, and the folder for its relative paths.
     crank_topic, joint_states_topic, faults_topic, withheld_topic, resets_topic, extras
         Names of the topics.
     begun
-        When the bag was begun, as `MID_RUN`; '' where it does not say.
+        When the bag was begun, as in `MID_RUN`; '' if it does not say.
     versions
-        Of what made it, by what they are of.
+        Versions of the software of the run, by name.
     solvers
-        What was chosen to close the loops, as a scene could say it, by the name of the linkage.
+        Chosen solver of each linkage, by name of the linkage, in the form of a scene file.
     own_effects
-        Which modules the effects are that are not of this package, by their names.
+        Modules of the user-defined effects, by name.
     seed
-        From which everything random came. Runs that do not say it had 0, unless their scene did.
+        Seed of all random numbers. Runs that do not state it had 0, unless their scene named one.
 
     """
 
@@ -130,34 +130,34 @@ class RunAccount(NamedTuple):
 
 def run_account(bag: Bag) -> RunAccount:
     """
-    Return what a run says of itself in its bag.
+    Return the run's account in its bag.
 
     Raises
     ------
     BagError
-        Where it says nothing, or that is damaged.
+        There is none, or it is damaged.
 
     """
     if RUN_FILE not in bag.attachments:
         raise BagError(
             bag.path, f'carries no {RUN_FILE}', 'name a bag that linkage_ros has recorded'
         )
-    said = run_said(bag)
-    extras = said.get('extra_topics', [])
+    account = run_said(bag)
+    extras = account.get('extra_topics', [])
     texts = {
         key: value
-        for key, value in said.items()
+        for key, value in account.items()
         if key in (*_TEXTS, BEGUN, *VERSIONS) and isinstance(value, str)
     }
     missing = {'scene', 'joint_states_topic'} - set(texts)
-    wrong = (said.keys() & {*_TEXTS, BEGUN}) - set(texts)
-    solvers = said.get(CHOSEN, {})
+    wrong = (account.keys() & {*_TEXTS, BEGUN}) - set(texts)
+    solvers = account.get(CHOSEN, {})
     topics = [value for key, value in texts.items() if key.endswith('_topic')]
     named = _are_names(topics) and _are_names(extras)
-    seed = said.get(SEED, 0)
+    seed = account.get(SEED, 0)
     if missing or wrong or not named or not isinstance(solvers, dict) or type(seed) is not int:
         raise BagError(bag.path, f'its {RUN_FILE} is damaged', 'name another bag')
-    # It is shown, and nothing else; a file's name may be anything.
+    # Only displayed; the name of a file may contain any character.
     if not texts['scene'].isprintable():
         texts['scene'] = repr(texts['scene'])[1:-1]
     return RunAccount(
@@ -166,14 +166,16 @@ def run_account(bag: Bag) -> RunAccount:
         begun=texts.get(BEGUN, ''),
         versions={key: texts[key] for key in VERSIONS if key in texts},
         solvers=solvers,
-        own_effects=_own_effects(said),
+        own_effects=_own_effects(account),
         seed=seed,
     )
 
 
-def _own_effects(said: Mapping[str, Any]) -> dict[str, str]:
-    found = said.get(OWN_EFFECTS)
-    return {name: str(which) for name, which in found.items()} if isinstance(found, dict) else {}
+def _own_effects(account: Mapping[str, Any]) -> dict[str, str]:
+    modules = account.get(OWN_EFFECTS)
+    return (
+        {name: str(which) for name, which in modules.items()} if isinstance(modules, dict) else {}
+    )
 
 
 _TEXTS = (
@@ -185,24 +187,24 @@ _TEXTS = (
     'withheld_topic',
     'resets_topic',
 )
-"""Keys under which a run says something of itself, which are fields of `RunAccount` too."""
+"""Keys of the account that are also fields of `RunAccount`."""
 
 
 def _are_names(values: Any) -> bool:
-    # What is not printable is no topic, and some of it no text that a bag could hold.
+    # A string that is not printable is no topic, and some cannot be stored in a bag.
     return isinstance(values, list) and all(
         isinstance(value, str) and value.isprintable() for value in values
     )
 
 
 def run_said(bag: Bag) -> dict[str, Any]:
-    """Return what a run says of itself, as it stands in its bag; nothing if it is damaged."""
+    """Return the run's account as stored in its bag; empty if it is damaged."""
     try:
         text = bag.attachments[RUN_FILE]
-        said = json.loads(text) if len(text) <= _LONGEST_ACCOUNT else {}
+        account = json.loads(text) if len(text) <= _LONGEST_ACCOUNT else {}
     except (KeyError, ValueError, RecursionError):
         return {}
-    return said if isinstance(said, dict) else {}
+    return account if isinstance(account, dict) else {}
 
 
 def recorded_events(
@@ -212,18 +214,18 @@ def recorded_events(
     crank_topic: str | None = None,
 ) -> Iterator[Event]:
     """
-    Put the messages of a bag together to what happened in the run, in its order.
+    Combine the messages of a bag into the events of the run, in order.
 
     Parameters
     ----------
     run
         The run's account of itself.
     own
-        Tells the run's joint states from the crank's samples where both share a topic.
+        Recognises the run's own joint states where they share a topic with crank samples.
     messages
-        The bag's.
+        Messages of the bag.
     crank_topic
-        Where the crank's samples are; absent, where the run has taken them.
+        Topic of the crank samples; by default that of the run.
 
     """
     crank = run.crank_topic if crank_topic is None else crank_topic
@@ -231,7 +233,7 @@ def recorded_events(
     topics = (run.joint_states_topic, *run.extras) if run.joint_states_topic else ()
     outputs = {topic: number for number, topic in enumerate(topics)}
     others = {run.faults_topic, run.withheld_topic, run.resets_topic} - {''}
-    open_tick: tuple[int, int, list[bytes]] | None = None  # more of its messages may follow
+    open_tick: tuple[int, int, list[bytes]] | None = None  # may get further messages
     withheld: tuple[int, int] | None = None
     for topic, log_time, publish_time, data in messages:
         output = outputs.get(topic)
@@ -249,7 +251,7 @@ def recorded_events(
             log, time, made = open_tick
             yield TickEvent(log, time, tuple(made))
             open_tick = None
-        # In older bags two linkages that withhold at one tick say so twice.
+        # In older bags, two linkages that suppress one tick record it twice.
         again, withheld = withheld == (log_time, publish_time), None
         if taken:
             yield SampleEvent(log_time, publish_time, data)
@@ -274,14 +276,14 @@ _NUMBER = re.compile(r'_([0-9]{1,9})\.mcap$')
 
 def lost_beginning(bag: Bag, run: RunAccount) -> str:
     """
-    Return in words why the first messages of a run are not in its bag; '' where they are.
+    Return text on why the first messages of a run are not in its bag; '' if they are.
 
     Parameters
     ----------
     bag
         The bag.
     run
-        What the run says of itself in it.
+        The run's account in it.
 
     """
     let_go = sum(counts_in(bag.custom, 'let_go').values())

@@ -14,12 +14,12 @@
 
 
 """
-Find the records of a damaged MCAP file that are whole.
+Find the whole records of a damaged MCAP file.
 
-The file is taken record by record, as a reader takes it. Where a record is not what it says, the
-index says where to go on, if its own checksum fits; else the records around do, or the file is
-searched for the next chunk or attachment whose checksum fits. A record with a checksum is given
-only if it fits; a record without one is never given behind a damage.
+The file is read record by record, as by a reader. After an invalid record, the index says where to
+continue, if the checksum of the index matches. Otherwise the surrounding records decide, or the
+file is searched for the next chunk or attachment with a matching checksum. A record with a
+checksum is returned only if it matches; a record without one is never returned after damage.
 """
 
 from __future__ import annotations
@@ -58,19 +58,19 @@ from mcap.writer import MCAP0_MAGIC
 _WINDOW = 2**20
 _BLOCK = 4096
 _BEYOND = max(HEAD.size, len(MCAP0_MAGIC))
-# Of a record's length the upper half is zero: none of 4 GiB is taken. The look ahead consumes
-# nothing, so that none is overlooked in the bytes of another.
+# The upper half of a record's length is zero, since no record of 4 GiB is accepted. The
+# lookahead consumes nothing, so that no record within the bytes of another is missed.
 _BEGINNING = re.compile(rb'[\x06\x09](?=.{4}\x00{4})|' + re.escape(MCAP0_MAGIC), re.DOTALL)
 _MOST_IN_VAIN = 16
-"""How often the size of the file is read for what only looks like a chunk."""
+"""Limit for reading false candidates of chunks, in multiples of the file size."""
 
 
 def next_whole(source: Source, at: int) -> int:
     """
-    Return where the first chunk or attachment begins, from there on; the file's size if none does.
+    Return the position of the next chunk or attachment; the file's size if there is none.
 
-    What looks like one has to have a checksum that fits. A whole MCAP file within the file, as in
-    an attachment, is passed over: its messages are not those of this file.
+    A candidate must have a matching checksum. A whole MCAP file within the file, as in an
+    attachment, is skipped: its messages are not those of this file.
     """
     budget = _MOST_IN_VAIN * source.size + LARGEST
     while at < source.size:
@@ -96,11 +96,11 @@ def next_whole(source: Source, at: int) -> int:
 
 
 def _window(source: Source, at: int) -> tuple[bytes, int]:
-    """Return some bytes, and of how many of them the beginnings are to be looked at."""
+    """Return some bytes, and the number of them at which a record may begin."""
     try:
         return source.read(at, min(_WINDOW + _BEYOND, source.size - at)), _WINDOW
     except DamagedError:
-        # The disk cannot read them all; what is before and behind a bad block it can.
+        # The disk cannot read them all, but those before and after a bad block.
         with suppress(DamagedError):
             return source.read(at, min(_BLOCK + _BEYOND, source.size - at)), _BLOCK
     return b'', _BLOCK
@@ -116,13 +116,13 @@ def _is_whole(source: Source, at: int) -> bool:
 
 
 def _end_of_file_at(source: Source, at: int) -> int:
-    """Return where an MCAP file that begins there ends, if it does before this one; else 0."""
+    """Return the end of an MCAP file that begins at a position within this file; else 0."""
     place = at + len(MCAP0_MAGIC)
     while place < source.size:
         window, size = _window(source, place)
-        found = window.find(MCAP0_MAGIC)
-        if found >= 0:
-            end = place + found + len(MCAP0_MAGIC)
+        offset = window.find(MCAP0_MAGIC)
+        if offset >= 0:
+            end = place + offset + len(MCAP0_MAGIC)
             return end if end < source.size else 0
         place += size
     return 0
@@ -142,7 +142,7 @@ BEGINNING = 'the beginning, which is not that of an MCAP file'
 
 
 class Loss(NamedTuple):
-    """Bytes of a file that are lost, from `start` to before `end`, and why."""
+    """Lost bytes of a file, from `start` to before `end`, and the reason."""
 
     start: int
     end: int
@@ -151,25 +151,25 @@ class Loss(NamedTuple):
 
 class Salvage:
     """
-    Finds what is whole in a file, once.
+    Finds the whole records of a file, once.
 
     Parameters
     ----------
     source
-        The file, as far as it reached when it was opened.
+        The file, with its size at the time of opening.
 
     Attributes
     ----------
     seen
-        How far it was looked at.
+        Position up to which it has been examined.
     losses
-        What is lost; grows as things are found, as do the next two.
+        Lost ranges; grows during the search, as do the next two.
     repaired
-        What is damaged without a loss.
+        Damage without a loss.
     data
-        What was learned from the data.
+        Reader of the data section.
     index
-        The file's index, if its checksum fits.
+        The file's index, if its checksum matches.
 
     """
 
@@ -187,15 +187,15 @@ class Salvage:
         self._source = source
         self._promised = _promised(self.index)
         self._places = sorted(self._promised)
-        # With all places known there is nothing to search for, and nothing else to lose.
+        # If all positions are known there is nothing to search for, and nothing else to lose.
         self._all_known = self.index is not None and _is_complete(self.index)
         self._end = self.index.start if self.index else source.size
         self._spare = Definitions()
         self._messages = 0
-        self._indexes_end = 0  # of the messages of the chunk before
+        self._indexes_end = 0  # end of the previous chunk's message indexes
 
     def found(self) -> Iterator[Found]:
-        """Yield messages, attachments and metadata in the order of the file."""
+        """Yield messages, attachments and metadata in file order."""
         at = len(MCAP0_MAGIC)
         if self._source.size < at or self._source.read(0, at) != MCAP0_MAGIC:
             self.repaired.append(BEGINNING)
@@ -217,7 +217,7 @@ class Salvage:
         self._conclude()
 
     def _take(self, at: int) -> tuple[Iterable[Found], int]:
-        """Take what is there as a reader does, or by what the index says of it."""
+        """Read the record at a position, or what the index says about it."""
         promised = self._promised.get(at)
         try:
             opcode, end = self._source.head(at)
@@ -241,7 +241,7 @@ class Salvage:
             return taken
 
     def _chunk_by_index(self, promised: ChunkIndex) -> tuple[Iterable[Message], int]:
-        """Take a chunk by all that the index repeats of its head; the checksum is not among it."""
+        """Read a chunk by the index, which repeats all of its head except the checksum."""
         start, length = promised.chunk_start_offset, promised.compressed_size
         (crc,) = _INT.unpack(self._source.read(start + _CHECKSUM_PLACE, _INT.size))
         if not crc:
@@ -252,26 +252,26 @@ class Salvage:
         return self.data.chunk(chunk), end
 
     def _counted(self, records: Iterable[Found], end: int) -> Iterator[Found]:
-        """Pass on what was found, and work out how long the indexes behind it are."""
+        """Pass on the records, and compute the length of the message indexes after them."""
         counts: Counter[int] = Counter()
-        for found in records:
-            if isinstance(found, Message):
-                counts[found.channel.id] += 1
-            yield found
+        for record in records:
+            if isinstance(record, Message):
+                counts[record.channel.id] += 1
+            yield record
         if counts:
             self._messages += counts.total()
             self._indexes_end = end + sum(15 + 16 * count for count in counts.values())
 
-    def _wanted(self, found: Iterable[Found]) -> Iterator[Found]:
-        """Pass on what is found, but keep what is there for us only."""
-        for one in found:
+    def _wanted(self, items: Iterable[Found]) -> Iterator[Found]:
+        """Pass on the records for the caller; keep those for internal use."""
+        for one in items:
             if isinstance(one, Attachment) and one.name == CHANNELS_FILE:
                 self._spare = definitions_in(one.data)
             else:
                 yield one
 
     def _resume(self, at: int) -> int:
-        """Return where to go on behind a record that is damaged."""
+        """Return the position to continue at after a damaged record."""
         self.data.loose = False
         if self._all_known:
             return self._next_place(at)
@@ -291,7 +291,7 @@ class Salvage:
         return self._places[number] if number < len(self._places) else self._end
 
     def _goes_on_at(self, at: int) -> bool:
-        """Say whether records follow there: two of this place, or the end of the data."""
+        """Return whether records follow there: two at this place, or the end of the data."""
         try:
             for _ in range(2):
                 opcode, end = self._source.head(at)
@@ -305,7 +305,7 @@ class Salvage:
         return True
 
     def _lose(self, start: int, end: int, reason: str) -> None:
-        # Schemas and channels may be among it.
+        # The lost range may contain schemas and channels.
         self.data.definitions.complete(self._spare)
         promised = self._promised.get(start)
         ours = (type(promised), getattr(promised, 'name', '')) in _MADE_ANEW
@@ -337,7 +337,7 @@ class Salvage:
 
 
 def _trusted_index(source: Source) -> FileIndex | None:
-    """Return the index, if its checksum fits; nothing else is believed here."""
+    """Return the index if its checksum matches; an index without one is not trusted."""
     try:
         index = index_of(source)
     except DamagedError:
@@ -346,7 +346,7 @@ def _trusted_index(source: Source) -> FileIndex | None:
 
 
 def _is_complete(index: FileIndex) -> bool:
-    """Say whether an index tells of all that there is."""
+    """Return whether an index covers the whole content."""
     said = index.statistics
     return (
         said is not None

@@ -14,12 +14,12 @@
 
 
 """
-The last seconds of a run, kept in memory until a snapshot of them is written to a bag.
+Memory of the last seconds of a run, until a snapshot of it is written to a bag.
 
-`LastSeconds` packs the messages into blocks of bytes. They take half the memory of Python's
-objects, the garbage collector has nothing to visit, and to take them all is to copy the list of
-the blocks. `SnapshotMemory` fills it on a thread of its own: its `offer` is that of a recorder.
-`SnapshotWriting` writes what was taken to a bag, on another thread.
+`LastSeconds` packs the messages into blocks of bytes. They take half the memory of Python objects,
+the garbage collector has nothing to visit, and a snapshot only copies the list of blocks.
+`SnapshotMemory` fills it on its own thread; its `offer` is that of a recorder. `SnapshotWriting`
+writes a snapshot to a bag, on another thread.
 """
 
 from __future__ import annotations
@@ -41,27 +41,27 @@ from linkage_ros.bag.writer import BagWriter, TIME_END
 from linkage_ros.errors import RecordingError
 
 _HEAD = Struct('<HqqqI')
-"""Before each message: topic, time that has passed, log time, publish time [ns], size [bytes]."""
+"""Head of a message: topic, elapsed time, log time, publish time [ns], size [bytes]."""
 
 _BLOCK_SIZE = 64 * 1024
 _BLOCKS_IN_SPAN = 16
 
 _JUMP = 1_000_000_000
-"""What goes back by more is a clock that has jumped, and not messages out of order [ns]."""
+"""A larger step back of log time is a jump of the clock, not a message out of order [ns]."""
 
 
 class Extent(NamedTuple):
     """
-    How much is in memory.
+    Amount of messages in memory.
 
     Attributes
     ----------
     seconds
         Time between the oldest message and the newest [s].
     size
-        What the messages take [bytes].
+        Size of the messages [bytes].
     crowded
-        Whether for want of room something had to go that was not too old.
+        Whether messages that were not too old had to be removed for lack of memory.
 
     """
 
@@ -72,20 +72,20 @@ class Extent(NamedTuple):
 
 class Kept(NamedTuple):
     """
-    What was in memory at an instant; it stays as it is.
+    Content of the memory at an instant; immutable.
 
     Attributes
     ----------
     blocks
         The messages, packed.
     begin
-        Where the first of them begins in the first block.
+        Position of the first message in the first block.
     counts
-        How many of each topic there are.
+        Number of messages of each topic.
     seconds
-        Time between the oldest and the newest [s].
+        Time between the oldest message and the newest [s].
     whole
-        Whether nothing has been let go of.
+        Whether no message has been removed.
 
     """
 
@@ -96,7 +96,7 @@ class Kept(NamedTuple):
     whole: bool
 
     def messages(self) -> Iterator[tuple[int, int, int, bytes]]:
-        """Yield topic, log time, publish time and bytes, in the order in which they came."""
+        """Yield topic, log time, publish time and bytes, in order of arrival."""
         at = self.begin
         for block in self.blocks:
             while at < len(block):
@@ -109,26 +109,27 @@ class Kept(NamedTuple):
 
 class LastSeconds:
     """
-    Takes messages, and lets go of those that are too old.
+    Keeps messages, and removes those that are too old.
 
-    A message is as old as much time has passed since, by the log times of one topic: of the one by
-    which most has passed. Where these go back no time passes: by less than a second, until they
-    are where they were; by more, a clock has jumped, and time goes on from there. So what was
-    before a jump is kept as all else is, and where the topics' clocks differ nothing goes for it.
+    The age of a message is the time that has passed since, by the log times of the topic by which
+    most time has passed. Where log times go back, no time passes: if by less than a second, until
+    they reach the earlier value again; if by more, the clock has jumped, and time continues from
+    there. So messages from before a jump are kept like all others, and differing clocks of the
+    topics remove none.
 
     Parameters
     ----------
     topics
-        How many topics there are.
+        Number of topics.
     span
-        How old a message may be [ns].
+        Greatest age of a message [ns].
     most
-        How much memory they may take [bytes]; where that is too little, the oldest go.
+        Most memory for the messages [bytes]; if it is too little, the oldest are removed.
 
     Attributes
     ----------
     let_go
-        Messages of each topic that are gone.
+        Number of removed messages of each topic.
 
     """
 
@@ -140,15 +141,15 @@ class LastSeconds:
         self._now = 0  # time that has passed [ns]
         self._clocks: list[tuple[int, int] | None] = [None] * topics
         self._blocks: deque[bytes] = deque()
-        self._begin = 0  # of the oldest message, in the first block
+        self._begin = 0  # position of the oldest message, in the first block
         self._newest: list[bytes] = []
         self._newest_size, self._newest_since = 0, 0
         self._size = 0
-        self._gone: int | None = None  # log time of what has gone last
-        self._crowded: int | None = None  # when something last had to go too early
+        self._gone: int | None = None  # log time of the message that was removed last
+        self._crowded: int | None = None  # time of the last removal for lack of memory
 
     def add(self, topic: int, log_time: int, publish_time: int, data: bytes) -> None:
-        """Take a message, whose times fit into 63 bits."""
+        """Add a message with 63-bit times."""
         latest, passed = self._clocks[topic] or (log_time, self._now)
         if log_time > latest:
             self._now = max(self._now, passed + log_time - latest)
@@ -167,15 +168,15 @@ class LastSeconds:
         self._counts[topic] += 1
 
     def let_old_go(self, limit: int) -> bool:
-        """Let go of so many messages that have to go; return whether there may be more."""
-        # The newest block holds nothing that is too old, and is small.
+        """Remove up to `limit` messages that are due; return whether there may be more."""
+        # The newest block is small, and none of its messages is too old.
         for _ in range(limit):
             if not self._blocks:
                 return False
             block = self._blocks[0]
             topic, at, log_time, _, size = _HEAD.unpack_from(block, self._begin)
             crowded = self._size > self._most
-            # What one tick has taken and made goes together.
+            # Messages taken and made by one tick stay together.
             if self._now - at <= self._span and not crowded and log_time != self._gone:
                 return False
             if crowded:
@@ -191,14 +192,14 @@ class LastSeconds:
         return True
 
     def kept(self) -> Kept:
-        """Return what is in memory."""
+        """Return the content of the memory."""
         self._seal()
         seconds, _, _ = self.extent()
         whole = not any(self.let_go)
         return Kept(tuple(self._blocks), self._begin, tuple(self._counts), seconds, whole)
 
     def extent(self) -> Extent:
-        """Return how much is in memory."""
+        """Return the amount of messages in memory."""
         oldest = self._newest_since if self._newest else self._now
         if self._blocks:
             oldest = _HEAD.unpack_from(self._blocks[0], self._begin)[1]
@@ -206,7 +207,7 @@ class LastSeconds:
         return Extent((self._now - oldest) * 1e-9, self._size, crowded)
 
     def forget(self, limit: int) -> bool:
-        """Give back the memory of so many blocks; return whether there are more."""
+        """Free the memory of up to `limit` blocks; return whether there are more."""
         for _ in range(min(limit, len(self._blocks))):
             self._blocks.popleft()
         return bool(self._blocks)
@@ -223,20 +224,20 @@ _BLOCKS = 16  # 1 MiB
 
 class KeptCounts(NamedTuple):
     """
-    What became of one topic's messages: ``received == kept + let_go + dropped``, at every instant.
+    Counts of one topic's messages: at every instant ``received == kept + let_go + dropped``.
 
     Attributes
     ----------
     name
-        The topic's.
+        Name of the topic.
     received
-        What was offered.
+        Messages offered.
     kept
-        What is in memory.
+        Messages in memory.
     let_go
-        What has become too old, or had to make room.
+        Messages that became too old, or were removed for lack of memory.
     dropped
-        What no bag can hold, or came while the memory's thread could not keep up.
+        Messages that no bag can hold, or that came while the memory's thread was too slow.
 
     """
 
@@ -249,25 +250,25 @@ class KeptCounts(NamedTuple):
 
 class SnapshotMemory:
     """
-    The last seconds of what is offered, as `LastSeconds` has it.
+    Memory of the last seconds of the offered messages, as in `LastSeconds`.
 
     Parameters
     ----------
     topics
-        What will be offered; a topic's number is its place in this sequence.
+        Topics of the messages; the index in this sequence is the topic's number.
     seconds
-        How old a message may be [s].
+        Greatest age of a message [s].
     most
-        How much memory they may take [bytes]; where that is too little, the oldest go.
+        Most memory for the messages [bytes]; if it is too little, the oldest are removed.
     capacity
         Messages that may wait for the memory's thread; as for `Recorder`.
 
     Attributes
     ----------
     extent
-        How much is in memory.
+        Amount of messages in memory.
     failure
-        Why the memory has ended early; None while it has not.
+        Reason why the memory has ended early; None if it has not.
 
     """
 
@@ -281,7 +282,7 @@ class SnapshotMemory:
         self._queue = MessageQueue(len(topics), capacity)
         self.offer = self._queue.offer
         """Hands over one message, as `MessageQueue.offer`."""
-        # Whose has the lock: the thread's, or for a moment that of who takes a snapshot.
+        # The owner of the lock: the thread, or briefly the caller that takes a snapshot.
         self._lock = threading.Lock()
         self._last = LastSeconds(len(topics), round(seconds * 1e9), most)
         self._stopping = threading.Event()
@@ -289,11 +290,11 @@ class SnapshotMemory:
         self._thread.start()
 
     def inspect(self) -> tuple[KeptCounts, ...]:
-        """Return the counts as they are now; what waits for the thread counts as kept."""
+        """Return the current counts; messages that wait for the thread count as kept."""
         counts = []
         for number, topic in enumerate(self.topics):
             let_go, dropped = self._last.let_go[number], self._queue.dropped[number].value()
-            # Last, so that a message on its way is kept, and never gone twice.
+            # Read last, so that a message in transit counts as kept, and never twice.
             received = self._queue.received[number].value()
             kept = received - let_go - dropped
             counts.append(KeptCounts(topic.name, received, kept, let_go, dropped))
@@ -301,7 +302,7 @@ class SnapshotMemory:
 
     def take(self) -> Kept:
         """
-        Return what is in memory: all that was offered before, and is not too old.
+        Return the content of the memory: all messages offered before that are not too old.
 
         Raises
         ------
@@ -320,7 +321,7 @@ class SnapshotMemory:
             return self._last.kept()
 
     def stop(self) -> tuple[KeptCounts, ...]:
-        """End the memory; return the counts as they were then, with what was kept to the end."""
+        """End the memory; return the last counts, with the messages kept to the end."""
         self._queue.open = False
         self._stopping.set()
         self._thread.join()
@@ -330,18 +331,18 @@ class SnapshotMemory:
         try:
             stopping = False
             while not stopping:
-                # Asked before the queue is emptied: what was offered until then is counted.
+                # Checked before the queue is emptied: messages offered until then are counted.
                 stopping = self._stopping.wait(POLL)
                 while self._work():
                     time.sleep(NAP)
-        except Exception as error:  # noqa: BLE001 (nothing may end the thread in silence)
+        except Exception as error:  # noqa: BLE001 (no error may end the thread silently)
             self._fail(error)
-        # Not all at once: a tick may go on, and would wait for it.
+        # Not all at once: a tick may be running, and would wait for it.
         while self._last.forget(_BLOCKS):
             time.sleep(NAP)
 
     def _work(self) -> bool:
-        """Put away a batch of messages, and let as many go; return whether there may be more."""
+        """Add a batch of messages, and remove as many; return whether there may be more."""
         with self._lock:
             self._put_away(BATCH)
             more = self._last.let_old_go(2 * BATCH)
@@ -357,7 +358,7 @@ class SnapshotMemory:
                 self._queue.dropped[topic].add()
 
     def _fail(self, error: Exception) -> None:
-        """Keep the failure; what was in memory is gone."""
+        """Store the failure; the content of the memory is lost."""
         self._queue.open = False
         self.failure = RecordingError(
             _WHERE, f'has ended early: {type(error).__name__}: {error}', 'please report this'
@@ -367,31 +368,31 @@ class SnapshotMemory:
 
 
 _AHEAD = 5000
-"""How many messages are handed to the recorder before it has written them."""
+"""Most messages handed to the recorder that it has not written yet."""
 
 _PATIENCE = 10.0
-"""How long a disk that does not answer is waited for, in [s]."""
+"""Longest wait for a disk that does not answer, in [s]."""
 
 
 class SnapshotWriting:
     """
-    A bag that is written from memory on a thread of its own.
+    Writes a bag from memory on its own thread.
 
     Parameters
     ----------
     kept
-        What goes into it.
+        Content of the bag.
     make
-        Makes the bag, on that thread.
+        Creates the bag; called on the writing thread.
     done
-        Called on that thread when the outcome is there.
+        Called on the writing thread when the outcome is ready.
 
     Attributes
     ----------
     kept
         As given.
     outcome
-        How the recording went, or why there is none; None until then.
+        Summary of the recording, or the error that prevented it; None until then.
 
     """
 
@@ -403,13 +404,13 @@ class SnapshotWriting:
         self._make = make
         self._done = done
         self._seen = time.monotonic()
-        # A daemon: a disk that never answers must not keep the process from ending.
+        # A daemon thread: a disk that never answers must not keep the process alive.
         self._thread = threading.Thread(target=self._run, name='snapshot', daemon=True)
         self._thread.start()
 
     def wait(self) -> RecordingSummary | RecordingError:
-        """Return the outcome as soon as it is there, or a disk has not answered for too long."""
-        # The thread has some patience of its own, and has to close a bag then.
+        """Wait for the outcome, but not too long for a disk that does not answer; return it."""
+        # The thread has its own time limit, and then has to close a bag.
         while self.outcome is None and time.monotonic() - self._seen < 3.0 * _PATIENCE:
             self._thread.join(POLL)
         return self.outcome or RecordingError(
@@ -421,7 +422,7 @@ class SnapshotWriting:
             self.outcome = self._write(self._make())
         except RecordingError as error:
             self.outcome = error
-        except Exception as error:  # noqa: BLE001 (nothing may end the thread in silence)
+        except Exception as error:  # noqa: BLE001 (no error may end the thread silently)
             reason = f'{type(error).__name__}: {error}'
             self.outcome = RecordingError('snapshot', reason, 'please report this')
         self._done()
@@ -437,7 +438,7 @@ class SnapshotWriting:
             recorder.offer(*message)
         self._is_taken(recorder, 0)
         summary = recorder.stop(timeout=_PATIENCE)
-        # After a failure not all was offered.
+        # After a failure some messages were not offered.
         topics = [
             replace(topic, received=there, dropped=there - topic.recorded)
             for topic, there in zip(summary.topics, self._received(writer), strict=True)
@@ -445,7 +446,7 @@ class SnapshotWriting:
         return replace(summary, topics=tuple(topics))
 
     def _is_taken(self, recorder: Recorder, most: int) -> bool:
-        """Wait until no more messages than that wait; return whether the disk goes on."""
+        """Wait until at most `most` messages wait; return whether the disk still works."""
         left = -1
         while not recorder.failure:
             before, left = left, sum(topic.waiting for topic in recorder.inspect())
@@ -459,7 +460,7 @@ class SnapshotWriting:
         return False
 
     def _received(self, writer: BagWriter) -> list[int]:
-        """Return how many messages of each topic there are to be written."""
+        """Return the number of messages of each topic to write."""
         return list(map(sum, zip(self.kept.counts, writer.opened, strict=True)))
 
     def _account(self, writer: BagWriter, summary: BagSummary) -> RecordingStats:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""How a bag lies on the disk, and when it gets there: as the run goes, or when one asks for it."""
+"""Storage settings of a bag: its files, and when messages reach the disk."""
 
 from __future__ import annotations
 
@@ -26,42 +26,42 @@ COMPRESSIONS = (NONE, 'lz4', 'zstd')
 
 FLUSH_AFTER = 0.9
 """
-The part of the flush period after which the next flush begins: to wake, to write and to wait for
-the disk take time too, and what is older than the period shall be on the disk.
+Fraction of the flush period after which the next flush begins: waking, writing and waiting for the
+disk take time too, and messages older than the period must be on the disk.
 """
 
-# What is written between two looks, a chunk and what a flush adds [bytes]: with it there is never
-# less than was asked for.
+# Data written between two checks of free space: a chunk and the data of a flush [bytes]. It is
+# kept free in addition, so that the required space is never missing.
 _ON_ITS_WAY = 256 * 1024
 
 
 @dataclass(frozen=True, slots=True)
 class Storage:
     """
-    How a bag is stored; by default as the run goes, in files of 1 GiB, not packed.
+    Storage settings of a bag; by default written continuously, in uncompressed files of 1 GiB.
 
-    Until a file ends, mcap keeps in memory where each of its chunks lies, and what is in it: that
-    bounds a file.
+    Until a file ends, mcap keeps in memory the positions of its chunks and messages, so the size
+    of a file must be limited.
 
     Attributes
     ----------
     flush_period
-        What a power cut may cost [s]: how often the disk is waited for, and a tenth more.
+        Time whose messages a power cut may lose [s]: the flush period, and a tenth more.
     split_bytes
-        Size at which the next file begins [bytes]; 0 for never.
+        Size after which the next file begins [bytes]; 0 for never.
     split_seconds
-        Time after which the next file begins [s], by the log times; 0 for never.
+        Duration after which the next file begins [s], by log times; 0 for never.
     keep_files
-        How many files are kept; 0 for all.
+        Number of files to keep; 0 for all.
     min_free_bytes
-        What stays free on the disk [bytes].
+        Space to leave free on the disk [bytes].
     compression
         'none', 'lz4' or 'zstd'.
     snapshot_seconds
-        How much of the run is kept in memory until one asks for it [s], by the log times; 0 for a
-        bag that is written as the run goes.
+        Duration of the run to keep in memory until a snapshot is requested [s], by log times; 0 to
+        write the bag continuously.
     snapshot_bytes
-        How much memory that may take [bytes].
+        Most memory for it [bytes].
 
     """
 
@@ -76,7 +76,7 @@ class Storage:
 
 
 def scarcity(folder: Path, least: int) -> str:
-    """Return how much too little is free on the disk of a folder; '' where it is enough."""
+    """Return how much free space a folder's disk lacks, as text; '' if there is enough."""
     if not least:
         return ''
     disk = os.statvfs(folder)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The description of a topic in a bag: type, definition and hash of the type, offered QoS."""
+"""Description of a topic in a bag: type, definition and hash of the type, offered QoS."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from dataclasses import dataclass
 from typing import Any
 
 CHANNELS_FILE = 'channels.mcap'
-"""Attached to each of our files under this name: an MCAP file with its topics and no messages."""
+"""Name of an attachment of each of our files: an MCAP file with its topics and no messages."""
 
 INFINITE = 2**63 - 1
-"""The duration [ns] that rmw takes as 'no limit'; rosbag2 writes 9223372036 s 854775807 ns."""
+"""Duration [ns] that rmw reads as 'no limit'; rosbag2 writes 9223372036 s 854775807 ns."""
 
 # Up to metadata version 8 rosbag2 wrote the policies as the numbers of rmw's enumerations.
 _NUMBERED = {
@@ -54,10 +54,10 @@ class QosProfile:
     """
     The quality of service that the recorded publisher offered.
 
-    The words are rmw's: history 'keep_last' or 'keep_all', reliability 'reliable' or
+    The values are rmw's: history 'keep_last' or 'keep_all', reliability 'reliable' or
     'best_effort', durability 'volatile' or 'transient_local', liveliness 'automatic' or
-    'manual_by_topic'. Durations are in [ns]. `understood` says whether a bag that was read has
-    said it so that it could be; else these are the values that stand here.
+    'manual_by_topic'. Durations are in [ns]. `understood` is False if the profile in a bag could
+    not be parsed; then the values are defaults.
     """
 
     history: str = 'keep_last'
@@ -87,7 +87,7 @@ class QosProfile:
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> QosProfile:
-        """Return the profile that rosbag2, of any metadata version, wrote as this mapping."""
+        """Parse the mapping that rosbag2, with any metadata version, wrote for a profile."""
         words: dict[str, Any] = {
             key: names[mapping[key]] if isinstance(mapping[key], int) else str(mapping[key])
             for key, names in _NUMBERED.items()
@@ -110,16 +110,16 @@ class Topic:
     Parameters
     ----------
     name
-        Absolute, as the graph has it: '/arm/joint_states'.
+        Absolute name: '/arm/joint_states'.
     type
         'sensor_msgs/msg/JointState'.
     definition
-        The text of the type's ``.msg`` file, then for each type that it needs a line of 80 '=',
-        a line 'MSG: std_msgs/Header' and that type's text: MCAP's ``ros2msg``.
+        Text of the type's ``.msg`` file, then for each type that it contains a line of 80 '=', a
+        line 'MSG: std_msgs/Header' and that type's text: MCAP's ``ros2msg``.
     type_hash
         'RIHS01_' and 64 hexadecimal digits (REP 2016).
     qos
-        What the publisher offered.
+        QoS offered by the publisher.
 
     """
 

@@ -14,11 +14,12 @@
 
 
 """
-Write a bag, in one file or several, whose every flushed message outlives a kill or a full disk.
+Write a bag of one or more files; every flushed message survives a kill or a full disk.
 
-``metadata.yaml`` is there from the first moment and renewed about once a second and with each new
-file: it names all files, and counts what is on the disk. Until the bag is closed its custom data
-has `recording_stats.UNFINISHED`; so a killed bag says that it is one, and where it stopped.
+``metadata.yaml`` exists from the start and is updated about once a second and with each new file:
+it names all files, and counts the messages on the disk. Until the bag is closed its custom data
+has `recording_stats.UNFINISHED`, so that the bag of a killed process is recognisable, with the
+point where it stopped.
 """
 
 from __future__ import annotations
@@ -50,45 +51,45 @@ _CHECK_DISK = 'check the disk before the next recording'
 _KEEP_OUT = 'let no other process write to the folder of a bag while it is recorded'
 TIME_END = 2**63  # rosbag2's times are signed
 _SEQUENCE_END = 2**32  # MCAP's sequence numbers; at 10 kHz they start again after five days
-_RENEWAL = 0.8  # [s]; less than is between two flushes of a second
-_ROOM_TO_GO_ON = 4 * FIRST_RESERVE  # lest a disk that stays full get many small files [bytes]
+_RENEWAL = 0.8  # [s]; less than the time between two flushes at a period of 1 s
+_ROOM_TO_GO_ON = 4 * FIRST_RESERVE  # avoids many small files on a full disk [bytes]
 
 
 class BagWriter:
     """
-    A new bag, open for writing; not for several threads at once.
+    A new bag that is open for writing; not thread-safe.
 
     Parameters
     ----------
     folder
-        Where the bag goes. It is made here; one that exists is never touched.
+        Folder of the bag. It is created here; an existing one is refused and not changed.
     topics
-        What will be written; a topic's number is its place in this sequence.
+        Topics of the messages; the index in this sequence is the topic's number.
     attachments
-        Name to (media type, content); each file has them, and its topics, so that each explains
-        itself.
+        Name to (media type, content). Each file gets them, and its topics, so that each file is
+        complete in itself.
     storage
-        How it is stored; its ``flush_period`` is for whoever calls `flush`.
+        Storage settings; the caller has to call `flush` every ``flush_period``.
     opening
-        Topic number and CDR bytes of what stands before the first message of each file, with its
-        log time: what was published once, for whoever comes later.
+        Topic number and CDR bytes of latched messages, written before the first message of each
+        file, with its log time.
 
     Attributes
     ----------
     let_go
-        Messages of each topic that were in files that made way for newer ones.
+        Messages of each topic in files that were removed to keep newer ones.
     out_of_room
-        Whether it has failed for want of room, so that `resume` may go on.
+        Whether it failed for lack of space, so that `resume` may continue.
     opened
-        How many messages of each topic are there by `opening`, and were not given to `write`.
+        Number of messages of each topic written because of `opening`, not by `write`.
     account
-        Returns what became of all messages, given what the bag holds; none for a bag whose writer
-        keeps no account.
+        Returns the statistics of all messages, given the summary of the bag; None for a bag
+        without statistics.
 
     Raises
     ------
     RecordingError
-        The folder exists, or cannot be made or written to. Nothing is left behind.
+        The folder exists, or cannot be created or written to. Nothing is left behind.
 
     """
 
@@ -116,13 +117,13 @@ class BagWriter:
         self._sequences = [0] * len(self.topics)
         self._refused = [0] * len(self.topics)
         self._ended: list[BagSummary] = []
-        self._gone: list[Path] = []  # files that made way, as far as they are still there
+        self._gone: list[Path] = []  # files to remove that still exist
         self._due = 0.0
-        self._looked = 0  # size of the file when it was last looked how much is free [bytes]
+        self._looked = 0  # size of the file at the last check of free space [bytes]
         self._summary: BagSummary | None = None
         self.out_of_room = False
         self._failure: RecordingError | None = None
-        self._said: dict[str, str] = {}  # of failures, in the metadata
+        self._said: dict[str, str] = {}  # messages about failures, for the metadata
         try:
             self.folder.mkdir(parents=True)
         except FileExistsError:
@@ -145,27 +146,27 @@ class BagWriter:
 
     def write(self, topic: int, log_time: int, publish_time: int, data: bytes) -> bool:
         """
-        Take one message; it is on the disk at the latest after the next `flush`.
+        Take a message; it is on the disk after the next `flush` at the latest.
 
         Parameters
         ----------
         topic
             The topic's number.
         log_time, publish_time
-            When it was received, and when its source made it [ns].
+            Time of reception, and time at the source [ns].
         data
             The CDR bytes with their 4-byte header.
 
         Returns
         -------
         bool
-            Whether the message was taken. One whose times are negative or beyond 63 bits is
-            refused and counted: inside mcap it would break the chunk it comes into.
+            Whether the message was accepted. One whose times are negative or beyond 63 bits is
+            refused and counted: in mcap it would corrupt its chunk.
 
         Raises
         ------
         RecordingError
-            The recording has ended here, and the bag is closed as well as the disk let it be.
+            The recording has ended, and the bag is closed as well as the disk allows.
 
         """
         if self._failure:
@@ -197,7 +198,7 @@ class BagWriter:
         self._sequences[topic] = sequence + 1
 
     def flush(self) -> None:
-        """Bring to the disk what was written, and look how full it is; raises as `write` does."""
+        """Write the data to the disk, and check its free space; raises as `write` does."""
         if self._failure:
             raise self._failure
         try:
@@ -209,16 +210,16 @@ class BagWriter:
 
     def resume(self) -> bool:
         """
-        Go on in a new file where there was no room and is some again; return whether it does.
+        Continue in a new file after a lack of space, if there is some again; return whether so.
 
-        What the bag says of the failure stays in its metadata.
+        The failure stays recorded in the metadata.
         """
         if not self.out_of_room or not self._file.ended:
             return False
         try:
             reserve = Reserve(self.folder)
             try:
-                # Quotas and blocks that are reserved are known to who allocates only.
+                # Quotas and reserved blocks show only in an allocation.
                 reserve.grow(_ROOM_TO_GO_ON)
                 self._refuse_if_scarce('cannot go on')
             finally:
@@ -233,17 +234,17 @@ class BagWriter:
 
     def close(self, custom: Mapping[str, str] | None = None) -> BagSummary:
         """
-        Finish the bag and return what it holds; after a failure, return what could be kept.
+        Finish the bag and return its summary; after a failure, that of the messages kept.
 
         Parameters
         ----------
         custom
-            Goes to ``custom_data`` of the bag's metadata.
+            Additional entries for ``custom_data`` of the bag's metadata.
 
         Raises
         ------
         RecordingError
-            As `write`, once; after it a call returns the summary.
+            As for `write`, once; the next call returns the summary.
 
         """
         if self._summary:
@@ -257,14 +258,14 @@ class BagWriter:
 
     @property
     def kept(self) -> tuple[int, ...]:
-        """Return how many messages of each topic `write` took by now that are not lost since."""
+        """Return how many messages of each topic `write` has taken and not lost since."""
         summary = self._summarize()
         there = zip(summary.counts, summary.let_go, self.opened, strict=True)
         return tuple(counts + gone - opened for counts, gone, opened in there)
 
     @property
     def size(self) -> int:
-        """Return the size of the MCAP files by now [bytes]."""
+        """Return the current size of the MCAP files [bytes]."""
         return sum(part.size for part in self._ended) + self._file.size
 
     def _is_full(self, log_time: int) -> bool:
@@ -273,11 +274,11 @@ class BagWriter:
             return False
         if 0 < self.storage.split_bytes <= file.size and file.has_chunks:
             return True
-        # Where time jumps back, what comes after it is not put to what came before.
+        # After a backward jump of time, new messages do not join the earlier ones.
         return 0 < self._split_time <= abs(log_time - file.first)
 
     def _look(self) -> None:
-        """End the recording where too little is free."""
+        """End the recording if there is too little free space."""
         self._looked = self._file.size
         try:
             self._refuse_if_scarce('the recording was interrupted')
@@ -285,7 +286,7 @@ class BagWriter:
             self._end(error)
 
     def _split(self) -> None:
-        """End the file and begin the next; where they are too many, let the oldest go."""
+        """End the file and begin the next; with too many files, remove the oldest."""
         try:
             self._refuse_if_scarce('the recording was interrupted')
             error = self._file.finish(last_records(self._unfinished, self._summarize(), None))
@@ -298,7 +299,7 @@ class BagWriter:
             self._end(worse)
 
     def _renew_and_let_go(self) -> None:
-        """Name the files that are kept, then remove the others: no name is without its file."""
+        """List the kept files, then remove the others: every listed file exists."""
         parts, most = self._parts(), self.storage.keep_files
         excess = max(0, len(parts) - most) if most else 0
         gone, kept = parts[:excess], parts[excess:]
@@ -311,14 +312,14 @@ class BagWriter:
         self._remove_gone()
 
     def _remove_gone(self) -> None:
-        """Remove the files that made way; one that cannot be removed is tried again."""
+        """Remove the files that are due; retry later if one cannot be removed."""
         self._gone = [file for file in self._gone if not _is_removed(file)]
 
     def _finish(self, custom: Mapping[str, str], *, accounted: bool = True) -> OSError | None:
         """
-        Close the bag as well as the disk allows; return what went wrong now.
+        Close the bag as well as the disk allows; return the error, if any, of this call.
 
-        Where it has failed before, only its metadata are written anew.
+        After an earlier failure, only update its metadata.
         """
         error = None
         if not self._file.finished:
@@ -338,14 +339,14 @@ class BagWriter:
             try:
                 write_metadata(summary, last)
             except OSError:
-                # All of it once more: it is the bag's last word.
+                # The whole metadata once more: this is the final version.
                 write_metadata(summary, last)
         except OSError as worse:
             error = error or worse
         return error
 
     def _lose_what_is_gone(self) -> LostError | None:
-        """Count no more what is in files that another process has cut or removed; name these."""
+        """Remove from the counts the messages in files that another process has cut or removed."""
         parts = self._parts()
         gone = [part for part in parts if not _is_there(self.folder / part.file, part.size)]
         if not gone:
@@ -357,7 +358,7 @@ class BagWriter:
         return LostError(f'{names}: cut or removed by another process')
 
     def _try_to_renew(self, summary: BagSummary) -> bool:
-        """Write the metadata anew, or leave the old ones: no message depends on them."""
+        """Update the metadata, or keep the old ones on failure: no message depends on them."""
         try:
             self._renew(summary)
         except OSError:
@@ -366,11 +367,11 @@ class BagWriter:
         return True
 
     def _renew(self, summary: BagSummary) -> None:
-        """Write into the metadata what is on the disk by now."""
+        """Write the messages on the disk by now into the metadata."""
         begin = time.monotonic()
         write_metadata(summary, custom_data(self._unfinished, summary, None))
         end = time.monotonic()
-        # Of a bag in many files it is long, and a slow disk must not be kept busy with it.
+        # With many files the metadata are long, and must not keep a slow disk busy.
         self._due = end + max(_RENEWAL, 20.0 * (end - begin))
 
     def _next_file(self) -> BagFile:
@@ -378,11 +379,11 @@ class BagWriter:
 
     @property
     def _unfinished(self) -> dict[str, str]:
-        """Return what the metadata say until the recording has ended."""
+        """Return the custom data of a recording in progress."""
         return {**UNFINISHED_DATA, **self._said}
 
     def _refuse_if_scarce(self, what: str, remedy: str = _GO_ON) -> None:
-        """Raise RecordingError where too little is free; what a file has set aside is not."""
+        """Raise RecordingError if too little is free, without the files' reserve."""
         scarce = scarcity(self.folder, self.storage.min_free_bytes)
         if scarce:
             raise RecordingError(self.folder, f'{what}: {scarce}', remedy)
@@ -390,7 +391,7 @@ class BagWriter:
     def _end(self, error: OSError | RecordingError) -> NoReturn:
         self._failure = error if isinstance(error, RecordingError) else self._ended_by(error)
         self._said = {FAILURE: str(self._failure)}
-        # A RecordingError comes from `_refuse_if_scarce` alone.
+        # Only `_refuse_if_scarce` raises RecordingError.
         self.out_of_room = isinstance(error, RecordingError) or error.errno in NO_ROOM
         if self.out_of_room:
             self._finish(UNFINISHED_DATA, accounted=False)
@@ -428,14 +429,14 @@ class BagWriter:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a folder that nobody but us has written to."""
+    """Remove a folder that only this process has written to."""
     for leftover in folder.iterdir():
         leftover.unlink()
     folder.rmdir()
 
 
 def _is_there(file: Path, size: int) -> bool:
-    """Return whether a file is there, and as large as it was; a disk that fails says nothing."""
+    """Return whether a file still exists with its size; True if the disk does not answer."""
     try:
         return 0 < size <= file.stat().st_size
     except (FileNotFoundError, NotADirectoryError):

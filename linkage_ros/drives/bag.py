@@ -14,14 +14,14 @@
 
 
 """
-A crank that was recorded: the samples of a bag, at their times or one for every tick.
+A recorded crank: the samples of a bag, at their times or one per tick.
 
-Samples that the `topic` drive would refuse are skipped, and counted: messages without the input
-joints, numbers that are not finite, stamps that go back. Only how far a stamp was ahead of the
-clock does not matter, since the first sample counts as taken at the first tick.
+Samples that the `topic` drive would reject are skipped and counted: messages without the input
+joints, non-finite numbers, stamps that go back. The lead of a stamp over the clock does not
+matter, since the first sample counts as taken at the first tick.
 
-A bag is read when the drive is built, so again at every reset. A sample takes 8 bytes for its
-time and 16 for each input: an hour at 1 kHz is 86 MB.
+The drive reads the bag when it is built, and again at every reset. A sample takes 8 bytes for its
+time and 16 for each input: 86 MB for an hour at 1 kHz.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Samples:
     inputs
         Names of the driven joints.
     use
-        How they are used, which decides whether they need rates.
+        How samples are used, which decides whether they need rates.
     needs_rate
         As for `TopicDrive`.
 
@@ -63,7 +63,7 @@ class Samples:
     offsets: array[int]
     """Times since the first sample, in [ns]."""
     rejected: Counter[Rejection]
-    """How many messages were skipped, and why."""
+    """Number of skipped messages, by reason."""
 
     def __init__(self, inputs: tuple[str, ...], use: TopicParameters, needs_rate: bool) -> None:
         self._inputs = len(inputs)
@@ -74,7 +74,7 @@ class Samples:
         self.rejected = Counter()
 
     def add(self, message: bytes) -> None:
-        """Add a message, serialized, or count why it is not good."""
+        """Add a serialized message, or count the reason for its rejection."""
         sample = self._read(message)
         if isinstance(sample, Rejection):
             self.rejected[sample] += 1
@@ -89,7 +89,7 @@ class Samples:
         self._values.extend(sample.rates or (0.0,) * self._inputs)
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of samples."""
         return len(self.offsets)
 
     def __getitem__(self, number: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -111,29 +111,30 @@ def read_samples(
     bag
         The bag.
     topic
-        The topic; '' for that which the bag's own account of its run names, or, where there is
-        none, for the only one with good samples.
+        The topic; '' for the topic that the run's account in the bag names or, without an account,
+        for the only topic with good samples.
     inputs, use, needs_rate
         As for `Samples`.
 
     Raises
     ------
     BagError
-        Where no topic, or more than one, has good samples; where the bag is damaged.
+        No topic, or more than one, has good samples; or the bag is damaged.
 
     """
     of_type = [each.name for each in bag.topics if each.type == _TYPE]
     if topic and topic not in of_type:
         known = listed(of_type) or 'no other'
         raise BagError(bag.path, f'holds no topic {topic!r} of {_TYPE}', f'it holds {known}')
-    own = topic or _crank_topic_of_run(bag)
-    found = {
-        name: Samples(inputs, use, needs_rate) for name in ([own] if own in of_type else of_type)
+    crank_topic = topic or _crank_topic_of_run(bag)
+    samples_of = {
+        name: Samples(inputs, use, needs_rate)
+        for name in ([crank_topic] if crank_topic in of_type else of_type)
     }
     for name, _, _, data in bag.messages():
-        if name in found:
-            found[name].add(data)
-    good = {name: samples for name, samples in found.items() if len(samples)}
+        if name in samples_of:
+            samples_of[name].add(data)
+    good = {name: samples for name, samples in samples_of.items() if len(samples)}
     if len(good) == 1:
         (samples,) = good.values()
         return samples
@@ -145,25 +146,25 @@ def read_samples(
         )
     raise BagError(
         bag.path,
-        f'holds no crank sample of {listed(inputs)}{_why(found)}',
+        f'holds no crank sample of {listed(inputs)}{_why(samples_of)}',
         'name another bag, or its topic as drive.bag.topic',
     )
 
 
-def _why(found: Mapping[str, Samples]) -> str:
-    """Return what most messages of each topic were refused for."""
+def _why(samples_of: Mapping[str, Samples]) -> str:
+    """Return the most frequent reason for rejected messages, for each topic."""
     reasons = (
         f'{name}: {samples.rejected.most_common(1)[0][0].value}'
-        for name, samples in found.items()
+        for name, samples in samples_of.items()
         if samples.rejected
     )
     return ''.join(f', {reason}' for reason in reasons)
 
 
 def _crank_topic_of_run(bag: Bag) -> str:
-    """Return the crank topic of a bag of ours; '' where it does not say."""
-    said = run_said(bag).get('crank_topic')
-    return said if isinstance(said, str) else ''
+    """Return the crank topic from the run's account in a bag; '' if the bag has none."""
+    name = run_said(bag).get('crank_topic')
+    return name if isinstance(name, str) else ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,9 +204,9 @@ def build(parameters: BagParameters, context: Context) -> RecordedPace | FastPac
     Raises
     ------
     BagError
-        Where it cannot be read, or no topic of it, or more than one, holds the input joints.
+        The bag cannot be read, or no topic, or more than one, has the input joints.
     DefinitionError
-        Where it is to repeat and its samples take no time.
+        It should repeat, but its samples take no time.
 
     """
     recorded = parameters.pace == 'recorded'
@@ -223,30 +224,30 @@ def build(parameters: BagParameters, context: Context) -> RecordedPace | FastPac
 
 class RecordedPace(Drive):
     """
-    The samples at their times: each comes as long after the first tick as after the first sample.
+    Recorded samples at their times: each as long after the first tick as after the first sample.
 
-    Between and after them it is the `topic` drive that makes the crank.
+    A `TopicDrive` makes the crank state between and after them.
 
     Parameters
     ----------
     samples
         The samples.
     use
-        How they are used.
+        How samples are used.
     repeat
-        Whether they begin again.
+        Whether they start again at the end.
 
     Raises
     ------
     DefinitionError
-        Where they are to begin again and take no time.
+        They should start again, but take no time.
 
     """
 
     __slots__ = ('_newest', '_period', '_start', '_topic', 'max_age', 'samples')
 
     max_age: int
-    """Age of the newest sample beyond which there is no crank, in [ns]."""
+    """Age of the newest sample above which there is no crank state, in [ns]."""
 
     def __init__(self, samples: Samples, use: TopicParameters, *, repeat: bool) -> None:
         self.samples = samples
@@ -267,7 +268,7 @@ class RecordedPace(Drive):
         return 0 if self._start is None else self._start + self._topic.stamp - 1
 
     def state(self, now: int) -> CrankState | None:
-        """Return the crank at a time, in [ns]; nothing where the newest sample is too old."""
+        """Return the crank state at a time, in [ns]; None if the newest sample is too old."""
         if self._start is None:
             self._start = now
         elapsed = time = now - self._start
@@ -275,7 +276,7 @@ class RecordedPace(Drive):
         if self._period:
             rounds, time = divmod(elapsed, self._period)
         number = bisect_right(self.samples.offsets, time) - 1
-        # The inner drive's time begins at 1 ns, since a stamp of 0 would be none.
+        # The time of the inner drive begins at 1 ns, since a stamp of 0 means no stamp.
         if self._newest != (rounds, number):
             self._newest = (rounds, number)
             stamp = elapsed - time + self.samples.offsets[number] + 1
@@ -285,14 +286,14 @@ class RecordedPace(Drive):
 
 class FastPace(Drive):
     """
-    The samples one by one: at each tick the next, as it was measured, whatever the time.
+    Recorded samples one by one: each tick takes the next one as measured, whatever the time.
 
     Parameters
     ----------
     samples
         The samples.
     repeat
-        Whether they begin again after the last.
+        Whether they start again after the last.
 
     """
 
@@ -307,7 +308,7 @@ class FastPace(Drive):
         self._next = 0
 
     def state(self, _now: int) -> CrankState | None:
-        """Return the next sample; nothing after the last."""
+        """Return the next sample; None after the last."""
         number = self._next
         if number == len(self.samples):
             if not self._repeat:

@@ -14,20 +14,20 @@
 
 
 """
-A crank that swings through a range of frequencies: θ = θ₀ + A·sin φ, with φ′ = 2π·f(t).
+Drive a crank through a range of frequencies: θ = θ₀ + A·sin φ, with φ′ = 2π·f(t).
 
-Over the T seconds of the sweep, with x = t/T, the frequency and the periods passed, φ/2π, are
+During the T seconds of the sweep, with x = t/T, the frequency and the periods passed, φ/2π, are
 
 - linear: f = f₀ + (f₁ − f₀)·x and f₀·t + (f₁ − f₀)·x·t/2;
 - logarithmic: f = f₀·(f₁/f₀)^x and f₀·T·((f₁/f₀)^x − 1)/ln(f₁/f₀),
 
-the latter the exponential sweep of Farina, "Simultaneous measurement of impulse response and
+the latter is the exponential sweep of Farina, "Simultaneous measurement of impulse response and
 distortion with a swept-sine technique", AES 108th Convention (2000), preprint 5093.
 
-Both start at φ = 0. Of the linear sweep whole periods are taken off in integers, before anything
-is rounded; of the logarithmic the periods passed are a double, good to some units in its last
-place. After the end the crank rests where it then is. With ``repeat`` the sweep goes back as it
-came, f(T + t) = f(T − t), and so on: neither angle nor rate jumps where it turns.
+Both start at φ = 0. For the linear sweep, whole periods are subtracted in integers, before any
+rounding. For the logarithmic one, the number of periods is a double with an error of a few ulps.
+After the end the crank rests at the value reached. With ``repeat`` the sweep runs back,
+f(T + t) = f(T − t), and so on: neither angle nor rate jumps where it reverses.
 """
 
 from __future__ import annotations
@@ -72,13 +72,13 @@ def build(parameters: ChirpParameters, context: Context) -> ClockedDrive:
 
 
 def extent(parameters: Chirp) -> tuple[float, float]:
-    """Return between which values an input stays, in [rad] or [m]."""
+    """Return the least and the greatest value of an input, in [rad] or [m]."""
     mean, A = parameters.mean, parameters.amplitude
     length = round(parameters.seconds * NANOSECONDS)
     sweep = _linear if parameters.sweep == 'linear' else _logarithmic
     periods, below, _ = sweep(parameters.start_frequency, parameters.end_frequency, length)
     passed = inf if parameters.repeat else periods(length) / below
-    # The sine begins at 0; its summit is a quarter of a period on, its valley three.
+    # The sine begins at 0; its maximum is a quarter of a period later, its minimum three quarters.
     there = sin(tau * passed) if passed < 1.0 else 0.0
     return mean + A * (-1.0 if passed >= 0.75 else min(0.0, there)), mean + A * (
         1.0 if passed >= 0.25 else there

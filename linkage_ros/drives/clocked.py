@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-What the drives that make the crank up have in common: a curve for each input, and one clock.
+Drives that generate the crank by themselves: a curve for each input, on one clock.
 
-A time is the whole number of nanoseconds since the tick that first asked. A curve takes it as that
-integer, so that nothing is lost of it before it is multiplied by a rate or a frequency.
+Time is the integer number of nanoseconds since the first tick. A curve takes that integer, so that
+no digit is lost before the multiplication by a rate or a frequency.
 """
 
 from __future__ import annotations
@@ -30,8 +30,6 @@ from linkage_ros.generated_code import Lines
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 
-# Drives that would take a joint beyond its limits, refused when they are built.
-
 
 def refuse_beyond(
     closure: Closure, number: int, where: str, start: float, extent: tuple[float, float]
@@ -39,26 +37,27 @@ def refuse_beyond(
     """
     Refuse a motion of an input that leaves the limits of a joint, where that can be known.
 
-    Of the input's own limits it can; of those of published joints where there is one input. A
-    motion that leaves the range by a toggle is none of this: there the loop is open.
+    It can be known for the limits of the input itself and, with a single input, for those of
+    published joints. A motion that leaves the range through a toggle is not refused: there the
+    loop is open.
 
     Parameters
     ----------
     closure
         The linkage.
     number
-        Of the input.
+        Index of the input.
     where
-        Key of the motion, for messages.
+        Key of the motion, for error messages.
     start
         Its first value, in [rad] or [m].
     extent
-        Between which values it stays; infinite ones where it goes on and on.
+        Least and greatest value; infinite for a motion without bound.
 
     Raises
     ------
     DefinitionError
-        With the joint whose limits it leaves.
+        A joint leaves its limits; the error names it.
 
     """
     given = closure.linkage.inputs[number]
@@ -93,7 +92,7 @@ def refuse_beyond(
 
 
 LARGEST = 1e10
-"""No value or rate of a machine's input is beyond this, in [rad], [m], [rad/s] or [m/s]."""
+"""Bound on values and rates of an input, in [rad], [m], [rad/s] or [m/s]."""
 
 Curve = Callable[[int], tuple[float, float, float]]
 """
@@ -108,12 +107,12 @@ P = TypeVar('P')
 
 class ClockedDrive(Drive):
     """
-    Inputs that follow curves, from the first tick on.
+    Inputs that follow curves from the first tick on.
 
     Parameters
     ----------
     curves
-        One for each input, in the order of the linkage.
+        One curve for each input, in the order of the linkage.
 
     """
 
@@ -130,10 +129,10 @@ class ClockedDrive(Drive):
         self.start = None
 
     def state(self, now: int) -> CrankState:
-        """Return the crank at a time, in [ns]; the first that is asked for is the curves' zero."""
+        """Return the crank state at a time, in [ns]; the first call sets the time 0."""
         if self.start is None:
             self.start = now
-        if self._curve is not None:  # zip over one takes twice as long, in every tick
+        if self._curve is not None:  # zip over one curve would double the time
             value, rate, acceleration = self._curve(now - self.start)
             return CrankState((value,), (rate,), (acceleration,), 0)
         elapsed = now - self.start
@@ -141,7 +140,7 @@ class ClockedDrive(Drive):
         return CrankState(values, rates, accelerations, 0)
 
     def straight(self, inputs: int, leave: str) -> Lines:
-        """Return `state` as lines: of one input without a frame of its own."""
+        """Return `state` as generated lines; a single input needs no function call."""
         if self._curve is None:
             return super().straight(inputs, leave)
         lines = [
@@ -162,29 +161,29 @@ def build_clocked(
     extent: Callable[[P], tuple[float, float]],
 ) -> ClockedDrive:
     """
-    Build a drive of curves.
+    Build a drive from curves.
 
     Parameters
     ----------
     where
-        Key of the drive, for messages.
+        Key of the drive, for error messages.
     common
-        What an input follows that has nothing of its own.
+        Parameters of the inputs that have none in `inputs`.
     inputs
-        What single inputs follow, by their names.
+        Parameters of single inputs, by name.
     context
-        What it is built for.
+        Context of the drive.
     curve
-        Makes a curve of parameters, given their key for messages.
+        Makes a curve from parameters and their key for error messages.
     extent
-        Tells between which values a curve of parameters stays, in [rad] or [m]; infinite ones
-        where it goes on and on.
+        Returns the least and the greatest value of a curve, in [rad] or [m]; infinite for a motion
+        without bound.
 
     Raises
     ------
     DefinitionError
-        Where every input has something of its own, so that ``common`` would mean nothing; where
-        one leaves the limits of a joint.
+        Every input has its own parameters, so that ``common`` has no effect; or an input leaves
+        the limits of a joint.
 
     """
     names = [given.joint for given in context.closure.linkage.inputs]
@@ -205,10 +204,11 @@ def build_clocked(
 
 def as_integers(*numbers: float) -> tuple[list[int], int]:
     """
-    Return doubles as integers over one denominator, exactly: each is an integer over a power of 2.
+    Return doubles as integers over one denominator.
 
-    Python divides integers of any length to the nearest double. A formula of products and sums
-    that is worked out in such integers, with the time as another, is therefore rounded once.
+    This is exact, since each double is an integer over a power of 2. Python divides integers of
+    any length to the nearest double. So a formula of products and sums of such integers, with the
+    time as another integer, is rounded only once.
     """
     ratios = [number.as_integer_ratio() for number in numbers]
     denominator = max(below for _, below in ratios)

@@ -14,11 +14,11 @@
 
 
 """
-A crank at a constant rate: θ = θ₀ + ω·t.
+Drive a crank at a constant rate: θ = θ₀ + ω·t.
 
-The sum is worked out in integers and rounded once, so that the angle is the double nearest to the
-exact one, after any time. Where an input leaves the range that the linkage can reach, it goes on:
-the loop is open from there, and said to be.
+The sum is computed in integers and rounded once, so the angle is the double nearest to the exact
+value after any time. An input may leave the range that the linkage can reach: it goes on, and the
+loop is reported open from there.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def build(parameters: ConstantRateParameters, context: Context) -> ClockedDrive:
 
 
 def extent(parameters: ConstantRate) -> tuple[float, float]:
-    """Return between which values an input stays, in [rad] or [m]."""
+    """Return the least and the greatest value of an input, in [rad] or [m]."""
     start, rate = parameters.start, parameters.rate
     return (-inf if rate < 0.0 else start), (inf if rate > 0.0 else start)
 

@@ -14,21 +14,21 @@
 
 
 """
-The drives: where the crank comes from.
+Interface of the drives, which determine the crank state.
 
-Each is a module, imported only where a scene names the drive, with
+Each drive is a module, imported only if a scene names the drive, with
 
 ``PARAMETERS``
     The type of its parameters (see `linkage_ros.files.parameters`).
 ``build(parameters, context: Context) -> Drive``
     Build it.
 
-A drive that listens to a topic has also
+A drive that listens to a topic also has
 
 ``TOPIC``
     The topic; its messages are ``sensor_msgs/msg/JointState``.
 ``reader(context) -> Callable[[bytes], sample | Rejection]``
-    Build what makes a sample of a message; the drive has then ``offer(sample, now)``.
+    Build a function that reads a sample from a message; the drive then has ``offer(sample, now)``.
 """
 
 from __future__ import annotations
@@ -56,23 +56,23 @@ DRIVES = {
     'bag': 'linkage_ros.drives.bag',
     'torque': 'linkage_ros.drives.torque',
 }
-"""Name of each drive, and the module that holds it."""
+"""Module of each drive, by name of the drive."""
 
 
 class CrankState(NamedTuple):
     """
-    The crank at a tick.
+    State of the inputs at a tick.
 
     Attributes
     ----------
     angles
-        Of each input, in the order of the linkage, in [rad]; of one that slides in [m].
+        Value of each input, in the order of the linkage, in [rad]; of a sliding input in [m].
     rates
-        In [rad/s] or [m/s].
+        Rates in [rad/s] or [m/s].
     accelerations
-        In [rad/s²] or [m/s²]; 0 where they are unknown.
+        Accelerations in [rad/s²] or [m/s²]; 0 where unknown.
     age
-        Time of the tick less that of the sample, in [ns].
+        Time of the tick minus that of the sample, in [ns].
 
     """
 
@@ -87,13 +87,13 @@ _CRANK = ', '.join(CrankState._fields)
 
 class CrankBehindPlay(CrankState):
     """
-    The crank at a tick, behind the play between it and its motor.
+    State of the inputs at a tick, after the play between them and their motors.
 
     Attributes
     ----------
     free_motors
-        For each input the acceleration of its motor, in [rad/s²] or [m/s²], where the motor moves
-        within the play and pushes nothing; None where it pushes the crank.
+        For each input the acceleration of its motor, in [rad/s²] or [m/s²], while the motor moves
+        within the play and transmits no force; None while it drives the input.
 
     """
 
@@ -101,29 +101,29 @@ class CrankBehindPlay(CrankState):
 
 
 class Drive(Protocol):
-    """A drive at work; it remembers, and a reset builds it again."""
+    """Drive with its state; a reset builds a new one."""
 
     @property
     def stamp(self) -> int:
-        """Stamp of the newest good sample, in [ns]; 0 where there is none."""
+        """Stamp of the newest good sample, in [ns]; 0 without one."""
 
     @property
     def max_age(self) -> int:
-        """Age of the newest sample beyond which something is amiss, in [ns]; 0 for never."""
+        """Age of the newest sample above which a warning is due, in [ns]; 0 for never."""
 
     def state(self, now: int, /) -> CrankState | None:
-        """Return the crank at a time, in [ns]; nothing where there is none."""
+        """Return the crank state at a time, in [ns]; None if there is none."""
 
     def straight(self, _inputs: int, leave: str) -> Lines:
         """
-        Return `state` as lines that make what a `CrankState` has, by its names, of ``now``.
+        Return `state` as generated lines that compute the fields of `CrankState` from ``now``.
 
         Parameters
         ----------
         inputs
-            How many the linkage has.
+            Number of inputs of the linkage.
         leave
-            The statement that leaves the lines where there is no crank.
+            Statement that leaves the lines where there is no crank state.
 
         """
         lines = ['crank = state(now)', 'if crank is None:', f'    {leave}', f'{_CRANK} = crank']
@@ -133,31 +133,31 @@ class Drive(Protocol):
 @dataclass(frozen=True)
 class Context:
     """
-    What drives and effects are built for.
+    Context from which drives and effects are built.
 
     Attributes
     ----------
     closure
-        The linkage, as it is solved.
+        Closure of the linkage.
     rate
-        Ticks a second, in [Hz]; 0 for one for every crank sample.
+        Tick rate, in [Hz]; 0 for one tick per crank sample.
     needs_rate
-        Whether something uses the crank's rate.
+        Whether something uses the rate of the crank.
     seed
-        From which every random generator of this linkage is made.
+        Seed of every random generator of this linkage.
     loads
-        The forces that act on it.
+        Forces on the linkage.
     friction
-        In its joints; nothing where the scene names none.
+        Friction in its joints; None if the scene has none.
     prefix
-        What the joints' names have before their own in messages; '' for nothing.
+        Prefix of the joint names in messages; '' for none.
     dependent
-        Names in messages of the joints of all linkages that follow from driven ones.
+        Names, as in messages, of the dependent joints of all linkages.
     effects
-        Names of the effects that the scene names.
+        Names of the effects in the scene.
     moves_by_rates
-        Whether the crank's rates are those at which it moves; one that is held between its samples
-        stands, whatever its rate.
+        Whether the crank moves at its rates; an input that is held between samples stands still,
+        whatever its rate.
 
     """
 
@@ -174,7 +174,7 @@ class Context:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of the published joints, as the linkage has them."""
+        """Names of the published joints, without prefix."""
         return tuple(self.closure.linkage.joints)
 
     @property
@@ -188,28 +188,28 @@ class Context:
         return tuple(self.prefix + given.joint for given in self.closure.linkage.inputs)
 
     def random(self, effect: str) -> Random:
-        """Return a generator of an effect's own: what others draw does not change it."""
+        """Return the random generator of an effect, independent of those of other effects."""
         return self.generator(self.seed, effect)
 
     @staticmethod
     def generator(seed: str, effect: str) -> Random:
-        """Return an effect's generator, where its context does not exist yet."""
+        """Return the random generator of an effect before its context exists."""
         return Random(f'{seed}/{effect}')
 
     @cached_property
     def mechanics(self) -> Mechanics:
-        """Return the forces of the linkage, shared by all that ask for them."""
-        from linkage_ros.dynamics.mechanics import Mechanics  # local import: where forces act
+        """Return the force model of the linkage; all users share it."""
+        from linkage_ros.dynamics.mechanics import Mechanics  # local import: only with forces
 
         return Mechanics(self.closure, self.loads, self.friction)
 
     @cached_property
     def reactions(self) -> Reactions:
-        """Return the forces in its pins and sliders, shared by all that ask for them."""
-        from linkage_ros.dynamics.reactions import Reactions  # local import: where forces act
+        """Return the forces in pins and sliders; all users share them."""
+        from linkage_ros.dynamics.reactions import Reactions  # local import: only with forces
 
         return Reactions(self.mechanics)
 
 
 Reader = Callable[[bytes], Any]
-"""Makes a sample, or a Rejection, of a message."""
+"""Reads a sample, or a Rejection, from a message."""

@@ -14,21 +14,20 @@
 
 
 """
-A crank that follows a table of times and values.
+Drive a crank along a table of times and values.
 
-Between two rows the value is a polynomial of x, the part of the time between them that has passed:
+Between two rows the value is a polynomial of x, the elapsed fraction of the time between them:
 
 - ``linear``: a straight line. The rate jumps at each row, and the acceleration is 0.
 - ``cubic``: the cubic spline through all rows, with a continuous acceleration (de Boor, "A
   Practical Guide to Splines", 1978, chapter IV). It is at rest in the first row and in the last;
   with ``repeat`` it is periodic instead, and runs through them as through the others.
-- ``minimum_jerk``: at rest in every row, and from row to row by 10x³ − 15x⁴ + 6x⁵, of all such
-  ways that with the least jerk (Flash and Hogan, J. Neurosci. 5 (1985) 1688). Two rows of one
-  value are a dwell.
+- ``minimum_jerk``: at rest in every row, and from row to row by 10x³ − 15x⁴ + 6x⁵, the motion of
+  least jerk (Flash and Hogan, J. Neurosci. 5 (1985) 1688). Two rows of equal value are a dwell.
 
-Before the first row the input rests there, and after the last. With ``repeat`` the last row is the
-first once more: what the table gained from its first value to its last is kept, so that a table
-from 0 to 2π turns on and on, and one that comes back repeats exactly.
+Before the first row and after the last the input rests. With ``repeat`` the last row is also the
+first row of the next pass, and the difference between last and first value is added at each pass:
+a table from 0 to 2π turns continuously, and one that returns to its start repeats exactly.
 """
 
 from __future__ import annotations
@@ -78,37 +77,37 @@ def build(parameters: ProfileParameters, context: Context) -> ClockedDrive:
     Raises
     ------
     DefinitionError
-        Where a table has less than two rows, or times that do not increase.
+        A table has less than two rows, or times that do not increase.
 
     """
     return build_clocked('drive.profile', parameters, parameters.inputs, context, curve, extent)
 
 
 def extent(parameters: Profile) -> tuple[float, float]:
-    """Return between which values an input stays, in [rad] or [m]."""
+    """Return the least and the greatest value of an input, in [rad] or [m]."""
     values = [value for _, value in parameters.table]
     gain = values[-1] - values[0] if parameters.repeat else 0.0
-    found = list(values)
-    if parameters.interpolation == 'cubic':  # the others do not swing beyond their rows
+    extremes = list(values)
+    if parameters.interpolation == 'cubic':  # the others stay between their rows
         times = [time for time, _ in parameters.table]
         seconds = [after - before for before, after in pairwise(times)]
         for value, (c1, c2, c3, _, _) in zip(
             values, _polynomials(parameters, seconds), strict=False
         ):
-            found += [value + x * (c1 + x * (c2 + x * c3)) for x in _turns_at(c1, c2, c3)]
-    return (-inf if gain < 0.0 else min(found)), (inf if gain > 0.0 else max(found))
+            extremes += [value + x * (c1 + x * (c2 + x * c3)) for x in _turns_at(c1, c2, c3)]
+    return (-inf if gain < 0.0 else min(extremes)), (inf if gain > 0.0 else max(extremes))
 
 
 def _turns_at(c1: float, c2: float, c3: float) -> list[float]:
-    """Return where between 0 and 1 the slope c₁ + 2c₂x + 3c₃x² is 0."""
+    """Return the places between 0 and 1 where the slope c₁ + 2c₂x + 3c₃x² is 0."""
     root = c2 * c2 - 3.0 * c1 * c3
     if root < 0.0:
         return []
-    # Of the two forms of a root the one in which nothing cancels (Press et al., section 5.6).
+    # Of the two forms of a root, use the one without cancellation (Press et al., section 5.6).
     q = -(c2 + copysign(sqrt(root), c2))
-    found = [q / (3.0 * c3)] if c3 else []
-    found += [c1 / q] if q else []
-    return [x for x in found if 0.0 < x < 1.0]
+    roots = [q / (3.0 * c3)] if c3 else []
+    roots += [c1 / q] if q else []
+    return [x for x in roots if 0.0 < x < 1.0]
 
 
 def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
@@ -146,7 +145,7 @@ def curve(parameters: Profile, where: str = 'drive.profile') -> Curve:
 
 
 def _polynomials(parameters: Profile, seconds: Sequence[float]) -> list[_Polynomial]:
-    """Return the polynomial that leads from each row to the next, but for its constant."""
+    """Return the polynomial from each row to the next, without its constant term."""
     steps = [after - before for (_, before), (_, after) in pairwise(parameters.table)]
     if parameters.interpolation == 'linear':
         return [(step, 0.0, 0.0, 0.0, 0.0) for step in steps]
@@ -182,11 +181,11 @@ _Polynomial = tuple[float, float, float, float, float]
 def _cubic(
     seconds: Sequence[float], steps: Sequence[float], *, periodic: bool
 ) -> list[_Polynomial]:
-    """Return the coefficients of the spline, by its slopes at the rows."""
+    """Return the coefficients of the spline from its slopes at the rows."""
     chords = [step / h for step, h in zip(steps, seconds, strict=True)]
     slopes = _slopes(seconds, chords, 0.0)
     if periodic:
-        # Linear in the slope at the seam, which is such that the acceleration is continuous there.
+        # Linear in the slope at the seam, chosen to make the acceleration continuous there.
         unit = _slopes(seconds, [0.0] * len(chords), 1.0)
         h0, h1 = seconds[0], seconds[-1]
         seam = (3.0 * (h0 * chords[-1] + h1 * chords[0]) - h0 * slopes[-2] - h1 * slopes[1]) / (
@@ -201,10 +200,10 @@ def _cubic(
 
 def _slopes(seconds: Sequence[float], chords: Sequence[float], ends: float) -> list[float]:
     """
-    Return the slopes at the rows, given those at both ends, in [rad/s] or [m/s].
+    Return the slopes at the rows from those at both ends, in [rad/s] or [m/s].
 
-    At each row between, h₀ and h₁ are the times before and after it, d₀ and d₁ the slopes of the
-    chords. The acceleration is continuous where h₁·m₋ + 2(h₀ + h₁)·m + h₀·m₊ = 3(h₁·d₀ + h₀·d₁).
+    At each inner row, h₀ and h₁ are the times before and after it, d₀ and d₁ the slopes of the
+    chords. The acceleration is continuous if h₁·m₋ + 2(h₀ + h₁)·m + h₀·m₊ = 3(h₁·d₀ + h₀·d₁).
     """
     slopes = [ends]
     upper = [0.0]

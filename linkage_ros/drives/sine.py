@@ -14,10 +14,10 @@
 
 
 """
-A crank that swings as a sine: θ = θ₀ + A·sin(2π·f·t + φ).
+Drive a crank by a sine: θ = θ₀ + A·sin(2π·f·t + φ).
 
-Whole periods are taken off f·t in integers, before anything is rounded. What the sine is taken of
-is thus as exact after a month as at the beginning.
+Whole periods of f·t are subtracted in integers, before any rounding. So the argument of the sine
+is as exact after a month as at the start.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def build(parameters: SineParameters, context: Context) -> ClockedDrive:
 
 
 def extent(parameters: Sine) -> tuple[float, float]:
-    """Return between which values an input stays, in [rad] or [m]."""
+    """Return the least and the greatest value of an input, in [rad] or [m]."""
     return parameters.mean - parameters.amplitude, parameters.mean + parameters.amplitude
 
 

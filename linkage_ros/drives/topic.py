@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The crank from a topic: the newest measured sample, carried forward by its rate."""
+"""Drive from a topic: the newest measured sample, extrapolated by its rate."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from linkage_ros.messages.joint_state import CrankSample, JointStateReader, Reje
 from linkage_ros.messages.layout import NANOSECONDS
 
 LARGEST = 1e10
-"""Angles beyond this, in [rad], are 2e-6 rad apart as doubles: none of a machine. Rates alike."""
+"""Larger angles, in [rad], are 2e-6 rad apart as doubles: no machine has them. Likewise rates."""
 
 
 TOPIC = 'crank_states'
@@ -56,7 +56,7 @@ PARAMETERS = TopicParameters
 
 
 def reader(context: Context) -> Reader:
-    """Build what reads the messages."""
+    """Build the reader of the messages."""
     return JointStateReader(context.inputs_in_messages).read
 
 
@@ -70,27 +70,27 @@ _Values = tuple[float, ...]
 
 class TopicDrive(Drive):
     """
-    The newest good sample, and nothing else.
+    Drive that keeps the newest good sample only.
 
-    A JointState has no accelerations: those of the state are 0, which is what carrying forward by
-    the rate takes them for.
+    A JointState has no accelerations: those of the crank state are 0, as the extrapolation at
+    constant rate implies.
 
     Parameters
     ----------
     use
         How samples are used.
     needs_rate
-        Whether something beyond carrying forward needs the crank's rate. Where nothing does,
-        messages without velocities are good enough.
+        Whether anything besides the extrapolation needs the crank's rate. If nothing does,
+        messages without velocities are accepted.
 
     """
 
     __slots__ = ('_carry_forward', '_max_lead', '_needs_rate', 'max_age', 'sample')
 
     max_age: int
-    """Age of the newest sample beyond which there is no crank, in [ns]."""
+    """Age of the newest sample above which there is no crank state, in [ns]."""
     sample: tuple[int, _Values, _Values, _Values] | None
-    """The newest good sample: its stamp, in [ns], angles, rates, and as many zeros."""
+    """The newest good sample: its stamp, in [ns], angles, rates, and zeros as accelerations."""
 
     def __init__(self, use: TopicParameters, needs_rate: bool) -> None:
         self._carry_forward = use.carry_forward
@@ -106,7 +106,7 @@ class TopicDrive(Drive):
 
     def offer(self, sample: CrankSample, now: int) -> Rejection | None:
         """
-        Take a sample, or say why not; a sample that is not taken changes nothing.
+        Take a sample, or return why it is rejected; a rejected sample changes nothing.
 
         Parameters
         ----------
@@ -136,7 +136,7 @@ class TopicDrive(Drive):
         return None
 
     def state(self, now: int) -> CrankState | None:
-        """Return the crank at a time, in [ns]; nothing where the newest sample is too old."""
+        """Return the crank state at a time, in [ns]; None if the newest sample is too old."""
         if self.sample is None:
             return None
         stamp, angles, rates, zeros = self.sample
@@ -145,7 +145,7 @@ class TopicDrive(Drive):
             return None
         if self._carry_forward:
             seconds = age * 1e-9
-            if len(angles) == 1:  # a loop over one takes five times as long, in every tick
+            if len(angles) == 1:  # a loop over one takes five times as long
                 angles = (angles[0] + rates[0] * seconds,)
             else:
                 pairs = zip(angles, rates, strict=True)
@@ -153,7 +153,7 @@ class TopicDrive(Drive):
         return CrankState(angles, rates, zeros, age)
 
     def straight(self, inputs: int, leave: str) -> Lines:
-        """Return `state` as lines: without a frame of its own."""
+        """Return `state` as generated lines, without a function call."""
         lines = [
             'if drive.sample is None:',
             f'    {leave}',

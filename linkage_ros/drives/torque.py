@@ -14,12 +14,12 @@
 
 
 """
-Hardware in the loop: a controller commands the effort of the input, and the linkage moves by it.
+Hardware in the loop: a controller commands the effort of the input, which moves the linkage.
 
-Time is cut into steps of one length from the first tick on; a step is cut again where a command
-comes or runs out, since the force changes there. So the motion depends on the commands and their
-times alone, and not on when it is looked at: the state at a time between is a step of its own
-length, of the same method, that is not gone on from.
+Time is divided into equal steps from the first tick on. A step is divided again where a command
+arrives or expires, since the force changes there. So the motion depends only on the commands and
+their times, not on when the state is read: the state between two steps comes from a shorter step
+of the same method, which is then discarded.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from linkage_ros.messages.layout import NANOSECONDS
 TOPIC = 'crank_commands'
 
 _MADE_UP = NANOSECONDS
-"""Time that a tick makes up for, at least, in [ns]; so are two ticks of a scene."""
+"""Time that one tick integrates at most, in [ns]; two periods if these are longer."""
 
 _NEVER = 1 << 63
 
@@ -82,7 +82,7 @@ PARAMETERS = TorqueParameters
 
 
 def reader(context: Context) -> Reader:
-    """Build what reads the messages."""
+    """Build the reader of the messages."""
     return JointEffortReader(context.inputs_in_messages[0], context.dependent).read
 
 
@@ -93,8 +93,8 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
     Raises
     ------
     DefinitionError
-        Where the linkage has several inputs or lacks masses, no motion starts where it should, or
-        the brake is not said.
+        The linkage has several inputs or lacks masses, no motion can start at the given start, or
+        the brake is not specified.
 
     """
     closure = context.closure
@@ -129,15 +129,15 @@ def build(parameters: TorqueParameters, context: Context) -> TorqueDrive:
             f'at {parameters.start:g} nothing can be moved: a toggle, or no inertia',
             'start elsewhere',
         )
-    # A scene with slow ticks does not lose time between them.
+    # A scene with slow ticks must not skip time between them.
     period = round(NANOSECONDS / context.rate) if context.rate else 0
     most = closure.linkage.inputs[0].limits.effort
     return TorqueDrive(motion, start, parameters, max(_MADE_UP, 2 * period), min(most, LARGEST))
 
 
 def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]:
-    """Return where the input is stopped, in [rad] or [m]: at limits, or before a toggle."""
-    # Where the input has limits itself, its angle counts with all turns.
+    """Return the stops of the input, in [rad] or [m]: at limits, or before a toggle."""
+    # If the input has limits, its angle is not reduced by whole turns.
     counted = closure.linkage.inputs[0].limits.bounded
     for each in closure.input_ranges:
         if each.whole:
@@ -162,23 +162,23 @@ def _stops(closure: Closure, start: float, margin: float) -> tuple[float, float]
 
 class TorqueDrive(Drive):
     """
-    A mechanism that commands move.
+    A mechanism moved by commanded efforts.
 
-    What a tick makes up for is limited, so that one that comes late is not later still for it:
-    of the time beyond it, whole steps are left out, as if the mechanism had stood still.
+    A tick integrates a limited time, so that a late tick does not become later still: beyond the
+    limit whole steps are skipped, as if the mechanism had stood still.
 
     Parameters
     ----------
     mechanism
-        How it moves.
+        The equation of motion.
     start
-        Its state at the first tick.
+        State at the first tick.
     use
-        Step, and what holds while no command does.
+        Step size, and the effort without a valid command.
     made_up
-        The longest time that a tick makes up for, in [ns].
+        Longest time that one tick integrates, in [ns].
     most
-        The greatest effort, either way, in [N·m] or [N]: what is commanded beyond it is cut to it.
+        Greatest effort in either direction, in [N·m] or [N]; commands are clipped to it.
 
     """
 
@@ -200,13 +200,13 @@ class TorqueDrive(Drive):
     )
 
     stamp: int
-    """When the newest good command came, in [ns]; 0 before the first."""
+    """Arrival of the newest good command, in [ns]; 0 before the first."""
     max_age: int
-    """How long a command holds, in [ns]."""
+    """Validity of a command, in [ns]."""
     lost: int
-    """Time that was left out, in [ns]."""
+    """Skipped time, in [ns]."""
     saturated: int
-    """Commands that were cut to the effort limit."""
+    """Number of commands clipped to the effort limit."""
 
     def __init__(
         self,
@@ -229,7 +229,7 @@ class TorqueDrive(Drive):
 
     def offer(self, command: EffortCommand, now: int) -> Rejection | None:
         """
-        Take a command from now on, or say why not; one that is not taken changes nothing.
+        Take a command from now on, or return why it is rejected; a rejected one changes nothing.
 
         Parameters
         ----------
@@ -258,7 +258,7 @@ class TorqueDrive(Drive):
         return None
 
     def state(self, now: int) -> CrankState:
-        """Return the crank at a time, in [ns]; at an earlier one than the last, as it was last."""
+        """Return the crank state at a time, in [ns]; for an earlier time, the last state."""
         if self._time < 0:
             self._time = now
             self._boundary = now + self._step
@@ -270,7 +270,7 @@ class TorqueDrive(Drive):
         return CrankState((motion.value,), (motion.rate,), (acceleration,), 0)
 
     def _advance(self, now: int) -> None:
-        """Do all steps that end by now."""
+        """Integrate all steps that end by a time, in [ns]."""
         late = now - self._time - self._made_up
         if late > 0:
             left_out = -(-late // self._step) * self._step
@@ -285,7 +285,7 @@ class TorqueDrive(Drive):
                 self._boundary += self._step
 
     def _go_to(self, end: int) -> None:
-        """Do a step, or what is left of one."""
+        """Integrate a step, or the rest of one."""
         if end > self._time:
             seconds = (end - self._time) * 1e-9
             self._motion = self._mechanism.advance(self._motion, seconds, *self._force)

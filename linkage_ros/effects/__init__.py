@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a scene can call for beyond positions, one effect a file."""
+"""Effects that a scene can switch on, one per file."""

@@ -14,12 +14,11 @@
 
 
 """
-Acceleration: the second time derivative of the published joints, on a topic of its own.
+Acceleration: second time derivative of the published joints, on a separate topic.
 
-It starts from the velocity and solves no loop again. The crank's own acceleration comes from the
-drive, which says 0 where it does not know: then what is published is the part that the shape of
-the linkage makes of the crank's rate. At a toggle no acceleration exists, as no rate does, and
-both stay empty.
+It is computed from the velocity, without solving the loops again. The acceleration of the crank
+comes from the drive, which gives 0 if it is unknown: then only the part due to the crank's rate is
+published. At a toggle neither accelerations nor rates exist, and both stay empty.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ def stage(_parameters: AccelerationParameters, context: Context) -> Stage:
         if velocity is None:
             return motion
         found = acceleration_of(motion.position, velocity, *motion.crank.accelerations)
-        # Towards a toggle it grows as the cube of what the rates grow as: it may overflow alone.
+        # Near a toggle it grows with the cube of the factor of the rates: it may overflow alone.
         if not all_finite(found.joints):
             return motion
         return motion._replace(acceleration=found)
@@ -61,7 +60,7 @@ def stage(_parameters: AccelerationParameters, context: Context) -> Stage:
 
 
 def writer(_parameters: AccelerationParameters, context: Context) -> Writer:
-    """Build what writes the message: what is read, as a trajectory of one point."""
+    """Build the writer of the message: the reading as a trajectory of one point."""
     from linkage_ros.messages import joint_trajectory  # local import: if published
 
     write = joint_trajectory.JointTrajectoryWriter(context.joints_in_messages).write

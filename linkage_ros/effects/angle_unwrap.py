@@ -14,11 +14,11 @@
 
 
 """
-How a published angle runs: on beyond a turn, or wrapped.
+Unwrap published angles beyond a turn, or wrap them.
 
-The closure knows an angle up to whole turns. `Continuous` adds the turns that bring it nearest to
-what came last, so it takes steps of less than half a turn. It stands before the sensors, which may
-then mix and quantise what they get without a thought of wrapping; `all_wrapped` stands behind.
+The closure gives an angle up to whole turns. `Continuous` adds the turns that bring it nearest to
+the last one, so an angle must move less than half a turn per tick. It comes before the sensors,
+which may then mix and quantise angles without regard to wrapping; `all_wrapped` comes after them.
 """
 
 from __future__ import annotations
@@ -31,31 +31,31 @@ from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.kinematics.closure import Closure
 
 _NO_TURN = -0.0
-"""What changes no number that it is added to; 0.0 would make −0.0 another."""
+"""Changes no number when added; 0.0 would turn −0.0 into 0.0."""
 
 Begin = Callable[[float], float]
-"""Returns the turn of an angle that is published first."""
+"""Returns the turns of an angle that is published first."""
 
 
 class Continuous:
     """
-    Lets angles run on without jumps; the first lies in (−π, π].
+    Unwraps angles; the first value lies in (−π, π].
 
     Parameters
     ----------
     turning
-        For each joint whether it is an angle.
+        Whether each joint is an angle.
     begins
-        For joints that begin elsewhere, by their numbers, where.
+        First value of joints that start elsewhere, by joint index.
 
     Attributes
     ----------
     places
-        Numbers of the joints that are angles.
+        Indices of the joints that are angles.
     raw
-        The joints as they came last; empty before the first.
+        Last joint values before unwrapping; empty before the first.
     added
-        What is added to each: whole turns, in [rad].
+        Whole turns added to each joint, in [rad].
 
     """
 
@@ -69,7 +69,7 @@ class Continuous:
         self.added = (_NO_TURN,) * len(turning)
 
     def __call__(self, _now: int, reading: SensorReading) -> SensorReading:
-        """Return a reading with the turns that its angles have made."""
+        """Return the reading with unwrapped angles."""
         joints, raw = reading.joints, self.raw
         self.raw = joints
         if raw:
@@ -78,12 +78,12 @@ class Continuous:
             return reading._replace(joints=tuple(map(add, joints, self.added)))
         first = {i: begin(joints[i]) for i, begin in self._begin.items()}
         self._turn(first, joints)
-        # Just as they begin: to add turns may round.
+        # Keep the first values exactly: adding turns may round.
         began = tuple(first.get(i, value) for i, value in enumerate(joints))
         return reading._replace(joints=began)
 
     def _turn(self, last: Mapping[int, float], joints: Sequence[float]) -> None:
-        """Add the turns that bring joints nearest to where they were last."""
+        """Add the turns that bring the joints nearest to their last values."""
         for i, value in last.items():
             if not -pi < value - joints[i] < pi:
                 self._turns[i] += round((value - joints[i]) / tau)
@@ -92,10 +92,10 @@ class Continuous:
 
 def beginnings(closure: Closure) -> dict[int, Begin]:
     """
-    Return how published angles begin that have limits, by the numbers of the joints.
+    Return the first values of published angles with limits, by joint index.
 
-    One that depends begins nearest to the middle of its limits, and so within them; one that is
-    driven begins where it is sent.
+    A dependent angle begins nearest to the middle of its limits, and so within them; a driven one
+    begins at its input.
     """
     bounds, joints = closure.bounds, list(closure.linkage.joints)
     found: dict[int, Begin] = {
@@ -109,12 +109,12 @@ def beginnings(closure: Closure) -> dict[int, Begin]:
 
 def all_wrapped(turning: Sequence[bool]) -> Sensor:
     """
-    Build what wraps angles to (−π, π].
+    Build a stage that wraps angles to (−π, π].
 
     Parameters
     ----------
     turning
-        For each joint whether it is an angle.
+        Whether each joint is an angle.
 
     """
     turns = tuple(turning)
@@ -127,6 +127,6 @@ def all_wrapped(turning: Sequence[bool]) -> Sensor:
 
 
 def wrapped(angle: float) -> float:
-    """Return an angle less its whole turns, in (−π, π] rad."""
+    """Return an angle without its whole turns, in (−π, π] rad."""
     rest = remainder(angle, tau)
     return pi if rest <= -pi else rest

@@ -14,30 +14,29 @@
 
 
 """
-Backlash: the play between motor and crank, which follows the motor with hysteresis.
+Backlash: play between motor and crank; the crank follows the motor with hysteresis.
 
-The crank is held back by friction and stays where it is until the motor comes to one end of the
-play b and pushes it (the play operator; A. Visintin, Differential Models of Hysteresis, 1994; for
-gears: M. Nordin and P.-O. Gutman, Controlling mechanical systems with backlash, a survey,
-Automatica 38, 2002)::
+Friction holds the crank until the motor reaches one end of the play b and pushes it (the play
+operator; A. Visintin, Differential Models of Hysteresis, 1994; for gears: M. Nordin and P.-O.
+Gutman, Controlling mechanical systems with backlash, a survey, Automatica 38, 2002)::
 
     θ(t) = min(max(θ(t−), φ − b/2), φ + b/2)    θ of the crank, φ of the motor
 
-Where the motor touches an end and its rate pushes on, the crank has the motor's rate and
-acceleration; else it rests. It does not fly ahead of a motor that slows down: that would take its
-inertia. At the first tick it stands in the middle of the play.
+Where the motor touches an end and its rate pushes on, the crank has the rate and acceleration of
+the motor; else it rests. The crank does not run ahead of a motor that slows down, which would take
+inertia. At the first tick it is in the middle of the play.
 
-A crank that rests is held by friction, which bears the weight of the links, the springs, and what
-other inputs do to it. Its motor then moves alone, and `effort` is what the motor's own inertia
-takes (see `CrankBehindPlay`). Where the motor pushes, it bears all of it. Without play, a play of
-0, it always pushes.
+A resting crank is held by friction, which bears the weight of the links, the springs, and the
+effect of other inputs. Its motor then moves alone, and `effort` is the effort for the motor's own
+inertia (see `CrankBehindPlay`). Where the motor pushes, it bears all of these. Without play, at
+b = 0, it always pushes.
 
-Under the torque drive a scene with backlash is refused: motor and crank would be two masses there,
-which meet and part, and the equation of motion knows one.
+Under the torque drive a scene with backlash is refused: motor and crank would be two masses that
+meet and part, and the equation of motion has one.
 
-The model depends on the path and not on the speed, so what happens between two ticks is lost: a
-motor that turns back and forth between them has moved nothing. A turning motor may come wrapped:
-between two ticks it turns by less than half a turn.
+The model depends on the path and not on the speed, so motion between two ticks is lost: a motor
+that goes back and forth between them has moved nothing. A rotating motor may be given as a wrapped
+angle: it turns by less than half a turn per tick.
 """
 
 from __future__ import annotations
@@ -71,7 +70,7 @@ PARAMETERS = BacklashParameters
 
 
 def drive_stage(parameters: BacklashParameters, context: Context) -> DriveStage:
-    """Build the stage; it remembers where the cranks are."""
+    """Build the stage; it stores the positions of the cranks."""
     linkage = context.closure.linkage
     plays = tuple(
         Play(parameters.inputs.get(given.joint, parameters.play), turns=not given.slider)
@@ -97,14 +96,14 @@ def drive_stage(parameters: BacklashParameters, context: Context) -> DriveStage:
 
 class Play:
     """
-    What one crank does between the ends of its play.
+    The motion of one crank within its play.
 
     Parameters
     ----------
     play
-        From one end to the other, in [rad] or [m].
+        Width of the play, in [rad] or [m].
     turns
-        Whether it is an angle, which may come wrapped.
+        Whether the position is an angle, which may be wrapped.
 
     """
 
@@ -120,19 +119,19 @@ class Play:
         self, motor: float, rate: float, acceleration: float
     ) -> tuple[float, float, float, float | None]:
         """
-        Return position, rate and acceleration of the crank, and the motor's where that is free.
+        Return the state of the crank, and the motor's acceleration if it moves alone.
 
         Parameters
         ----------
         motor, rate, acceleration
-            Of the motor, in [rad] or [m], by [s] and [s²].
+            State of the motor, in [rad] or [m], and per [s] and [s²].
 
         Returns
         -------
         crank, rate, acceleration
-            Of the crank.
+            State of the crank.
         free
-            The motor's acceleration where it moves alone; None where it pushes the crank.
+            Acceleration of the motor while it moves alone; None while it pushes the crank.
 
         """
         crank = self._crank

@@ -14,14 +14,15 @@
 
 
 """
-Bias: a sensor's zero lies beside that of the joint.
+Bias: the zero of a sensor differs from that of the joint.
 
-What is read of a joint is off by a constant (instrumental bias: JCGM 200:2012, International
+The reading of a joint is off by a constant (instrumental bias: JCGM 200:2012, International
 vocabulary of metrology, 4.20)::
 
     y = x + b
 
-Rates, accelerations and efforts have none: they are derivatives of y, and other sensors' values.
+Rates, accelerations and efforts have no bias: they are derivatives of y, or come from other
+sensors.
 """
 
 from __future__ import annotations

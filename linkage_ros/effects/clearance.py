@@ -14,25 +14,25 @@
 
 
 """
-Clearance: a pin is smaller than its hole, and leans on that side where the force presses it.
+Clearance: a pin is smaller than its hole, and the force presses it to one side of the hole.
 
-While the two touch, pin and hole are joined as by a massless link as long as the radial play c,
-between their centres, which lies along the force that it carries (S. W. E. Earles and C. L. S. Wu,
-Motion analysis of a rigid-link mechanism with clearance at a bearing, using Lagrangian mechanics
-and digital computation, 1973; P. Flores, J. Ambrósio, J. C. P. Claro and H. M. Lankarani,
-Kinematics and Dynamics of Multibody Systems with Imperfect Joints, 2008). It is pulled: the
-centre of the hole or pin of ``link`` lies beside that of ``to`` by::
+While pin and hole touch, a massless link between their centres joins them. Its length is the
+radial play c, and it lies along the force that it carries (S. W. E. Earles and C. L. S. Wu, Motion
+analysis of a rigid-link mechanism with clearance at a bearing, using Lagrangian mechanics and
+digital computation, 1973; P. Flores, J. Ambrósio, J. C. P. Claro and H. M. Lankarani, Kinematics
+and Dynamics of Multibody Systems with Imperfect Joints, 2008). It is in tension: the centre of the
+hole or pin of ``link`` is displaced from that of ``to`` by::
 
     δ = −c·F/|F|              F: the force that ``to`` exerts on ``link``
 
-so that a link that hangs in its pin hangs lower by c. Of a pin of three links or more each leans
-so against the first one that ``links`` names it on.
+so a link that hangs in its pin hangs lower by c. In a pin of three links or more, each link is
+displaced in this way from the first one that ``links`` names on the pin.
 
-The force is that of the linkage without play, and what the leaning does to the published joints is
-worked out to first order, with the inputs held: wrong by the square of the play. Contact is
-never lost: where a force turns round, the pin is on the other side at once. Quasi-static: the
-rates stay those of the linkage without play. A pin without a force, below 1e-12 of the largest
-in the linkage, leans nowhere.
+The force is that of the linkage without play. The displacement of the published joints is computed
+to first order, with fixed inputs; its error is of the order of the square of the play. Contact is
+never lost: where a force reverses, the pin is on the other side at once. The model is
+quasi-static: the rates are those of the linkage without play. A pin whose force is below 1e-12 of
+the largest in the linkage is not displaced.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from linkage_ros.files.parameters import each, Number
 from linkage_ros.kinematics.arithmetic import called, vector
 
 _SMALLEST = 1e-12
-"""A force below this part of the largest one is rounding, and has no direction."""
+"""Below this fraction of the largest force, a force is rounding error without a direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ def stage(parameters: ClearanceParameters, context: Context) -> Stage:
     Raises
     ------
     DefinitionError
-        Where a slider is named.
+        A slider is named.
 
     """
     joints = context.closure.structure.joints

@@ -16,18 +16,18 @@
 """
 Compliance: links stretch under the axial force that they carry.
 
-A link between two pins P and Q is a bar of axial stiffness k = E·A/L: with the axial force N,
+A link between two pins P and Q is a bar of axial stiffness k = E·A/L: under the axial force N,
 positive in tension, it is longer by N/k (Hooke's law; S. P. Timoshenko, Strength of Materials, ch.
-I). With u the unit vector from P to Q, and F the force on the link in each of its pins, which
-contains what its inertia takes::
+I). With u the unit vector from P to Q, and F the force on the link in each of its pins, inertia
+included::
 
     N = ½·(F_Q − F_P)·u
 
-What acts on the link between its pins, its weight, its inertia and springs, is borne half by each
-end so. The force is that of the rigid linkage; what the longer links do to the published joints
-is worked out to first order, with the inputs held: right for stretches that are small against the
-links, and wrong by their square. The links have no mass to swing by: quasi-static, and the rates
-stay those of the rigid linkage.
+So each end bears half of the loads between the pins: weight, inertia and springs. The force is
+that of the rigid linkage. The displacement of the published joints is computed to first order,
+with fixed inputs: valid for stretches that are small against the links, with an error of the order
+of their square. The model is quasi-static: the stretch adds no vibration, and the rates are those
+of the rigid linkage.
 """
 
 from __future__ import annotations
@@ -68,13 +68,13 @@ class _Bar(NamedTuple):
     Attributes
     ----------
     coordinate
-        Which of the closure's turns it.
+        Index of the closure's coordinate that turns it.
     axis
         Unit vector from the near pin to the far one where that coordinate is 0.
     halves
-        Joints by number, with what their force times it is half of the tension.
+        Joints by index, with the factor of their axial force in the tension.
     far
-        Joints of the far pin by number; 1 where the link is the joint's ``link``, −1 where ``to``.
+        Joints of the far pin by index; 1 where the link is the joint's ``link``, −1 where ``to``.
     compliance
         1/k, in [m/N].
 
@@ -94,7 +94,7 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
     Raises
     ------
     DefinitionError
-        Where a link has not just two pins.
+        A link has not exactly two pins.
 
     """
     bars = tuple(_bar(context, link, k) for link, k in parameters.links.items())
@@ -114,7 +114,7 @@ def stage(parameters: ComplianceParameters, context: Context) -> Stage:
                 fx, fy, _ = reactions[joint]
                 tension += half * (fx * along.real + fy * along.imag)
             stretch = tension * softness * along
-            # What the drawing has for the far pin lies short of where the pin is.
+            # The rigid position of the far pin is short of its real position.
             for joint, sign in far:
                 offsets[joint] -= sign * stretch
         moved = shift_of(position, offsets)

@@ -13,33 +13,33 @@
 # limitations under the License.
 
 """
-Delay: what is read arrives later, by a transport time that is exact to the nanosecond.
+Delay: the reading arrives later, by a transport time that is exact to the nanosecond.
 
 With the delay d in whole nanoseconds, at the tick t::
 
     y(t) = x(t − d)
 
-``between`` says what x is between two ticks: ``interpolated``, as `history` has it; or
-``sampled``, the newest reading that is at least d old, as of a line that carries one reading for
-each tick (the delays of dm_control's observables: S. Tunyasuvunakool et al., dm_control: Software
-and tasks for continuous control, Software Impacts 6, 2020; in a control loop: B. Wittenmark, J.
-Nilsson and M. Törngren, Timing problems in real-time control systems, ACC 1995). Unless it is
-named it is ``sampled`` behind an encoder, whose readings stay whole counts, and else
-``interpolated``.
+``between`` defines x between two ticks: ``interpolated``, as in `history`; or ``sampled``, the
+newest reading that is at least d old, as in a line with one reading per tick (the delays of
+dm_control's observables: S. Tunyasuvunakool et al., dm_control: Software and tasks for continuous
+control, Software Impacts 6, 2020; in a control loop: B. Wittenmark, J. Nilsson and M. Törngren,
+Timing problems in real-time control systems, ACC 1995). The default is ``sampled`` after an
+encoder, whose readings stay whole counts, and ``interpolated`` otherwise.
 
-Nothing is published before there is a reading that old, and nothing is extrapolated. Where the
-linkage had no pose, or no crank, there is a gap: it arrives d later. The last reading before it
-arrives as it is, with the first tick that is d later; nothing is mixed across it.
+Nothing is published before there is a reading of that age, and nothing is extrapolated. Where the
+linkage had no pose, or no crank state, there is a gap: it arrives d later. The last reading before
+it arrives unchanged, at the first tick that is d later; nothing is interpolated across the gap.
 
-Behind a sensor that is silent at times (a slow one, a lossy one) the line carries messages and no
-signal. The first silence, too, arrives d later: from the last reading before it on, each reading
-arrives once, as it is, with the first tick that is d later; of several that come due between two
+After a sensor that is silent at times (a slow one, a lossy one) the line carries messages instead
+of a signal. The first silence also arrives d later: from the last reading before it on, each
+reading arrives once, unchanged, at the first tick that is d later; if several are due between two
+ticks, one at each tick.
 ticks, one with each tick.
 
-``stamp: arrival`` leaves the message the stamp of its tick, as a driver does that knows of no
-delay; ``measured`` is the time at which the sensor saw it, t − d, or that of the reading.
+With ``stamp: arrival`` the message has the stamp of its tick, as from a driver that does not know
+the delay; with ``measured`` the time of measurement, t − d, or that of the reading.
 
-The line holds the readings of the last d: at 1 kHz a thousand for a second.
+The line holds the readings of the last d: 1000 for a second at 1 kHz.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ PARAMETERS = DelayParameters
 
 
 def interpolates(parameters: DelayParameters, named: Collection[str]) -> bool:
-    """Return whether readings are mixed, with these effects in a scene."""
+    """Return whether readings are interpolated, given the effects of the scene."""
     if parameters.between == _AUTOMATIC:
         return 'encoder' not in named
     return parameters.between == 'interpolated'
@@ -98,16 +98,16 @@ class Delay:
     Parameters
     ----------
     use
-        What it does.
+        Parameters of the effect.
     mixes
-        Whether readings are mixed between two ticks; else it carries one for each tick.
+        Whether readings are interpolated between ticks; else the line carries one per tick.
     with_rates
-        Whether they are mixed by their rates, too.
+        Whether the interpolation uses the rates too.
 
     Attributes
     ----------
     gap_begins
-        Whether the last gap that it was told of began there.
+        Whether the last reported gap began there.
 
     """
 
@@ -124,13 +124,13 @@ class Delay:
         self._arrived = -1
         """Time up to which readings have arrived, in [ns]."""
         self._messages: int | None = None
-        """Time of the last reading before the first silence, in [ns]; nothing before that."""
+        """Time of the last reading before the first silence, in [ns]; None before it."""
         self._on_the_way: deque[tuple[int, SensorReading]] = deque()
-        """Readings since then that have not arrived."""
+        """Later readings that have not arrived yet."""
         self.gap_begins = False
 
     def __call__(self, now: int, reading: SensorReading | None) -> SensorReading | None:
-        """Return what arrives; None in the place of a reading is the silence of a sensor."""
+        """Return the arriving reading; None as `reading` means that the sensor is silent."""
         if self._messages is not None:
             if reading is not None:
                 self._on_the_way.append((now, reading))
@@ -141,16 +141,16 @@ class Delay:
         return self._arriving(now)
 
     def gap(self, now: int) -> SensorReading | None:
-        """Return what arrives at a time, in [ns], at which the linkage has no pose."""
+        """Return the arriving reading at a time, in [ns], at which the linkage has no pose."""
         self.gap_begins = self._messages is None and self._history.add_gap(now)
         return self._arriving(now)
 
     def silence(self, now: int, gap: bool) -> SensorReading | None:
-        """Return what arrives where a sensor before it is silent, or looks into a gap."""
+        """Return the arriving reading where a sensor before is silent, or in a gap."""
         return self.gap(now) if gap else self(now, None)
 
     def _begin_messages(self) -> None:
-        """Let the line carry messages from the newest reading on."""
+        """Make the line carry messages from the newest reading on."""
         self._messages = -1
         for newest in self._history.after(self._arrived)[-1:]:
             self._messages = newest[0]
@@ -166,7 +166,7 @@ class Delay:
         return found if found is None or self._measured else restamped(found, now)
 
     def _next(self, due: int) -> SensorReading | None:
-        """Return the first reading on the way, if it is due."""
+        """Return the first waiting reading, if it is due."""
         if self._on_the_way and self._on_the_way[0][0] <= due:
             return self._on_the_way.popleft()[1]
         return None

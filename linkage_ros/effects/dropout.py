@@ -18,22 +18,23 @@ Dropout: samples are lost, one by one or in bursts.
 
 The line is a Markov chain of two states: in the good one every sample arrives, in the bad one none
 does (E. N. Gilbert, Capacity of a burst-noise channel, Bell System Technical Journal 39, 1960;
-with a chance of loss in either: E. O. Elliott, Estimates of error rates for codes on burst-noise
-channels, ibid. 42, 1963). From one sample to the next it goes with the chances::
+with a loss probability in either: E. O. Elliott, Estimates of error rates for codes on burst-noise
+channels, ibid. 42, 1963). From one sample to the next the transition probabilities are::
 
     good → bad    p = L/(B·(1 − L))
     bad → good    r = 1/B
 
-Then a stay in the bad state has the mean of B samples, ``burst``, and a part p/(p + r) = L of
+Then a stay in the bad state lasts B samples on average, ``burst``, and a fraction p/(p + r) = L of
 all samples is lost, ``probability``. Between two bursts at least one sample arrives: p ≤ 1, so B
-is at least L/(1 − L). Losses are independent of each other where p = 1 − r = L, at B = 1/(1 − L);
-that is what ``burst: 0`` stands for. The first state is drawn with the chance L, so that all
-samples are alike.
+is at least L/(1 − L). Losses are independent of each other if p = 1 − r = L, at B = 1/(1 − L);
+``burst: 0`` stands for this value. The first state is bad with probability L, so that all samples
+have the same distribution.
 
-One draw is made for each sample, whatever becomes of it. A sample is what a tick has to publish:
-what a slower sensor repeats is lost or not each time; where it is silent there is none to lose.
+Each sample takes one random draw, whatever its fate. A sample is a reading that a tick has to
+publish: a repeated reading of a slower sensor is lost or not each time; a silent sensor has no
+sample to lose.
 
-``hold: silent`` publishes nothing in the place of a lost sample; ``repeat`` the last one that
+``hold: silent`` publishes nothing for a lost sample; ``repeat`` publishes the last one that
 arrived, with the stamp of the tick, and nothing before the first.
 """
 
@@ -78,14 +79,14 @@ def sensor(parameters: DropoutParameters, context: Context) -> Dropout:
     Raises
     ------
     DefinitionError
-        Where so much cannot be lost in bursts so short.
+        Bursts this short cannot lose so many samples.
 
     """
     return Dropout(parameters, context.random('dropout'))
 
 
 def _chances(loss: float, burst: float) -> tuple[float, float]:
-    """Return the chance that a sample is lost after one that was not, and after one that was."""
+    """Return the loss probability after a sample that arrived, and after a lost one."""
     if burst == 0.0:
         return loss, loss
     if burst < 1.0:
@@ -108,12 +109,12 @@ def _chances(loss: float, burst: float) -> tuple[float, float]:
 
 
 def _too_short(burst: float, loss: float) -> bool:
-    """Return whether so much cannot be lost in bursts so short, by more than their rounding."""
+    """Return whether the bursts are too short for the loss, by more than rounding."""
     return loss > burst * (1.0 - loss) * (1.0 + 1e-12)
 
 
 def _least_burst(loss: float) -> str:
-    """Return the shortest burst that does for a loss, to six digits: what is advised is taken."""
+    """Return the least burst for a loss, to six digits, rounded so that it is accepted."""
     rounding = Rounding(prec=6)
     least = rounding.create_decimal(repr(loss / (1.0 - loss)))
     while _too_short(float(least), loss):
@@ -123,14 +124,14 @@ def _least_burst(loss: float) -> str:
 
 class Dropout:
     """
-    A line that loses samples.
+    Sensor stage that loses samples.
 
     Parameters
     ----------
     use
-        What it does.
+        Parameters of the effect.
     random
-        What decides.
+        Random generator of the losses.
 
     """
 
@@ -144,7 +145,7 @@ class Dropout:
         self._last: SensorReading | None = None
 
     def __call__(self, _now: int, reading: SensorReading) -> SensorReading | None:
-        """Return what arrives; None where nothing does."""
+        """Return the arriving reading; None if it is lost and not repeated."""
         if self._random() >= self._chance:
             self._chance = self._begins
             self._last = reading

@@ -14,18 +14,18 @@
 
 
 """
-Effort: what the drive must give for the motion, by virtual work (inverse dynamics).
+Effort of the drive for the motion, by virtual work (inverse dynamics).
 
-It bears the inertia of links and drive, gravity, springs and friction: see
-`linkage_ros.dynamics.mechanics` for the equation and its source. The crank's acceleration is part
-of it, and comes from the drive; a topic does not say it, and then it counts as 0. Under the torque
-drive the effort is the one that makes the motion, which where the linkage sticks or lies against a
-stop is not the one commanded.
+It covers the inertia of links and drive, gravity, springs and friction: see
+`linkage_ros.dynamics.mechanics` for the equation and its source. It uses the crank's acceleration
+from the drive; a topic has none, so there it counts as 0. Under the torque drive, the effort is
+the one that causes the motion; where the linkage sticks or rests at a stop, this is not the
+commanded one.
 
-Behind backlash a motor that moves within the play pushes nothing. Friction holds the crank, and
-what that drive must give is for its own inertia alone: drive_inertia·φ̈, φ̈ of the motor.
+After backlash, a motor that moves within the play pushes nothing. Friction holds the crank, and
+the effort of that drive is for its own inertia only: drive_inertia·φ̈, with φ̈ of the motor.
 
-At a toggle no rates exist, and no effort.
+At a toggle neither rates nor efforts exist.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def stage(_parameters: EffortParameters, context: Context) -> Stage:
         if velocity is None or acceleration is None:
             return motion
         efforts = efforts_of(motion.position, velocity, acceleration)
-        # Towards a toggle they grow with the accelerations, and further.
+        # Near a toggle efforts grow with the accelerations, and faster.
         if not all_finite(efforts):
             return motion
         return motion._replace(efforts=efforts)
@@ -63,13 +63,13 @@ def stage(_parameters: EffortParameters, context: Context) -> Stage:
 
 
 def _behind_play(effort: Stage, context: Context) -> Stage:
-    """Return the stage for drives with play: one that moves within it bears its own inertia."""
+    """Return the stage for drives with play: within it a motor bears its own inertia only."""
     inertia = context.mechanics.loads.drive_inertia
 
     def effort_behind_play(motion: MechanismState) -> MechanismState:
         borne = effort(motion)
         crank = motion.crank
-        # An effect of one's own between the two may have made another crank, without play.
+        # A user-defined effect between the two may have made another crank state, without play.
         if not borne.efforts or not isinstance(crank, CrankBehindPlay) or not crank.free_motors:
             return borne
         return borne._replace(

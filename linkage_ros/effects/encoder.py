@@ -16,34 +16,34 @@
 """
 Encoder: a joint is read in whole counts.
 
-With n ``counts`` a turn (a metre, for a slide), θ₀ the ``offset`` at which count 0 begins, and
+With n ``counts`` per turn (per metre for a slide), θ₀ the ``offset`` at which count 0 begins, and
 q = 2π/n the resolution (1/n for a slide)::
 
     k = ⌊(θ − θ₀)/q⌋        y = θ₀ + k·q
 
-so that y ≤ θ < y + q: a reading is half a count low in the mean, and off from that by up to half a
-count (P. R. Bélanger, Estimation of angular velocity and acceleration from shaft encoder
-measurements, ICRA 1992). k is a whole number of any size and k·q is worked out anew each time: no
-error adds up over turns.
+so that y ≤ θ < y + q: on average a reading is half a count low, and it deviates from that by up to
+half a count (P. R. Bélanger, Estimation of angular velocity and acceleration from shaft encoder
+measurements, ICRA 1992). k is an integer of any size and k·q is computed anew each time: no error
+accumulates over turns.
 
-``incremental``: the encoder counts from where it was switched on, at the first tick, and reads
-y = (k − k₀)·q, until it passes its index mark: that lies where count 0 begins, on every turn. From
-then on it knows k. A mark is passed where it lies between the counts of two ticks; where it is
-passed to and fro between them it is as if the joint had stayed. On a slide there is one mark, at
-θ₀. Without ``index`` it never learns.
+``incremental``: the encoder counts from the position at power-on, at the first tick, and reads
+y = (k − k₀)·q, until it passes its index mark, which lies where count 0 begins, on every turn.
+From then on it knows k. A mark is passed if it lies between the counts of two ticks; a mark passed
+back and forth between two ticks is not seen. A slide has one mark, at θ₀. Without ``index`` k
+stays unknown.
 
 ``absolute`` encoders know the angle within one turn: k is counted from −n/2 to n/2, so that y lies
-within half a turn of θ₀; ``multi_turn: true`` counts turns, too, as those do that keep them in a
-battery or in gears. A slide has no turns.
+within half a turn of θ₀; ``multi_turn: true`` also counts turns, as encoders with a battery or
+gears do. A slide has no turns.
 
-``rates: differenced`` are what a driver makes of the counts, (k − k_last)·q/Δt, with Δt the time
-since it read them last: at the last tick, or at the last sample of `rate_limit`. They are 0 when
-it first reads, and as they were where no time has passed. They are whole multiples of q/Δt (R. H.
-Brown, S. C. Schneider and M. G. Mulligan, Analysis of algorithms for velocity estimation from
-discrete position versus time data, IEEE Transactions on Industrial Electronics 39, 1992). Turns
-and the step of y at the index mark are no motion, and not in them. ``exact`` leaves the rates as
-they come. Where none come none are made. Accelerations and efforts, and joints without an encoder,
-pass as they come.
+``rates: differenced`` are the rates that a driver computes from the counts, (k − k_last)·q/Δt,
+with Δt the time since its last reading: at the last tick, or at the last sample of `rate_limit`.
+They are 0 at its first reading, and unchanged if no time has passed. They are whole multiples of
+q/Δt (R. H. Brown, S. C. Schneider and M. G. Mulligan, Analysis of algorithms for velocity
+estimation from discrete position versus time data, IEEE Transactions on Industrial Electronics 39,
+1992). Turns and the step of y at the index mark are no motion, and not part of them. ``exact``
+leaves the rates unchanged. A reading without rates gets none. Accelerations, efforts, and joints
+without an encoder are unchanged.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
     Raises
     ------
     DefinitionError
-        Where an absolute encoder is said to have no index mark.
+        An absolute encoder has ``index: false``.
 
     """
     counters = []
@@ -128,12 +128,12 @@ def sensor(parameters: EncoderParameters, context: Context) -> Sensor:
 
 class Counter:
     """
-    Counts of one joint.
+    The counts of one joint.
 
     Parameters
     ----------
     encoder
-        What it is.
+        Parameters of the encoder.
     turns
         Whether the joint is an angle.
 
@@ -144,13 +144,14 @@ class Counter:
     )  # fmt: skip
 
     rate: float
-    """What a driver makes of the counts, in [rad/s] or [m/s]."""
+    """Rate that a driver computes from the counts, in [rad/s] or [m/s]."""
 
     def __init__(self, encoder: JointEncoder, turns: bool) -> None:
         self._encoder = encoder
         self._turns = turns
         self._in_a_turn = turns and not (encoder.incremental or encoder.multi_turn)
-        # The counts and what they span: (k*tau)/n is closer than k times a rounded resolution.
+        # Counts and the range of n counts: (k*tau)/n is more exact than k times a rounded
+        # resolution.
         self._counts, self._span = encoder.counts, tau if turns else 1.0
         self._last: int | None = None
         self._begin: int | None = None
@@ -158,7 +159,7 @@ class Counter:
         self.rate = 0.0
 
     def count(self, value: float) -> float:
-        """Return what the encoder says of a value, in [rad] or [m]."""
+        """Return the reading for a value, in [rad] or [m]."""
         encoder, counts, span, last = self._encoder, self._counts, self._span, self._last
         count = floor((value - encoder.offset) * counts / span)
         if last is None:
@@ -173,7 +174,7 @@ class Counter:
         return encoder.offset + count * span / counts
 
     def read(self, elapsed: int) -> float:
-        """Return the rate that a driver makes of the counts, so many [ns] after it read last."""
+        """Return the rate that a driver computes, so many [ns] after its last reading."""
         if self._read is not None and self._last is not None and elapsed > 0:
             moved = self._last - self._read
             self.rate = moved * self._span / (self._counts * elapsed * 1e-9)
@@ -181,7 +182,7 @@ class Counter:
         return self.rate
 
     def _passes(self, last: int, count: int) -> bool:
-        """Whether an index mark lies between two counts."""
+        """Return whether an index mark lies between two counts."""
         if self._turns:
             return last // self._counts != count // self._counts
         return (last < 0) != (count < 0)
@@ -194,15 +195,14 @@ class Encoder:
     Parameters
     ----------
     counters
-        The place of each joint that has one, and its counter.
+        Index and counter of each joint with an encoder.
     differenced
-        Whether the rates are made of the counts.
+        Whether the rates are computed from the counts.
 
     Attributes
     ----------
     read_at_ticks
-        Whether the driver reads the counts at every tick; else at those at which somebody calls
-        `differenced`.
+        Whether the driver reads the counts at every tick; else only when `differenced` is called.
 
     """
 
@@ -215,7 +215,7 @@ class Encoder:
         self.read_at_ticks = True
 
     def __call__(self, now: int, reading: SensorReading) -> SensorReading:
-        """Return what is read."""
+        """Return the reading of the encoders."""
         values = list(reading.joints)
         for place, counter in self._counters:
             values[place] = counter.count(values[place])
@@ -223,7 +223,7 @@ class Encoder:
         return self.differenced(now, found) if self.read_at_ticks else found
 
     def differenced(self, now: int, reading: SensorReading) -> SensorReading:
-        """Return a reading with the rates that the driver makes of it, at a time in [ns]."""
+        """Return a reading with the rates that the driver computes, at a time in [ns]."""
         if not self._differenced:
             return reading
         elapsed = now - self._last

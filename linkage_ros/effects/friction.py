@@ -14,17 +14,17 @@
 
 
 """
-Friction: what pins and sliders resist their motion with.
+Friction: resistance of pins and sliders to their motion.
 
-It has no part of the tick of its own: whatever works with forces takes it into account, the
-efforts, the forces in the pins, how the mechanism yields, and the torque drive. Of a pin::
+It is no stage of the tick: all that works with forces includes it, namely efforts, pin forces,
+clearance and compliance, and the torque drive. In a pin::
 
     T = −viscous·ω − coulomb·sign(ω)          ω: rate of one of its links against the other
 
-and of a slider likewise, with its slide's rate. The Coulomb part does not depend on the force that
-the joint carries (for this and better models: H. Olsson, K. J. Åström, C. Canudas de Wit, M.
-Gäfvert and P. Lischinsky, Friction models and friction compensation, European Journal of Control
-4, 1998). At rest it is 0 in an effort; under the torque drive it sticks.
+and in a slider likewise, with the rate of its slide. The Coulomb part does not depend on the force
+in the joint (for this and better models: H. Olsson, K. J. Åström, C. Canudas de Wit, M. Gäfvert
+and P. Lischinsky, Friction models and friction compensation, European Journal of Control 4, 1998).
+At rest it is 0 in an effort; under the torque drive it sticks.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class FrictionParameters:
 
     @property
     def friction(self) -> Friction:
-        """Return the friction as the mechanics take it."""
+        """Return the friction in the form that `Mechanics` takes."""
         return Friction(
             {
                 name: JointFriction(joint.viscous, joint.coulomb)

@@ -14,24 +14,25 @@
 
 
 """
-What a sensor has read lately: the memory of a delay line, and of a sensor that looks late.
+History of a sensor's readings, for delay and jitter.
 
-Between two readings a value x with the rate v is the cubic that has both ends' values and rates
+Between two readings, a value x with the rate v is the cubic with the values and rates of both ends
 (Hermite's; C. de Boor, A Practical Guide to Splines, 1978, ch. IV). With s from 0 to 1 over the
 interval h, and Δ = x₁ − x₀::
 
     x(s) = x₀ + s·Δ + s·(1 − s)·((1 − s)·(h·v₀ − Δ) − s·(h·v₁ − Δ))
 
-Its error is at most h⁴/384 times the largest fourth derivative. Where a reading has no rates it is
-the straight line x₀ + s·Δ, with an error of h²/8 times the largest second derivative. So are the
-rates, accelerations and efforts themselves; those that one of the two does not have are left out.
+Its error is at most h⁴/384 times the largest fourth derivative. Without rates it is the straight
+line x₀ + s·Δ, with an error of h²/8 times the largest second derivative. Rates, accelerations and
+efforts are interpolated linearly too; those that one of the two readings lacks are left out.
 
-At a tick next to a toggle a rate may be any number, and the cubic would leave the mechanism. For
-a motion that the readings resolve, c = h·v₀ + h·v₁ − 2Δ, which is h³/6 times the third derivative,
-is small beside the change of the rates or the way itself. Where 2·|c| > |h·v₁ − h·v₀| + |Δ| the
-rates do not fit the values, and the line is taken.
+At a tick next to a toggle a rate may be any number, and the cubic would leave the motion of the
+mechanism. If the readings resolve the motion, c = h·v₀ + h·v₁ − 2Δ, which is h³/6 times the third
+derivative, is small against the change of the rates or the displacement. Where
+2·|c| > |h·v₁ − h·v₀| + |Δ| the rates do not fit the values, and the straight line is used.
 
-Where the linkage has no pose there is a gap: nothing is read, and nothing is mixed across it.
+Where the linkage has no pose there is a gap: nothing is read, and nothing is interpolated across
+it.
 """
 
 from __future__ import annotations
@@ -46,17 +47,17 @@ _Values = tuple[float, ...]
 
 class History:
     """
-    Readings and gaps, as many as reach back over a span; older ones are forgotten.
+    Readings and gaps of a time span; older ones are deleted.
 
-    A gap stands at the first time at which there was no reading, and lasts until the next one.
+    A gap begins at the first time without a reading, and lasts until the next reading.
 
     Parameters
     ----------
     span
-        How far back it has to reach, in [ns].
+        Length of the span, in [ns].
     with_rates
-        Whether rates are those at which the values change. A crank that is held between its
-        samples has a rate, and stands.
+        Whether the values change at the given rates. A crank that is held between its samples has
+        a rate but stands still.
 
     """
 
@@ -73,17 +74,17 @@ class History:
 
     @property
     def begin(self) -> int:
-        """Earliest time that is remembered, in [ns]."""
+        """Earliest time in memory, in [ns]."""
         return self._times[0]
 
     def add(self, now: int, reading: SensorReading) -> None:
         """
-        Remember a reading.
+        Add a reading.
 
         Parameters
         ----------
         now
-            The time of its tick, in [ns]; none is before the last. Of readings at one time the
+            Time of its tick, in [ns]; never before the last one. Of readings at the same time the
             last one counts.
         reading
             The reading.
@@ -97,12 +98,12 @@ class History:
 
     def add_gap(self, now: int) -> bool:
         """
-        Remember that nothing is read at a time, in [ns].
+        Add a gap at a time, in [ns].
 
         Returns
         -------
         begins
-            Whether a gap begins there: not where one lasts, nor where nothing was read before.
+            Whether a new gap begins: not within a gap, nor before the first reading.
 
         """
         if not self._times or self._readings[-1] is None:
@@ -113,7 +114,7 @@ class History:
     def _append(self, now: int, reading: SensorReading | None) -> None:
         times, readings = self._times, self._readings
         if times:
-            # By the last time: what came due since then is still asked for.
+            # Counted back from the last time: readings that have come due since are still needed.
             oldest = times[-1] - self._span
             while len(times) > 1 and times[1] <= oldest:
                 times.popleft()
@@ -130,7 +131,7 @@ class History:
         time
             The time.
         since
-            When it was asked for before: of a gap only what came after that.
+            Time of the last request: in a gap only a later reading is returned.
 
         """
         at = bisect_right(self._times, time)
@@ -140,10 +141,11 @@ class History:
 
     def between(self, time: int) -> SensorReading | None:
         """
-        Return what was read at a time, in [ns], and bears it as its stamp.
+        Return the interpolated reading at a time, in [ns], which becomes its stamp.
 
-        Where nothing was read since, there is nothing to mix with: then it is the newest reading,
-        with its own stamp. Before the first there is nothing, and nothing in a gap.
+        After the newest reading there is no second one to interpolate with: the result is the
+        newest reading, with its own stamp. Before the first reading, and in a gap, the result is
+        None.
         """
         at = bisect_right(self._times, time)
         if not at:
@@ -157,11 +159,11 @@ class History:
         return _mixed(time, begin, before, self._times[at], after, self._with_rates)
 
     def arriving(self, time: int, since: int) -> SensorReading | None:
-        """Return as `between` does, and the last reading before a gap as it is, once."""
+        """Return as `between`, and also the last reading before a gap, unchanged and once."""
         return self.between(time) or self._before_gap(time, since)
 
     def _before_gap(self, time: int, since: int) -> SensorReading | None:
-        """Return the reading that was the newest at a time, if it came after another time."""
+        """Return the newest reading at a time, if it came after another time."""
         at = bisect_right(self._times, time)
         while at and self._times[at - 1] > since:
             at -= 1
@@ -170,7 +172,7 @@ class History:
         return None
 
     def after(self, time: int) -> list[tuple[int, SensorReading]]:
-        """Return the readings since a time, in [ns], each with its own."""
+        """Return the readings after a time, in [ns], each with its time."""
         pairs = zip(self._times, self._readings, strict=True)
         return [(at, reading) for at, reading in pairs if at > time and reading is not None]
 
@@ -178,7 +180,7 @@ class History:
 def _mixed(
     time: int, begin: int, before: SensorReading, end: int, after: SensorReading, with_rates: bool
 ) -> SensorReading:
-    """Return the reading at a time between two, all times in [ns]."""
+    """Return the reading at a time between two readings, all times in [ns]."""
     s = (time - begin) / (end - begin)
     _, x0, v0, a0, e0 = before
     _, x1, v1, a1, e1 = after
@@ -193,7 +195,7 @@ def _mixed(
 
 
 def _cubic(s: float, x0: float, x1: float, way0: float, way1: float) -> float:
-    """Return the value at s; the ways are what the rates at both ends make in the interval."""
+    """Return the value at s; `way0` and `way1` are the rates at the ends times the interval."""
     step = x1 - x0
     more0, more1 = way0 - step, way1 - step
     line = x0 + s * step

@@ -14,21 +14,21 @@
 
 
 """
-Jitter: the instant at which the sensor looks wanders; its stamp does not know.
+Jitter: the instant of measurement varies, but the stamp does not show it.
 
-At the tick t the sensor has looked δ earlier, and all joints at one instant::
+At the tick t the sensor has measured all joints at one instant, δ earlier::
 
     y(t) = x(t − δ)        0 ≤ δ ≤ J, drawn anew for each tick
 
-``uniform``: δ = J·u with u uniform in [0, 1), as of a sensor that runs freely. ``half_normal``:
-δ = min(|n|, J) with n normal and of the standard deviation J/3, as of one that is held up now and
-then (B. Wittenmark, J. Nilsson and M. Törngren, Timing problems in real-time control systems, ACC
-1995); 0.3 % of the draws lie beyond J. A mechanism at the rate v is misread by up to v·J.
+``uniform``: δ = J·u with u uniform in [0, 1), as in a free-running sensor. ``half_normal``:
+δ = min(|n|, J) with n normal with standard deviation J/3, as in a sensor that is delayed at times
+(B. Wittenmark, J. Nilsson and M. Törngren, Timing problems in real-time control systems, ACC
+1995); 0.3 % of the draws lie beyond J. At the rate v the error of a reading is up to v·J.
 
-Between two ticks x is interpolated, as `history` has it. A sensor cannot look before the first
-tick: an instant before it is the first tick's. Where J is more than a period, an instant may lie
-before that of the tick before. The message keeps the stamp of its tick. Where the linkage has no
-pose, or had none at the instant, nothing is read.
+Between two ticks x is interpolated as in `history`. An instant before the first tick is replaced
+by the first tick's. If J is longer than a period, an instant may come before that of the previous
+tick. The message keeps the stamp of its tick. Where the linkage has no pose, or had none at the
+instant, nothing is read.
 
 All instants are whole nanoseconds.
 """
@@ -64,21 +64,21 @@ def sensor(parameters: JitterParameters, context: Context) -> Jitter:
 
 class Jitter:
     """
-    A sensor whose instants wander.
+    Sensor stage with varying instants of measurement.
 
     Parameters
     ----------
     use
-        What it does.
+        Parameters of the effect.
     random
-        What draws how much earlier it looks.
+        Random generator of δ.
     with_rates
-        Whether readings are mixed by their rates, too.
+        Whether the interpolation uses the rates too.
 
     Attributes
     ----------
     gap_begins
-        Whether the last gap that it was told of began there.
+        Whether the last reported gap began there.
 
     """
 
@@ -102,12 +102,12 @@ class Jitter:
         self._earlier = earlier
 
     def __call__(self, now: int, reading: SensorReading) -> SensorReading | None:
-        """Return what is read at a time, in [ns]."""
+        """Return the reading at a time, in [ns]."""
         history = self._history
         history.add(now, reading)
         found = history.between(max(now - self._earlier(), history.begin))
         return None if found is None else restamped(found, reading.stamp)
 
     def gap(self, now: int) -> None:
-        """Take note that the linkage has no pose at a time, in [ns]; nothing is read."""
+        """Record that the linkage has no pose at a time, in [ns]; nothing is read."""
         self.gap_begins = self._history.add_gap(now)

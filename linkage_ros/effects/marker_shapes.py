@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-What the markers of a linkage look like: the shapes of `linkage_ros.drawing`, packed once.
+Shapes of a linkage's markers, from the shapes of `linkage_ros.drawing`, packed once.
 
-A link's shape stands in a frame of its own, at one of its points and turned as the link is, so
-that of a message only places and angles are new. What lies on top in the drawing lies higher, by
-less than a bar is wide. The ground and the curves of traced points do not move.
+The shape of a link has its own frame, at a point of the link and turned with it, so only positions
+and angles change from message to message. Shapes that lie on top in the drawing get a greater z,
+by less than the width of a bar. The ground and the curves of traced points do not move.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ from linkage_ros.messages.marker_array import (
 )
 
 ARROW_POINTS = 16
-"""Of an effort's arrow, with its head."""
+"""Number of points of an effort's arrow, with its head."""
 
 
 class Key(NamedTuple):
-    """A point of a link."""
+    """A point of a link, as a key."""
 
     link: str
     point: str
@@ -66,13 +66,13 @@ class Body(NamedTuple):
     Attributes
     ----------
     number
-        Of the marker.
+        Index of the marker.
     at
-        Where its frame is.
+        Origin of its frame.
     colour
-        Far from a toggle.
+        Colour when not near a toggle.
     filled
-        Whether it is an area and no line.
+        Whether it is a filled area; else a line.
 
     """
 
@@ -89,25 +89,25 @@ class MarkerShapes(NamedTuple):
     Attributes
     ----------
     moving
-        Those that change from message to message.
+        Markers that change from message to message.
     still
         The ground, and the curves of traced points.
     bodies
-        Which of the moving ones lie on a link.
+        Moving markers that belong to a link.
     pins
-        Which of them are pins: each has a sphere for every one of `pin_places`.
+        Moving markers for pins: each has a sphere for every place in `pin_places`.
     pin_places
-        Where the pins are.
+        Positions of the pins.
     trails, trail_places
-        Which of them are the ways of traced points so far, and where those points are.
+        Moving markers for the trails of traced points, and the positions of these points.
     forces, efforts
-        Which of them are arrows.
+        Moving markers that are arrows.
     status
-        The number of the text.
+        Index of the text marker.
     size
         Half the width of a bar, in [m].
     extent
-        The diagonal of all that the linkage reaches, in [m].
+        Diagonal of the linkage's whole workspace, in [m].
 
     """
 
@@ -126,16 +126,16 @@ class MarkerShapes(NamedTuple):
 
 
 def rgba(code: str) -> Colour:
-    """Return a colour, #rrggbb or #rrggbbaa."""
+    """Return the colour for #rrggbb or #rrggbbaa."""
     red, green, blue, *alpha = (value / 255.0 for value in bytes.fromhex(code[1:]))
     return red, green, blue, alpha[0] if alpha else 1.0
 
 
 ALARM = rgba('#e0241b')
-"""Of what is near a toggle."""
+"""Colour near a toggle."""
 
 _HATCHED = rgba('#7f93a6')
-"""Of the ground's lines: to be seen on white as on black."""
+"""Colour of the ground's lines: visible on white and on black."""
 
 _EDGE, _SLOT, _FORCE, _EFFORT = map(rgba, (INK, '#ffffff', '#CC79A7', '#009E73'))
 _NOWHERE: list[Place] = [(0.0, 0.0, 0.0)]
@@ -150,20 +150,20 @@ def marker_shapes(
     lifetimes: tuple[int, int],
 ) -> MarkerShapes:
     """
-    Draw a linkage's markers.
+    Build the markers of a linkage.
 
     Parameters
     ----------
     closure
         The linkage.
     width
-        Of a bar, as a share of all that the linkage reaches; 0 for what suits it.
+        Width of a bar, as a share of the workspace; 0 for a suitable one.
     trail
-        Of how many places the trail of a traced point is made; 0 for its whole curve instead.
+        Number of points in a traced point's trail; 0 for its whole curve instead.
     forces, efforts
-        How many arrows there are of each.
+        Numbers of arrows.
     lifetimes
-        Of what moves and of what does not, in [ns].
+        Lifetimes of moving and of still markers, in [ns].
 
     """
     shown = view(closure, usual_inputs(closure))
@@ -219,7 +219,7 @@ def marker_shapes(
 
 
 class _Pile:
-    """Markers that lie above each other, and how high the next one lies, in [m]."""
+    """Stack of markers, with the height of the next one, in [m]."""
 
     def __init__(self, size: float, lifetime: int) -> None:
         self.size = size
@@ -228,7 +228,7 @@ class _Pile:
         self.markers: list[Marker] = []
 
     def add(self, marker: Marker) -> int:
-        """Add a marker; return its number."""
+        """Add a marker; return its index."""
         self.markers.append(marker._replace(lifetime=self._lifetime))
         return len(self.markers) - 1
 
@@ -236,7 +236,7 @@ class _Pile:
 def _bodies(
     pile: _Pile, closure: Closure, position: Position, drawn: Sequence[tuple[str, Shape]]
 ) -> tuple[Body, ...]:
-    """Return the markers of all that moves with a link, each in the frame of its link."""
+    """Return the markers that move with a link, each in the frame of its link."""
     points, angles = closure.points(position), closure.link_angles(position)
     anchors = {link: Key(link, next(iter(p))) for link, p in closure.structure.links.items()}
     ids: Counter[str] = Counter()
@@ -268,7 +268,7 @@ def _bodies(
 
 
 def _pins(pile: _Pile, count: int) -> tuple[int, int]:
-    """Return the numbers of two spheres for each pin: the smaller stands out above the larger."""
+    """Return the indices of two spheres per pin: the smaller one stands out above the larger."""
     wide, narrow = 1.1 * pile.size, 0.68 * pile.size
     places = _NOWHERE * count
     rim = pile.add(Marker('pins', 0, SPHERE_LIST, (wide,) * 3, _EDGE, places, z=pile.z))
@@ -278,7 +278,7 @@ def _pins(pile: _Pile, count: int) -> tuple[int, int]:
 
 
 def _still(drawn: Sequence[Shape], size: float, lifetime: int) -> list[Marker]:
-    """Return the ground as markers: what is filled, and lines."""
+    """Return the markers of the ground: areas and lines."""
     filled = [shape for shape in drawn if isinstance(shape, Polygon)]
     area = [p for shape in filled for p in _triangles([_flat(q) for q in shape.corners])]
     lines = [_flat(q) for shape in drawn for ends in pairwise(outline(shape)) for q in ends]
@@ -291,7 +291,7 @@ def _still(drawn: Sequence[Shape], size: float, lifetime: int) -> list[Marker]:
 
 
 def _traced(closure: Closure) -> dict[str, Key]:
-    """Return of each traced point where it is found."""
+    """Return the key of each traced point."""
     links = closure.linkage.links
     return {
         point: Key(next(link for link, named in links.items() if point in named), point)
@@ -311,39 +311,37 @@ def _flat(place: complex) -> Place:
     return place.real, place.imag, 0.0
 
 
-# Arrows for forces and efforts among the markers.
-#
-# They begin where the force acts. Where no scale is given, their lengths are::
-#
-#     L = D/8 · ln(1 + F/W)
-#
-# with D the diagonal of all that the linkage reaches, and W = 9.81 m/s² · Σm the weight of what
-# moves: no force is too small or too large to be seen, and none depends on what came before. The
-# effort of a drive that turns is an arc about its pin, at a radius of eight half bars, as long as
-# the arrow of the force that it makes there.
-
 _GRAVITY = 9.81
 _SHORTEST = 0.25
-"""Of the half bar: no arrow is shorter."""
+"""Least length of an arrow, in half bars."""
 
 _WIDEST = 1.7 * pi
-"""An arc that goes farther round would meet itself."""
+"""Greatest angle of an arc, in [rad]; a longer one would meet itself."""
 
 Points = Mapping[tuple[str, str], complex]
 
 
 class Arrows:
     """
-    Forces and efforts as arrows, each as its places; none where it is too short to be seen.
+    Arrows for forces and efforts, each as its points; none where it is too short to be seen.
+
+    They begin where the force acts. Without a given scale, their lengths are::
+
+        L = D/8 · ln(1 + F/W)
+
+    with D the diagonal of the workspace, and W = 9.81 m/s² · Σm the weight of the moving links: so
+    no force is too small or too large to be seen, and an arrow does not depend on earlier ones.
+    The effort of a rotating drive is an arc about its pin, at a radius of eight half bars, as long
+    as the arrow of its force at that radius.
 
     Parameters
     ----------
     scale
-        Length for a force, in [m/N]; 0 for the logarithm.
+        Length per force, in [m/N]; 0 for the logarithm.
     closure, shapes
-        The linkage, and how large it is drawn.
+        The linkage, and its drawn size.
     joints
-        Where the forces act.
+        Joints at which the forces act.
 
     """
 
@@ -367,7 +365,7 @@ class Arrows:
     def forces(
         self, points: Points, reactions: Sequence[tuple[float, float, float]]
     ) -> list[list[complex]]:
-        """Return for each joint its arrow."""
+        """Return the arrow of each joint."""
         if not reactions:
             return [[] for _ in self._joints]
         drawn = []
@@ -386,7 +384,7 @@ class Arrows:
         angles: Mapping[str, float],
         efforts: Sequence[float],
     ) -> list[list[complex]]:
-        """Return for each input the arrow of its effort: an arc about the pin, or straight."""
+        """Return the effort arrow of each input: an arc about the pin, or a straight arrow."""
         if not efforts:
             return [[] for _ in inputs]
         return [
@@ -422,7 +420,7 @@ class Arrows:
         return self._headed(arc, way, length)
 
     def _headed(self, line: list[complex], way: complex, length: float) -> list[complex]:
-        """Return a line with a head, of as many places as every arrow."""
+        """Return a line with a head; all arrows have the same number of points."""
         if length < self._shortest:
             return []
         end, back = line[-1], min(self._head, length) * way

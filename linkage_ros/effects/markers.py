@@ -14,23 +14,23 @@
 
 
 """
-Markers: the linkage as RViz and Foxglove draw it, on a topic of its own, at a rate of its own.
+Markers: the linkage for RViz and Foxglove, on a separate topic, at its own rate.
 
-They show the mechanism as the tick has solved it, not what a sensor makes of it. With the time t
-of the tick and the rate f of the markers, the message comes with the first tick of which::
+They show the solved mechanism, without the effects of sensors. With the time t of the tick and the
+rate f of the markers, a message is published at the first tick at which::
 
     ⌊t·f⌋ ≠ ⌊t′·f⌋
 
-t′ being the time of the last message: nothing but the ticks' times decides, so that a replay gives
-the same messages. What does not move comes with the first of each second. A marker goes by itself
-after its lifetime, so that what is silent is not seen standing.
+t′ is the time of the last message. Only the times of the ticks decide, so that a replay gives the
+same messages. Still markers come with the first message of each second. A marker disappears after
+its lifetime, so that a silent linkage does not look like one that stands still.
 
 Forces are arrows; see `linkage_ros.effects.marker_shapes`.
 
-Links are red while the conditioning of the group that they belong to (see
-`linkage_ros.kinematics.singularity_margin`) is below √2·sin(μ/2), μ being the threshold: of a
-dyad, while its transmission angle is smaller than μ. Where a loop does not close there is no pose,
-and none is invented: what moves is deleted, and a text says by how much it does not close.
+Links are red while the conditioning of their group (see
+`linkage_ros.kinematics.singularity_margin`) is below √2·sin(μ/2), with the threshold μ: for a
+dyad, while its transmission angle is smaller than μ. Where a loop does not close there is no pose:
+moving markers are deleted, and a text shows the closure error.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ PARAMETERS = MarkersParameters
 
 
 def writer(parameters: MarkersParameters, context: Context) -> Writer:
-    """Build what writes the message."""
+    """Build the writer of the message."""
     return Markers(parameters, context)
 
 
@@ -103,9 +103,9 @@ class Markers:
     Parameters
     ----------
     use
-        How they look.
+        Parameters of the effect.
     context
-        What they show.
+        Context with the linkage to show.
 
     """
 
@@ -139,11 +139,11 @@ class Markers:
         self._trails: list[deque[complex]] = [deque(maxlen=trail) for _ in shapes.trails]
         self._near = sqrt(2.0) * sin(0.5 * use.near_toggle)
         self._groups = tuple(frozenset(_links(group)) for group in closure.structure.groups)
-        # What is searched for once is searched for here, and not in a tick.
+        # Search once here, not in a tick.
         closure.singularity_margin(closure.position(*usual_inputs(closure)))
 
     def __call__(self, now: int, motion: MechanismState, _reading: SensorReading) -> bytes:
-        """Return a message, b'' between two of them."""
+        """Return a message; b'' between two messages."""
         if not self.due(now):
             return b''
         self._slot = now * self._unit // self._per
@@ -164,7 +164,7 @@ class Markers:
         ):
             place = points[at]
             trail.append(place)
-            # A line has as many places from the start on.
+            # A line has its full number of points from the start.
             write.draw(marker, [*trail, *(place,) * (trail.maxlen or 0)][: trail.maxlen])
         for marker, drawn in zip(
             shapes.forces, self._arrows.forces(points, motion.reactions), strict=True
@@ -184,7 +184,7 @@ class Markers:
         return now * self._unit // self._per != self._slot
 
     def no_pose(self, now: int, position: Position) -> bytes:
-        """Return a message that there is no pose, b'' between two of them."""
+        """Return a message without a pose; b'' between two messages."""
         if not self.due(now):
             return b''
         self._slot = now * self._unit // self._per
@@ -207,12 +207,12 @@ class Markers:
         return MarkerArrayWriter(self._frame, markers).message(now)
 
     def _still_due(self, now: int) -> bool:
-        """Return whether what does not move is due."""
+        """Return whether the still markers are due."""
         before, self._second = self._second, now // NANOSECONDS
         return before != self._second
 
     def _red(self, position: Position) -> frozenset[str]:
-        """Return the links that are near a toggle."""
+        """Return the links near a toggle."""
         nearness = self._closure.singularity_margin(position)
         near = nearness.conditioning < self._near and nearness.group >= 0
         return self._groups[nearness.group] if near else frozenset()
@@ -225,10 +225,10 @@ def _show(write: MarkerArrayWriter, marker: int, drawn: list[complex]) -> None:
 
 def _lifetimes(use: MarkersParameters, context: Context) -> tuple[int, int]:
     """
-    Return how long what moves stays, and what does not, in [ns].
+    Return the lifetimes of moving and of still markers, in [ns].
 
-    For three messages, but a second at least; and for ever where ticks come with samples alone,
-    since nobody knows when the next one does.
+    Three periods of the message, but at least a second; without limit if ticks come with samples
+    only, since their period is unknown.
     """
     if not context.rate:
         return 0, 0

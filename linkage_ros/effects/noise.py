@@ -14,9 +14,9 @@
 
 
 """
-Noise: what is read of a joint scatters from tick to tick, and wanders.
+Noise: the reading of a joint scatters from tick to tick, and drifts.
 
-With n normal, of mean 0 and standard deviation 1, drawn anew for each use::
+With n normal, of mean 0 and standard deviation 1, drawn anew at each occurrence::
 
     y = x + σ·n + w        w(t + Δt) = w(t) + K·√Δt·n,  w = 0 at the first tick
     ẏ = ẋ + σᵥ·n
@@ -24,13 +24,13 @@ With n normal, of mean 0 and standard deviation 1, drawn anew for each use::
 σ, ``white``, is the standard deviation of one reading. IEEE Std 952 (annex C) and data sheets name
 the density N instead; at a rate of f readings a second σ = N·√f, and the Allan variance of y is
 N²/τ. K, ``walk``, is the density of a random walk: after the time t the standard deviation of w is
-K·√t, whatever the ticks between, and its Allan variance is K²·τ/3. Where no time passes w stays.
+K·√t, whatever the ticks between, and its Allan variance is K²·τ/3. If no time passes, w stays.
 
-σᵥ, ``rate_white``, is for sensors that measure rates; the noise of y is not in them, nor in the
-accelerations and efforts.
+σᵥ, ``rate_white``, is for sensors that measure rates: the rates do not contain the noise of y, nor
+do accelerations and efforts.
 
-Each joint and each kind of noise has a generator of its own, and each draws once in every tick,
-whether there are rates or not: what is added to one joint does not change that of another.
+Each joint and each kind of noise has its own generator, which draws once in every tick, with or
+without rates: the noise of one joint does not change that of another.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from linkage_ros.effects.stage import Sensor, SensorReading
 from linkage_ros.files.parameters import each, number
 
 _Source = tuple[int, float, Callable[[float, float], float]]
-"""Place of the joint, how strong its noise is, and what draws it: normal(mean, deviation)."""
+"""Index of the joint, size of its noise, and its generator: normal(mean, deviation)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,12 +88,12 @@ def sensor(parameters: NoiseParameters, context: Context) -> Sensor:
 
 class Noise:
     """
-    The noise of all joints; it remembers how far each has wandered.
+    Noise of all joints, with the state of each random walk.
 
     Parameters
     ----------
     white, walk, rate_white
-        Its sources, by kind.
+        Noise sources, by kind.
 
     """
 

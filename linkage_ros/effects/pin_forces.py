@@ -14,15 +14,15 @@
 
 
 """
-Pin forces: what the links of a linkage exert on each other in their pins and sliders.
+Pin forces: forces between the links of a linkage in their pins and sliders.
 
 They are those of the rigid linkage, by Newton's and Euler's equations of every link; see
-`linkage_ros.dynamics.reactions`. All of an instant come in one message, which is why they are
-``sensor_msgs/MultiDOFJointState`` and not a ``geometry_msgs/WrenchStamped`` for each pin: that
-would be a topic for each, to be matched by stamp, and each with a frame that nobody broadcasts.
-``wrench`` holds for each of ``joint_names`` the force (x, y) and the moment about z, in the frame
-of the ground; ``transforms`` and ``twist`` are empty. Where no forces exist, at a toggle, there is
-no message.
+`linkage_ros.dynamics.reactions`. One message holds all forces of an instant, hence the type
+``sensor_msgs/MultiDOFJointState`` and not a ``geometry_msgs/WrenchStamped`` per pin: these would
+be separate topics, to be matched by stamp, each with a frame that no node broadcasts. ``wrench``
+holds for each of ``joint_names`` the force (x, y) and the moment about z, in the frame of the
+ground; ``transforms`` and ``twist`` are empty. At a toggle no forces exist, and there is no
+message.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def stage(_parameters: PinForcesParameters, context: Context) -> Stage:
 
 
 def writer(_parameters: PinForcesParameters, context: Context) -> Writer:
-    """Build what writes the message; nothing where there are no forces."""
+    """Build the writer of the message; b'' where there are no forces."""
     from linkage_ros.messages import multi_dof_joint_state  # local import: if published
 
     write = multi_dof_joint_state.PlanarWrenchWriter(

@@ -14,22 +14,23 @@
 
 
 """
-Rate limit: the sensor is slower than the ticks, and samples at a rate of its own.
+Rate limit: the sensor is slower than the ticks, and samples at its own rate.
 
 Counted from the first tick t₀, its k-th sample is due at::
 
     t_k = t₀ + ⌊k·10⁹/f + ½⌋ ns
 
-in whole numbers, f being the very fraction that the double is: nothing drifts, in however long. A
-sample is what is read at the first tick at or after t_k: it is not interpolated to t_k, so that
-the counts of an encoder stay whole. It is held until the next one (a zero-order hold; K. J. Åström
-and B. Wittenmark, Computer-Controlled Systems, 3rd ed., 1997).
+in integers, where f is the exact fraction of the double: nothing drifts, however long it runs. A
+sample is the reading at the first tick at or after t_k. It is not interpolated to t_k, so that the
+counts of an encoder stay whole. It is held until the next one (a zero-order hold; K. J. Åström and
+B. Wittenmark, Computer-Controlled Systems, 3rd ed., 1997).
 
-With an `encoder` before it, the driver reads the counts with each sample: differenced rates are
-over the time between two samples.
+After an `encoder`, the driver reads the counts with each sample: differenced rates cover the time
+between two samples.
 
-``hold: repeat`` publishes at every tick what is held, rates, accelerations and efforts too, with
-the stamp of the tick, as a driver does that polls its sensor. ``silent`` publishes a sample once.
+``hold: repeat`` publishes the held sample at every tick, with rates, accelerations and efforts,
+and with the stamp of the tick, as a driver that polls its sensor. ``silent`` publishes a sample
+once.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ class RateLimit:
     Parameters
     ----------
     use
-        What it does.
+        Parameters of the effect.
 
     """
 
@@ -88,12 +89,12 @@ class RateLimit:
         self._encoder: Encoder | None = None
 
     def read_by(self, encoder: Encoder) -> None:
-        """Let an encoder before it be read with each sample, and not at every tick."""
+        """Make an encoder before it be read with each sample, not at every tick."""
         self._encoder = encoder
         encoder.read_at_ticks = False
 
     def __call__(self, now: int, reading: SensorReading) -> SensorReading | None:
-        """Return what is held; None where that is not repeated."""
+        """Return the held sample; None if it is not repeated."""
         held = self._held
         if held is None:
             self._begin = now

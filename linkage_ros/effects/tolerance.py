@@ -14,16 +14,16 @@
 
 
 """
-Tolerance: the linkage as it was made, whose points do not lie where the drawing has them.
+Tolerance: the linkage as manufactured, with points that deviate from the drawing.
 
-Each link is a part of its own, with holes of its own: of a pin's two holes, one in each link, each
-deviates by itself, in both coordinates, and so do the pivots of the ground. What matters of a link
-with two pins is its length, which deviates by √2 of the deviation of a coordinate.
+Each link is a separate part with its own holes: the two holes of a pin, one in each link, deviate
+independently, in both coordinates, and so do the pivots of the ground. For a link with two pins
+only the length matters, which deviates by √2 of the deviation of a coordinate.
 
-A deviation is normal, and what lies beyond three standard deviations is not delivered: it is drawn
-again. The standard deviation is that of what is delivered, so that ±t on a drawing, which no part
-exceeds, is a standard deviation of t/3. What is cut off takes from a standard deviation; so the
-normal distribution that is cut is wider than the one that is left by a factor w, with c = 3/w::
+A deviation is normal; one beyond three standard deviations is rejected and drawn again. The
+parameter is the standard deviation of the accepted parts, so a limit of ±t on a drawing, which no
+part exceeds, means a standard deviation of t/3. Truncation reduces the standard deviation, so that
+of the normal distribution before truncation is larger by a factor w, with c = 3/w::
 
     w²·(1 − 2·c·φ(c)/(2·Φ(c) − 1)) = 1        w = 1.01539
 
@@ -32,9 +32,9 @@ normal distribution that is cut is wider than the one that is left by a factor w
 Guide to the expression of uncertainty in measurement, 4.3.
 
 All coordinates are drawn, link by link and point by point in the order of the linkage file, x
-before y, and then scaled. So neither the deviation nor the choice of links changes what the others
-draw, and twice the deviation is the same mechanism, twice as badly made. The direction of a slider
-does not deviate.
+before y, and then scaled. So neither the deviation nor the choice of links changes the draws of
+the others, and a doubled deviation gives the same mechanism with doubled errors. The direction of
+a slider does not deviate.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ TRUNCATED = 3.0
 """A deviation is at most this many standard deviations."""
 
 BEFORE = 1.0153869850528114
-"""w: standard deviation before cutting off, where that of what is left is 1."""
+"""w: standard deviation before truncation that gives 1 after it."""
 
 _KEY = 'effects.tolerance'
 _FARTHEST = 1e9
@@ -83,12 +83,12 @@ PARAMETERS = ToleranceParameters
 
 def alter(parameters: ToleranceParameters, linkage: Linkage, random: Random) -> Linkage:
     """
-    Return the linkage as it was made.
+    Return the linkage as manufactured.
 
     Raises
     ------
     DefinitionError
-        Where it does not close.
+        It does not close.
 
     """
     deviating = parameters.links or tuple(linkage.links)
@@ -107,7 +107,7 @@ def alter(parameters: ToleranceParameters, linkage: Linkage, random: Random) -> 
 
 
 def _normal(random: Random) -> float:
-    """Draw a deviation of standard deviation 1 from the normal distribution that is cut off."""
+    """Draw a deviation from the truncated normal distribution of standard deviation 1."""
     while True:
         value = random.gauss(0.0, BEFORE)
         if abs(value) <= TRUNCATED:

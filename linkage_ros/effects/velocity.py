@@ -16,7 +16,7 @@
 """
 Velocity: the rates of the published joints, from the loop's velocity equation.
 
-At a toggle the position is valid and no rate exists: the rates stay empty.
+At a toggle the position is valid but no rates exist: they stay empty.
 """
 
 from __future__ import annotations

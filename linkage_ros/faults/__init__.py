@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What can be made to go wrong on demand, one fault a file."""
+"""Faults that can be injected, one per file."""

@@ -14,10 +14,10 @@
 
 
 """
-Broken link: the loop that it belongs to has no pose any more, so nothing is published.
+Broken link: the loop with the link has no pose any more, so nothing is published.
 
-A mechanism with a link in two has one freedom more than it has inputs: where it goes, the crank
-does not say, and a pose would be invented.
+A mechanism with a broken link has one degree of freedom more than inputs: the crank does not
+determine its pose.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ PARAMETERS = BrokenLinkParameters
 def mechanism(
     parameters: BrokenLinkParameters, switch: Switch, context: Context
 ) -> Callable[[Position], Position] | None:
-    """Build what takes the pose away, where the link is one of this linkage."""
+    """Build a function that removes the pose; None if the link is not in this linkage."""
     if parameters.link not in [context.prefix + link for link in context.closure.linkage.links]:
         return None
 

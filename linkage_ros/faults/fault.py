@@ -14,25 +14,25 @@
 
 
 """
-The faults: what can be made to go wrong while a scene runs, at set times or on demand.
+Interface of the faults, which a scene can inject at set times or on demand.
 
-Each is a module, imported only where a scene names the fault, with
+Each fault is a module, imported only if a scene names the fault, with
 
 ``PARAMETERS``
     The type of its parameters (see `linkage_ros.files.parameters`).
 
-and with one function that builds what it does while its `Switch` is on; which, says where:
+and with one function, whose name gives the place and which builds the fault from its `Switch`:
 
 ``clock(parameters, switch) -> Callable[[int], int]``
-    The time by which the tick goes, of the true one, in [ns].
+    Map the true time to the time of the tick, in [ns].
 ``message(parameters, switch) -> Callable[[bytes], bytes]``
-    The crank message that is read, of the one that came.
+    Change a crank message before it is read.
 ``mechanism(parameters, switch, context) -> Callable[[Position], Position] | None``
-    The linkage, once its loops are closed.
+    Change the position after the loops are closed.
 ``sensor(parameters, switch, joints) -> Callable[[int, Reading], Reading | None] | None``
-    What is read, behind all effects; as there.
+    Change the reading after all effects, at a time in [ns].
 
-Of several linkages each asks them all; to one that a fault does not concern, these return None.
+Each of several linkages calls these functions; they return None if it is not concerned.
 
 Faults are built only where a scene has a section ``faults``.
 """
@@ -50,7 +50,7 @@ FAULTS = {
     'freeze': 'linkage_ros.faults.freeze',
     'silence': 'linkage_ros.faults.silence',
 }
-"""Kind of each fault, and the module that holds it."""
+"""Module of each fault, by kind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,14 +58,14 @@ class Fault:
     """
     A fault that a scene can inject.
 
-    Attributes
+    A fault of a scene.
     ----------
     kind, parameters
-        What goes wrong: a key of `FAULTS`, and how.
+        Key of `FAULTS`, and the parameters.
     at
-        When it is injected by itself, in [s] from the first tick.
+        Times at which it begins by itself, in [s] from the first tick.
     seconds
-        How long it lasts then.
+        Its duration then, in [s].
 
     """
 

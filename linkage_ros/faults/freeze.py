@@ -14,10 +14,10 @@
 
 
 """
-Freeze: the last reading is published again and again, with stamps that go on.
+Freeze: the last reading is published again and again, with new stamps.
 
-What a sensor's electronics do that hang while their driver goes on polling, whether the linkage
-has a pose or not. Where nothing was read before, nothing is published.
+This models sensor electronics that hang while their driver continues to poll, whether or not the
+linkage has a pose. Without an earlier reading nothing is published.
 """
 
 from __future__ import annotations
@@ -38,23 +38,23 @@ PARAMETERS = FreezeParameters
 
 
 def sensor(_parameters: FreezeParameters, switch: Switch, _joints: Sequence[str]) -> Freeze:
-    """Build what holds the readings."""
+    """Build the sensor stage."""
     return Freeze(switch)
 
 
 class Freeze:
     """
-    A sensor that may hang.
+    Sensor stage that holds the last reading.
 
     Parameters
     ----------
     switch
-        Whether it does.
+        Switch of the fault.
 
     Attributes
     ----------
     gap_begins
-        That a gap changes nothing for it.
+        False: a gap does not change its state.
 
     """
 
@@ -67,14 +67,14 @@ class Freeze:
         self._last: SensorReading | None = None
 
     def __call__(self, _now: int, reading: SensorReading) -> SensorReading | None:
-        """Return a reading, or the last one before it hung."""
+        """Return the reading, or while frozen the last one before."""
         if not self._switch.on:
             self._last = reading
             return reading
         return None if self._last is None else restamped(self._last, reading.stamp)
 
     def gap(self, now: int) -> SensorReading | None:
-        """Return the last reading before it hung, stamped now, in [ns]; nothing else."""
+        """Return the last reading before the freeze, stamped now, in [ns]; None otherwise."""
         if not self._switch.on or self._last is None:
             return None
         return restamped(self._last, now)

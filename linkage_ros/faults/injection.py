@@ -14,9 +14,9 @@
 
 
 """
-When faults are on: at the times that the scene sets, or when somebody asks.
+Activation of faults: at the times in the scene, or by service calls.
 
-Time here is the true one: what a `time_jump` does to the clock does not change when it ends.
+Time here is the true time: a `time_jump` changes the clock, but not its own end.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from linkage_ros.faults.fault import Fault, FAULTS, Switch
 
 class Change(NamedTuple):
     """
-    That a fault has begun or ended.
+    Begin or end of a fault.
 
     Attributes
     ----------
     name
-        Of the fault, in the scene.
+        Name of the fault in the scene.
     on
-        Whether it has begun.
+        Whether it begins.
 
     """
 
@@ -47,12 +47,12 @@ class Change(NamedTuple):
 
 class Injection:
     """
-    The faults of a scene, each with its switch; it outlives a reset of the pipeline.
+    The faults of a scene with their switches; it outlives a reset of the pipeline.
 
     Parameters
     ----------
     faults
-        As the scene has them, by name.
+        Faults of the scene, by name.
 
     """
 
@@ -60,7 +60,7 @@ class Injection:
         self.faults = faults
         self.switches = {name: Switch() for name in faults}
         self.injected = dict.fromkeys(faults, 0)
-        """How many times each has begun."""
+        """Number of times that each fault has begun."""
         self._begun: int | None = None
         self._asked: list[Change] = []
         changes = [
@@ -69,7 +69,7 @@ class Injection:
             for begin, end in _windows(fault)
             for time, on in ((begin, True), (end, False))
         ]
-        # An end before a beginning at the same instant: two windows that touch are two.
+        # At the same instant an end comes before a begin: windows that touch stay two.
         self._timeline = sorted(changes, key=lambda entry: (entry[0], entry[2]))
         self._next = 0
         self._clocks = [
@@ -79,11 +79,11 @@ class Injection:
         ]
 
     def ask(self, name: str, on: bool) -> None:
-        """Let a fault begin or end at the next tick; from any thread."""
+        """Let a fault begin or end at the next tick; callable from any thread."""
         self._asked.append(Change(name, on))
 
     def advance(self, now: int) -> list[Change]:
-        """Set the switches for a time, in [ns]; return what has changed."""
+        """Set the switches for a time, in [ns]; return the changes."""
         if self._begun is None:
             self._begun = now
         due = []
@@ -97,7 +97,7 @@ class Injection:
         return [change for change in due if self.turn(*change)]
 
     def turn(self, name: str, on: bool) -> bool:
-        """Turn a fault on or off; return whether it was not so."""
+        """Turn a fault on or off; return whether that changed it."""
         switch = self.switches[name]
         if switch.on == on:
             return False
@@ -106,13 +106,13 @@ class Injection:
         return True
 
     def clock(self, now: int) -> int:
-        """Return the time by which the tick goes, in [ns]."""
+        """Return the time of the tick for the true time, in [ns]."""
         for clock in self._clocks:
             now = clock(now)
         return now
 
     def build(self, function: str, *arguments: Any) -> list[Any]:
-        """Build what the faults do in one place of the pipeline: a function of their modules."""
+        """Build the functions of all faults for one place of the pipeline, named by `function`."""
         built = []
         for name, fault in self.faults.items():
             module = import_module(FAULTS[fault.kind])
@@ -123,7 +123,7 @@ class Injection:
 
 
 def _windows(fault: Fault) -> list[tuple[int, int]]:
-    """Return when a fault begins and ends by itself, in [ns]; windows that overlap are one."""
+    """Return the windows of a fault, in [ns]; overlapping windows are merged."""
     windows: list[tuple[int, int]] = []
     for at in sorted(fault.at):
         begin, end = round(at * 1e9), round((at + fault.seconds) * 1e9)

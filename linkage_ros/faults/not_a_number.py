@@ -14,9 +14,9 @@
 
 
 """
-Not a number: the crank's messages say NaN for every position, rate and effort.
+Not a number: the crank messages hold NaN for every position, rate and effort.
 
-The node has to refuse them: what it does then is its own, as with a sensor that really sends them.
+The node has to reject them, as it would from a real sensor.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ PARAMETERS = NotANumberParameters
 
 
 def message(_parameters: NotANumberParameters, switch: Switch) -> Callable[[bytes], bytes]:
-    """Build what spoils the messages."""
+    """Build a function that corrupts the messages."""
 
     def spoilt(data: bytes) -> bytes:
         return with_every_number(data, nan) if switch.on else data

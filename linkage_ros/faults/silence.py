@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Silence: nothing is published, as when the sensor's cable is pulled."""
+"""Silence: nothing is published, as after the sensor's cable is pulled."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PARAMETERS = SilenceParameters
 
 
 def sensor(_parameters: SilenceParameters, switch: Switch, _joints: Sequence[str]) -> Sensor:
-    """Build what swallows the readings."""
+    """Build a function that suppresses the readings."""
 
     def silence(_now: int, reading: SensorReading) -> SensorReading | None:
         return None if switch.on else reading

@@ -14,10 +14,10 @@
 
 
 """
-Stuck: one joint's sensor stands still, the others go on.
+Stuck: the sensor of one joint stands still, the others work.
 
-Its position is held where it was when the fault began, its rate and acceleration are read as 0.
-Where nothing was read before, nothing is published.
+Its position stays as it was when the fault began; its rate and acceleration are 0. Without an
+earlier reading nothing is published.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ PARAMETERS = StuckParameters
 
 
 def sensor(parameters: StuckParameters, switch: Switch, joints: Sequence[str]) -> Sensor | None:
-    """Build what holds the joint, where it is one of these."""
+    """Build a function that holds the joint; None if it is not among these."""
     if parameters.joint not in joints:
         return None
     held: float | None = None

@@ -14,10 +14,10 @@
 
 
 """
-Time jump: the clock of the node steps, and steps back when the fault ends.
+Time jump: the clock of the node jumps, and jumps back when the fault ends.
 
-Where it steps back, either when it begins or when it ends, the node builds its pipeline anew, as
-it does when the system's clock is set.
+At a backward jump, at the begin or at the end of the fault, the node builds its pipeline again, as
+it does after a change of the system clock.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def clock(parameters: TimeJumpParameters, switch: Switch) -> Callable[[int], int
     step = round(parameters.by * 1e9)
 
     def jumping(now: int) -> int:
-        # No message has a stamp before 1970, or from 2038 on.
+        # Stamps of messages are limited to the years 1970 to 2038.
         return max(0, min(now + step, TIME_END - 1)) if switch.on else now
 
     return jumping

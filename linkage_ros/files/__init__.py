@@ -13,4 +13,4 @@
 # limitations under the License.
 
 
-"""Files of users: sections of strict YAML."""
+"""Files of users, read as sections of strict YAML, and files written for them."""

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A file written so that at every instant a whole one is there, the old or the new."""
+"""Write files atomically: at every instant the whole old file is there, or the whole new one."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from linkage_ros.errors import LinkageError
 
 def atomic_write(file: str | Path, data: bytes) -> None:
     """
-    Write a file, in the place of one that is there: beside its place, and moved there.
+    Write or replace a file: write it beside the target, then rename it.
 
     Parameters
     ----------
     file
-        Where to; a symbolic link is followed.
+        Target; a symbolic link is followed.
     data
-        What it is to hold.
+        Its content.
 
     Raises
     ------
     LinkageError
-        Where the file cannot be written.
+        The file cannot be written.
 
     """
     try:
@@ -49,19 +49,19 @@ def atomic_write(file: str | Path, data: bytes) -> None:
         if target.exists() and not os.access(target, os.W_OK):
             raise PermissionError(0, 'Permission denied')
         atomic_replace(target, data)
-    except (OSError, ValueError, RuntimeError) as error:  # the last for links in a circle
+    except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a circle of links
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise LinkageError(file, f'cannot be written ({reason})', 'name another file') from None
 
 
 def atomic_replace(target: Path, data: bytes) -> None:
     """
-    Write a file as `atomic_write` does, whatever is in its place; no link is followed.
+    Write a file as `atomic_write`, whatever exists there; do not follow a link.
 
     Raises
     ------
     OSError
-        Where the file cannot be written; what was there stays, and nothing is left beside it.
+        The file cannot be written; the old file stays, and nothing is left beside it.
 
     """
     temporary = target.parent / f'.{os.getpid()}.{token_hex(8)}.tmp'

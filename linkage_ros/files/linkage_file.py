@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A linkage file, read into a `Linkage`; the shorthands stand for exactly such a file."""
+"""Read a linkage file into a `Linkage`; shorthands expand to the same form."""
 
 from __future__ import annotations
 
@@ -41,26 +41,26 @@ from linkage_ros.resources import named_file
 
 _KEYS = ('links', 'input', 'assembly', 'sliders', 'joints', 'traced', 'pose', 'masses')
 _MOST_LINKS, _MOST_POINTS = 400, 10_000
-"""More links than these, and points of all links, are no machine's; a check takes seconds then."""
+"""Bounds on the links, and on the points of all links; at these a check takes seconds."""
 
 FARTHEST = 1e9
-"""Coordinates beyond this, in [m], are no machine's; below it no square overflows."""
+"""Bound on coordinates, in [m]; below it no square overflows."""
 
 HEAVIEST = 1e12
-"""Masses beyond this, in [kg], and moments of inertia, in [kg·m²], are no machine's either."""
+"""Bound on masses, in [kg], and on moments of inertia, in [kg·m²]."""
 
 STRONGEST = 1e12
-"""Nor are efforts beyond this, in [N·m] or [N]."""
+"""Bound on efforts, in [N·m] or [N]."""
 
 
 def looks_like_linkage(content: Section) -> bool:
-    """Return whether a file that may hold anything has the keys of a linkage."""
+    """Return whether a file of unknown kind has the keys of a linkage."""
     return any(key in content for key in ('links', *_SHORTHANDS))
 
 
 def load(linkage: str | PathLike[str]) -> Closure:
     """
-    Load a linkage, ready to be solved.
+    Load a linkage as a closure.
 
     Parameters
     ----------
@@ -71,9 +71,9 @@ def load(linkage: str | PathLike[str]) -> Closure:
     Raises
     ------
     FileError
-        Where there is no such file or name, or the file is wrong: with file, line, key and remedy.
+        There is no such file or name, or the file is wrong: with file, line, key and remedy.
     TypeError
-        Where it is neither a name nor a path.
+        The argument is neither a name nor a path.
 
     """
     file = named_file(linkage, 'linkages')
@@ -84,27 +84,27 @@ def load(linkage: str | PathLike[str]) -> Closure:
 
 
 def read_linkage(content: Section) -> Linkage:
-    """Read a linkage and prove that it closes; errors as of `read_closure`."""
+    """Read a linkage and check that it closes; errors as in `read_closure`."""
     return read_closure(content).linkage
 
 
 def read_closure(content: Section, name: str = '', *, publish_inputs: bool = False) -> Closure:
     """
-    Read a linkage and prove that it closes.
+    Read a linkage and check that it closes.
 
     Parameters
     ----------
     content
         The linkage file.
     name
-        What to call the linkage.
+        Name for the linkage.
     publish_inputs
-        Whether its input joints are published too, before the others.
+        Whether to publish its input joints too, before the others.
 
     Raises
     ------
     FileError
-        With file, line and key of what is wrong.
+        The file is wrong; the error has file, line and key.
 
     """
     for shorthand, expand in _SHORTHANDS.items():
@@ -157,7 +157,7 @@ def _linkage(content: Section, publish_inputs: bool) -> Linkage:
     return Linkage(
         points,
         inputs,
-        sides,  # type: ignore[arg-type]  # the choice above is the Literal
+        sides,  # type: ignore[arg-type]  # one of the words of the Literal, by `choice`
         published,
         {name: _slider(sliders.section(name)) for name in sliders},
         tuple(content.texts('traced')),
@@ -190,7 +190,7 @@ def _published(driven: Input) -> RevoluteJoint | SlideJoint:
 
 
 def _limits(content: Section) -> Limits:
-    """Return what a joint says of its limits; `kinematics.checks` says whether they can be."""
+    """Return the limits of a joint; `kinematics.checks` decides whether they are possible."""
     low, high = content.interval('limits', most=FARTHEST)
     return Limits(
         low,
@@ -270,23 +270,23 @@ def _closable(content: Section, linkage: Linkage, name: str, shorthand: str = ''
     except DefinitionError as error:
         where = error.where
         if shorthand:
-            # Of what a shorthand stands for, it says the limits alone itself.
+            # Of the expanded file, the author of a shorthand wrote only the limits.
             where = f'{shorthand}.{where}' if where.endswith('.limits') else shorthand
         raise content.error(where, error.reason, error.remedy) from None
     return closure
 
 
 def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
-    """Return what a shorthand stands for, with the limits that it gives its joints."""
+    """Return an expanded shorthand, with the limits that the shorthand gives to its joints."""
     driven, joints = written_out['input'], written_out['joints']
-    own = content.section('joints', required=False)
-    for name in own:
+    limited = content.section('joints', required=False)
+    for name in limited:
         if name not in joints:
-            raise own.error(
+            raise limited.error(
                 name, f'{quoted(name)} is no joint of it', f'name one of {listed(joints)}'
             )
     places = [(driven, content.section('input', required=False))]
-    places += [(joints[name], own.section(name)) for name in own]
+    places += [(joints[name], limited.section(name)) for name in limited]
     for joint, of in places:
         _limits(of)
         of.finish()
@@ -295,7 +295,7 @@ def _limited(written_out: dict[str, Any], content: Section) -> dict[str, Any]:
 
 
 def _four_bar(content: Section) -> dict[str, Any]:
-    """Write out crank a, coupler b, rocker c and ground d."""
+    """Expand crank a, coupler b, rocker c and ground d."""
     a, b, c, d = (content.number(side, above=0.0, most=FARTHEST, unit='m') for side in 'abcd')
     side = content.choice('assembly', ('left', 'right'), 'left')
     return {
@@ -315,7 +315,7 @@ def _four_bar(content: Section) -> dict[str, Any]:
 
 
 def _inverted_slider_crank(content: Section) -> dict[str, Any]:
-    """Write out crank a and the place of the swivel, from the crank's pivot."""
+    """Expand crank a and the position of the swivel relative to the crank's pivot."""
     a = content.number('a', above=0.0, most=FARTHEST, unit='m')
     swivel = content.point('swivel', most=FARTHEST)
     if swivel == (0.0, 0.0):

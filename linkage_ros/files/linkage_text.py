@@ -14,15 +14,15 @@
 
 
 """
-A linkage as the text of a linkage file, and the scene that such a file stands for.
+Write a linkage as the text of a linkage file, and its default scene.
 
-Reading the text gives the same linkage. Short mappings stand on one line, as in the files that
-come with the package. Numbers are the shortest that read as the same floats; names are quoted
-where a reader of YAML 1.1 or 1.2 could take them for something else.
+Reading the text gives the same linkage. Short mappings are on one line, as in the files of the
+package. Numbers are the shortest that read as the same floats; names are quoted if a reader of
+YAML 1.1 or 1.2 could take them for something else.
 
-Where a scene is expected, a linkage file stands for a scene that moves the linkage. It begins at
-`usual_inputs`. A single input turns at a constant rate, or swings through its range as a sine;
-several come from a topic. The result is the text of a scene file, read as any other.
+Where a scene is expected, a linkage file stands for a default scene that moves the linkage. It
+starts at `usual_inputs`. A single input turns at a constant rate, or swings through its range as a
+sine; several inputs come from a topic. The default scene is text, read as any other scene file.
 """
 
 from __future__ import annotations
@@ -53,11 +53,11 @@ from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 
 _WIDTH = 99
 _WHOLE = 1e15
-"""Beyond it, whole numbers are easier to read with an exponent."""
+"""Larger integers are easier to read with an exponent."""
 
 _PLAIN = re.compile(r'[^\W\d][\w.-]*')
 _WORDS = {'yes', 'no', 'on', 'off', 'true', 'false', 'null'}
-"""What YAML takes for something other than a name; 1.1 knows more of them than 1.2."""
+"""Words that YAML does not read as strings; YAML 1.1 has more of them than 1.2."""
 
 Content = float | str | list['Content'] | dict[str, 'Content']
 
@@ -69,9 +69,9 @@ def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
     Parameters
     ----------
     linkage
-        The linkage, with numbers that are finite and names that print.
+        The linkage; its numbers must be finite and its names printable.
     comment
-        Paragraphs that stand at its head.
+        Paragraphs of the comment at the top.
 
     """
     lines = list(_comment(comment))
@@ -82,22 +82,19 @@ def linkage_text(linkage: Linkage, comment: Sequence[str] = ()) -> str:
 
 def write_linkage(linkage: Linkage, file: str | Path, comment: Sequence[str] = ()) -> None:
     """
-    Write a linkage file, in the place of one that is there.
-
-    It is written beside its place and moved there, so that at every instant a whole file is there,
-    the old or the new.
+    Write or replace a linkage file atomically.
 
     Parameters
     ----------
     linkage, comment
         As in `linkage_text`.
     file
-        Where to; a symbolic link is followed.
+        Target; a symbolic link is followed.
 
     Raises
     ------
     LinkageError
-        Where the file cannot be written, or where what it would say is no linkage.
+        The file cannot be written, or its text would not be a valid linkage.
 
     """
     data = linkage_text(linkage, comment).encode()
@@ -106,7 +103,7 @@ def write_linkage(linkage: Linkage, file: str | Path, comment: Sequence[str] = (
 
 
 def number_text(value: float) -> str:
-    """Return the shortest text that every YAML reader takes for the same float."""
+    """Return the shortest text that every YAML reader reads as the same float."""
     value = float(value)
     if isinf(value):
         return '.inf' if value > 0.0 else '-.inf'
@@ -114,16 +111,16 @@ def number_text(value: float) -> str:
     if value.is_integer() and abs(value) < _WHOLE and written != '-0.0':
         return str(int(value))
     mantissa, e, exponent = written.partition('e')
-    # YAML 1.1 takes no number for one that has an exponent and no decimal point.
+    # YAML 1.1 requires a decimal point in a number with an exponent.
     return f'{mantissa}.0e{exponent}' if e and '.' not in mantissa else written
 
 
 _IN_ROWS = ('links', 'sliders', 'joints', 'masses')
-"""Keys whose parts have a line each, however short they are."""
+"""Keys whose parts have a line each, even if short."""
 
 
 def _content(linkage: Linkage) -> dict[str, Content]:
-    """Return what the file says, in its order; what is empty and may be absent is."""
+    """Return the content of the file in its order, without optional entries that are empty."""
     inputs: list[Content] = [_input(given) for given in linkage.inputs]
     content: dict[str, Content] = {
         'links': {
@@ -173,11 +170,11 @@ def _joint(joint: RevoluteJoint | SlideJoint) -> dict[str, Content]:
 
 
 def _limits(limits: Limits) -> dict[str, Content]:
-    found: dict[str, Content] = {'limits': [limits.low, limits.high]} if limits.bounded else {}
+    bounds: dict[str, Content] = {'limits': [limits.low, limits.high]} if limits.bounded else {}
     for key in ('velocity', 'effort'):
         if isfinite(value := getattr(limits, key)):
-            found[key] = value
-    return found
+            bounds[key] = value
+    return bounds
 
 
 def _pose(linkage: Linkage) -> dict[str, Content]:
@@ -193,13 +190,13 @@ def _comment(paragraphs: Sequence[str]) -> Iterator[str]:
     for paragraph in paragraphs:
         for line in paragraph.splitlines() or ['']:
             printing = ''.join(c if c.isprintable() else ' ' for c in line)
-            # Words of any length stay whole: a comment may hold a command or a path.
+            # A long word stays whole: it may be a command or a path.
             wrapped = wrap(printing, _WIDTH - 2, break_long_words=False, break_on_hyphens=False)
             yield from (f'# {part}' for part in wrapped) if wrapped else ['#']
 
 
 def _entry(name: str, value: Content, indent: str, *, in_rows: bool = False) -> Iterator[str]:
-    """Yield the lines of a key: one where it fits and need not be in rows, else one each part."""
+    """Yield the lines of a key: one line if it fits and need not be in rows, else one per part."""
     key = f'{indent}{_name(name)}:'
     line = f'{key} {_flow(value)}'
     inner = indent + '  '
@@ -225,34 +222,34 @@ def _flow(value: Content) -> str:
 def _name(name: str) -> str:
     if _PLAIN.fullmatch(name) and name.lower() not in _WORDS:
         return name
-    return json.dumps(name, ensure_ascii=False)  # its escapes are YAML's too
+    return json.dumps(name, ensure_ascii=False)  # its escapes are valid in YAML
 
 
 _PART = 0.96
-"""Of its range that an input swings through: at the ends of many lies a toggle, without rates."""
+"""Fraction of its range through which an input swings: many ranges end at a toggle."""
 
 _PERIOD = 4.0
-"""Of the swing, in [s]."""
+"""Period of the swing, in [s]."""
 
 _SAME = 1e-9
-"""What a start may lie beyond the end of a range and count as it, in [rad] or of a length."""
+"""Distance beyond the end of a range that still counts as the end, in [rad] or of a length."""
 
 
 def scene_text_for(closure: Closure, file: str) -> str:
     """
-    Return the text of the scene that a linkage stands for.
+    Return the text of a linkage's default scene.
 
     Parameters
     ----------
     closure
         The linkage.
     file
-        Name of its file, as the scene is to give it.
+        Name of the linkage file, for the scene to name.
 
     Raises
     ------
     DefinitionError
-        Where its pose says that it starts where no loop closes.
+        Its pose starts where no loop closes.
 
     """
     return (
@@ -275,25 +272,25 @@ def _drive(closure: Closure) -> str:
         end if by else end + inwards
         for end, inwards, by in zip(interval[:2], (left_out, -left_out), interval.by, strict=True)
     )
-    # A start that lies in what is left out at an end is where the swing turns back.
+    # If the start lies in the margin at an end of the range, the swing reverses there.
     low, high = min(low, start), max(high, start)
     mean, amplitude = 0.5 * (low + high), 0.5 * (high - low)
     sine = min(max((start - mean) / amplitude, -1.0), 1.0) if amplitude else 0.0
-    said = {
+    entries = {
         'amplitude': amplitude,
         'frequency': 1.0 / _PERIOD,
         'mean': mean,
         'phase': asin(sine),
     }
-    return f'{{sine: {{{", ".join(f"{key}: {number_text(of)}" for key, of in said.items())}}}}}'
+    return f'{{sine: {{{", ".join(f"{key}: {number_text(of)}" for key, of in entries.items())}}}}}'
 
 
 def _start(closure: Closure) -> tuple[float, InputRange]:
-    """Return where the single input starts, and the range in which that lies."""
+    """Return the start of the single input, and the range that contains it."""
     way, pose = InputSweep(closure), closure.linkage.pose
     if pose is None or pose.points:
         (start,) = usual_inputs(closure)
-        # Of a range as narrow as the rounding of its values the usual one may lie beside it.
+        # The usual input may lie beside a range that is as narrow as its rounding.
         interval = way.range_about(start) or way.widest_range
         assert interval is not None, 'reading the file has proved that it closes somewhere'
         return start, interval

@@ -14,10 +14,10 @@
 
 
 """
-How a drive, an effect or a fault declares its parameters: once, for reader, list and schema.
+Declare the parameters of drives, effects and faults once, for reader, table and schema.
 
 Parameters are a frozen dataclass whose fields are made by the functions below. Each field has a
-kind, which reads the value from a section of a file, describes it in tables, and writes its JSON
+kind, which reads the value from a section of a file, describes it in tables, and gives its JSON
 Schema.
 """
 
@@ -38,7 +38,7 @@ _KEY = 'parameter'
 Schema = dict[str, Any]
 
 Parts = Mapping[str, Sequence[str]]
-"""For each kind of part the names that there are."""
+"""The existing names for each kind of part."""
 
 KINDS = {
     'joint': 'published joint',
@@ -48,21 +48,21 @@ KINDS = {
     'body': 'link or the ground',
     'point': 'point: LINK.POINT',
 }
-"""Parts that a parameter can name, and what they are called."""
+"""Kinds of parts that a parameter can name, and their terms in messages."""
 
 CHARACTER = r'[^\u0000-\u001f\u007f-\u00a0\u2028\u2029]'
-"""Pattern of a character that prints."""
+"""Pattern of a printable character."""
 
 
 @dataclass(frozen=True, slots=True)
 class Kind(ABC):
     """
-    What a parameter is.
+    Kind of a parameter.
 
     Attributes
     ----------
     meaning
-        In words.
+        Meaning of the parameter, as text.
 
     """
 
@@ -71,7 +71,7 @@ class Kind(ABC):
 
     @abstractmethod
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
-        """Read the value of a key; arguments and errors as of `read_parameters`."""
+        """Read the value of a key; arguments and errors as in `read_parameters`."""
 
     @abstractmethod
     def schema(self) -> Schema:
@@ -79,7 +79,7 @@ class Kind(ABC):
 
     @abstractmethod
     def values(self) -> str:
-        """Return which values there are, for a table."""
+        """Return the allowed values, for a table."""
 
     def shown(self, default: Any) -> str:
         """Return a default, for a table."""
@@ -95,9 +95,9 @@ class Kind(ABC):
 
 @dataclass(frozen=True, slots=True)
 class Number(Kind):
-    """A finite number: least ≤ value ≤ most, and value > above; ``whole``, without decimals."""
+    """A finite number: least ≤ value ≤ most, and value > above; with ``whole`` an integer."""
 
-    unit: str = ''  # type: ignore[misc]  # a constant where there is none
+    unit: str = ''  # type: ignore[misc]  # a constant without a unit
     least: float = -inf
     most: float = inf
     above: float = -inf
@@ -127,13 +127,13 @@ class Number(Kind):
         return f'whole: {bounds}' if self.whole else bounds
 
     def shown(self, default: Any) -> str:
-        """Return a number as a person writes it."""
+        """Return the number in its usual notation."""
         return written(default)
 
 
 @dataclass(frozen=True, slots=True)
 class Numbers(Kind):
-    """A list of finite numbers, of which none is beyond ±most."""
+    """A list of finite numbers, each within ±most."""
 
     unit: str = ''  # type: ignore[misc]
     most: float = inf
@@ -154,7 +154,7 @@ class Numbers(Kind):
 
 @dataclass(frozen=True, slots=True)
 class Point(Numbers):
-    """Two finite numbers [x, y], of which none is beyond ±most."""
+    """Two finite numbers [x, y], each within ±most."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> tuple[float, float]:
         """Read a point as a tuple."""
@@ -172,7 +172,7 @@ class Point(Numbers):
 @dataclass(frozen=True, slots=True)
 class Rows(Kind):
     """
-    A list of rows of finite numbers, one for each column, of which none is beyond ±most.
+    A list of rows of finite numbers, one per column, each within ±most.
 
     Attributes
     ----------
@@ -213,7 +213,7 @@ class Flag(Kind):
         return self._described(type='boolean')
 
     def values(self) -> str:
-        """Return both."""
+        """Return both values."""
         return 'true or false'
 
     def shown(self, default: Any) -> str:
@@ -223,7 +223,7 @@ class Flag(Kind):
 
 @dataclass(frozen=True, slots=True)
 class Choice(Kind):
-    """One of several words."""
+    """One of a set of words."""
 
     words: tuple[str, ...]
 
@@ -242,7 +242,7 @@ class Choice(Kind):
 
 @dataclass(frozen=True, slots=True)
 class Text(Kind):
-    """A text; without a pattern, one that is not empty and prints."""
+    """A string; without a pattern, a printable one that is not empty."""
 
     pattern: str = f'^{CHARACTER}+$'
 
@@ -255,7 +255,7 @@ class Text(Kind):
         return self._described(type='string', pattern=self.pattern)
 
     def values(self) -> str:
-        """Return that it is a text."""
+        """Return that it is a string."""
         return 'a text'
 
 
@@ -264,7 +264,7 @@ class File(Text):
     """A path, relative to the folder of the scene file."""
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> str:
-        """Read a path, with the scene's folder before it."""
+        """Read a path, and prepend the scene's folder."""
         return join(folder, content.text(key))  # noqa: PTH118 (Path's raises on a NUL)
 
     def values(self) -> str:
@@ -279,11 +279,11 @@ class Name(Kind):
     kind: str
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> Any:
-        """Read the name of a part that there is."""
+        """Read the name of an existing part."""
         return self._known(content, key, content.text(key), parts)
 
     def schema(self) -> Schema:
-        """Return the schema of a name: which names there are, a schema does not know."""
+        """Return the schema of a name; a schema cannot know the existing names."""
         return Text(f'{self.meaning} (name of a {KINDS[self.kind]})').schema()
 
     def values(self) -> str:
@@ -291,7 +291,7 @@ class Name(Kind):
         return f'a {KINDS[self.kind]}'
 
     def _known(self, content: Section, key: str, name: str, parts: Parts) -> str:
-        """Return a name, if there is such a part."""
+        """Return the name if such a part exists."""
         names = parts[self.kind]
         if name in names:
             return name
@@ -320,14 +320,14 @@ class Names(Name):
         return f'names, each of a {KINDS[self.kind]}'
 
     def shown(self, default: Any) -> str:
-        """Return names; none stand for all."""
+        """Return the names; none stands for all."""
         return ', '.join(default) or 'all'
 
 
 @dataclass(frozen=True, slots=True)
 class Each(Name):
     """
-    For each of some parts of the linkage a value, or parameters of their own.
+    A value, or a section of parameters, for each named part of the linkage.
 
     Attributes
     ----------
@@ -343,7 +343,7 @@ class Each(Name):
         return Group('', self.of) if isinstance(self.of, type) else self.of
 
     def read(self, content: Section, key: str, parts: Parts, folder: str) -> dict[str, Any]:
-        """Read values by the names of parts."""
+        """Read values by name of the part."""
         inner = content.section(key)
         return {
             self._known(inner, name, name, parts): self._value.read(inner, name, parts, folder)
@@ -360,11 +360,11 @@ class Each(Name):
         return f'for each {KINDS[self.kind]}'
 
     def shown(self, default: Any) -> str:
-        """Return nothing: a table has the defaults of the values."""
+        """Return an empty text: a table has the defaults of the values."""
         return ''
 
     def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
-        """Yield a row, and those of the values."""
+        """Yield one row, and the rows of the values."""
         yield from Kind.rows(self, key, default)
         part = f'{key}.{"LINK.POINT" if self.kind == "point" else self.kind.upper()}'
         rows = self._value.rows(part, '')
@@ -375,7 +375,7 @@ class Each(Name):
 
 @dataclass(frozen=True, slots=True)
 class Group(Kind):
-    """Parameters within these."""
+    """A section of parameters within a section."""
 
     of: Any
 
@@ -392,11 +392,11 @@ class Group(Kind):
         return 'a mapping'
 
     def shown(self, default: Any) -> str:
-        """Return nothing: a table has the defaults of the parameters."""
+        """Return an empty text: a table has the defaults of the parameters."""
         return ''
 
     def rows(self, key: str, default: str) -> Iterator[tuple[str, ...]]:
-        """Yield a row, and those of the parameters."""
+        """Yield one row, and the rows of the parameters."""
         yield from Kind.rows(self, key, default)
         yield from parameter_rows(self.of, f'{key}.')
 
@@ -410,7 +410,7 @@ def number(
     most: float = inf,
     above: float = -inf,
 ) -> Any:
-    """Declare a number; without a default it must be given."""
+    """Declare a number; it is required if it has no default."""
     return _declared(Number(meaning, unit, least, most, above), default)
 
 
@@ -432,22 +432,22 @@ def rows(meaning: str, columns: Sequence[str], *, most: float = inf) -> Any:
 
 
 def flag(meaning: str, default: Any = MISSING) -> Any:
-    """Declare true or false."""
+    """Declare a boolean."""
     return _declared(Flag(meaning), default)
 
 
 def choice(meaning: str, words: Sequence[str], default: Any = MISSING) -> Any:
-    """Declare one of several words."""
+    """Declare one of a set of words."""
     return _declared(Choice(meaning, tuple(words)), default)
 
 
 def text(meaning: str, default: Any = MISSING) -> Any:
-    """Declare a text."""
+    """Declare a string."""
     return _declared(Text(meaning), default)
 
 
 def file(meaning: str) -> Any:
-    """Declare the path of a file, read as a text with the scene's folder before it."""
+    """Declare the path of a file, read as a string with the scene's folder prepended."""
     return _declared(File(meaning), MISSING)
 
 
@@ -462,12 +462,12 @@ def name(meaning: str, kind: str, default: Any = MISSING) -> Any:
 
 
 def names(meaning: str, kind: str, default: Any = ()) -> Any:
-    """Declare names of parts, read as a tuple; () where none are given stands for all."""
+    """Declare names of parts, read as a tuple; the default () stands for all parts."""
     return _declared(Names(meaning, kind), default)
 
 
 def each(meaning: str, kind: str, of: Any, *, required: bool = False) -> Any:
-    """Declare values for parts by their names, read as a mapping; empty if not required."""
+    """Declare values for parts by name, read as a mapping; empty if not required."""
     declared = Each(meaning, kind, of)
     if required:
         return _declared(declared, MISSING)
@@ -475,7 +475,7 @@ def each(meaning: str, kind: str, of: Any, *, required: bool = False) -> Any:
 
 
 def group(meaning: str, of: Any) -> Any:
-    """Declare parameters within these; absent, they are as by default."""
+    """Declare a section of parameters; if absent, all have their defaults."""
     return field(default_factory=of, metadata={_KEY: Group(meaning, of)})
 
 
@@ -484,7 +484,7 @@ def _declared(kind: Kind, default: Any) -> Any:
 
 
 def declared(parameters: Any) -> list[tuple[Field[Any], Kind]]:
-    """Return the fields of a type of parameters, each with its kind."""
+    """Return the fields of a parameter type, each with its kind."""
     return [(entry, entry.metadata[_KEY]) for entry in fields(parameters)]
 
 
@@ -494,7 +494,7 @@ def is_required(entry: Field[Any]) -> bool:
 
 
 def default_of(entry: Field[Any]) -> Any:
-    """Return the default of a parameter that has one, as JSON has it."""
+    """Return the default of an optional parameter, in the form of JSON."""
     value = entry.default
     if entry.default_factory is not MISSING:
         value = entry.default_factory()
@@ -504,7 +504,7 @@ def default_of(entry: Field[Any]) -> Any:
 
 
 def summary(parameters: Any) -> str:
-    """Return the first line of the docstring of a type of parameters."""
+    """Return the first line of the docstring of a parameter type."""
     return str(parameters.__doc__).strip().splitlines()[0]
 
 
@@ -517,16 +517,16 @@ def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -
     content
         The section.
     of
-        Their type.
+        Parameter type.
     parts
-        What they may name.
+        Parts of the linkage that they may name.
     folder
-        To which the paths of files are relative.
+        Folder for relative paths.
 
     Raises
     ------
     FileError
-        With line and key of what is wrong, what was expected, and the nearest name.
+        A value is wrong; the error has line and key, the expected values, and the nearest name.
 
     """
     entries = declared(of)
@@ -540,7 +540,7 @@ def read_parameters(content: Section, of: Any, parts: Parts, folder: str = '') -
 
 
 def parameters_schema(of: Any) -> Schema:
-    """Return the JSON Schema of the section that is read into a type of parameters."""
+    """Return the JSON Schema of the section of a parameter type."""
     entries = declared(of)
     return mapping(
         summary(of),
@@ -563,7 +563,7 @@ def parameter_rows(of: Any, prefix: str = '') -> Iterator[tuple[str, ...]]:
 def mapping(
     description: str, properties: Mapping[str, Schema], *, required: tuple[str, ...] = ()
 ) -> Schema:
-    """Return the JSON Schema of a mapping that has these keys and no others."""
+    """Return the JSON Schema of a mapping with these keys only."""
     schema: Schema = {'description': description, 'type': 'object'}
     if required:
         schema['required'] = list(required)
@@ -576,7 +576,7 @@ def named(description: str, of: Schema) -> Schema:
 
 
 def written(value: Any) -> str:
-    """Return a number as a person writes it: 1e9, but 4096; a list as it is."""
+    """Return a number in its usual notation: 1e9, but 4096; a list unchanged."""
     if not isinstance(value, int | float):
         return str(value)
     short = f'{value:g}'.replace('e+0', 'e').replace('e-0', 'e-').replace('e+', 'e')
@@ -593,5 +593,5 @@ def _bounds(least: float, most: float, above: float = -inf) -> Schema:
 
 
 def _plain(bound: float) -> float:
-    """Return a whole number without its decimals: a reader of the file sees 1, not 1.0."""
+    """Return a whole number without decimals: users see 1, not 1.0."""
     return int(bound) if float(bound).is_integer() and abs(bound) < 1e15 else bound

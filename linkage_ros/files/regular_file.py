@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Files that are read: regular ones alone.
+Open files for reading: regular files only.
 
-To open a named pipe waits for who writes into it, a device may never end, and either may do
-something when it is opened. So it is looked at first, and not waited for.
+Opening a named pipe waits for a writer, a device may never end, and opening either may have an
+effect. So the file type is checked first.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ def open_regular(file: str | Path) -> BinaryIO:
     Raises
     ------
     OSError
-        Where it cannot be opened, or is no regular file; the message says what it is.
+        It cannot be opened, or is no regular file; the message names its type.
     ValueError
-        A NUL is in its name.
+        Its name contains a NUL.
 
     """
     _check(Path(file).stat(), file)
-    # Between the two another file may have come to its place.
+    # The file may have been replaced since the check.
     descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:
         _check(os.fstat(descriptor), file)
@@ -60,22 +60,22 @@ def open_regular(file: str | Path) -> BinaryIO:
 
 def read_regular(file: str | Path, largest: int) -> bytes:
     """
-    Read a file; of one that is larger than a number of bytes, one byte more than that.
+    Read a file; if it exceeds a number of bytes, read one byte more than that.
 
     Raises
     ------
     OSError, ValueError
-        As `open_regular`.
+        As in `open_regular`.
 
     """
     with open_regular(file) as stream:
         return stream.read(largest + 1)
 
 
-def _check(found: os.stat_result, file: str | Path) -> None:
-    if stat.S_ISREG(found.st_mode):
+def _check(status: os.stat_result, file: str | Path) -> None:
+    if stat.S_ISREG(status.st_mode):
         return
-    if stat.S_ISDIR(found.st_mode):
+    if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(file))
-    what = next((said for kind, said in _KINDS if kind(found.st_mode)), 'is no file')
+    what = next((reason for kind, reason in _KINDS if kind(status.st_mode)), 'is no file')
     raise OSError(EINVAL, f'{what}, not a regular file', str(file))

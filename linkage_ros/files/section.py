@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A mapping of a YAML file, whose keys are taken one by one."""
+"""Section of a YAML file: a mapping whose keys are taken one by one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from linkage_ros.errors import did_you_mean, FileError, listed, quoted
 
 
 class LinedDict(dict[str, Any]):
-    """A mapping that knows the line of each of its keys."""
+    """A mapping with the line of each of its keys."""
 
     __slots__ = ('lines',)
 
@@ -39,14 +39,14 @@ class Section:
     """
     A mapping of a YAML file, whose keys are taken one by one.
 
-    Every getter takes its key off the section; `finish` refuses what is left.
+    Every getter removes its key from the section; `finish` refuses the remaining keys.
 
     Parameters
     ----------
     file
-        The file, for messages.
+        Name of the file, for error messages.
     path
-        Dotted key of the mapping within the file.
+        Dotted key of the mapping in the file.
     content
         The mapping.
     line
@@ -69,7 +69,7 @@ class Section:
 
     @property
     def mapping(self) -> Mapping[str, Any]:
-        """Return all of it, as it was read."""
+        """Return the whole mapping, as it was read."""
         return self._content
 
     def error(self, key: str, reason: str, remedy: str) -> FileError:
@@ -124,14 +124,14 @@ class Section:
         return int(value)
 
     def flag(self, key: str, default: bool | None = None) -> bool:
-        """Return true or false."""
+        """Return a boolean."""
         value = self._take(key, default, 'true or false')
         if not isinstance(value, bool):
             raise self.error(key, f'{quoted(value)} is not a flag', 'write true or false')
         return value
 
     def text(self, key: str, default: str | None = None) -> str:
-        """Return a text that is not empty, or the default."""
+        """Return a string that is not empty, or the default."""
         value = self._take(key, default, 'a text')
         if value == default and default is not None:
             return default
@@ -140,7 +140,7 @@ class Section:
         return value
 
     def ros_name(self, name: str) -> str:
-        """Return a key of this section, or a value in it, that is to be in a topic's name."""
+        """Return a key of this section, or a value in it, that will be part of a topic name."""
         if not fullmatch('[A-Za-z][A-Za-z0-9_]*', name):
             raise self.error(
                 name if name in self._content else '',
@@ -150,14 +150,14 @@ class Section:
         return name
 
     def choice(self, key: str, choices: Sequence[str], default: str | None = None) -> str:
-        """Return one of several words."""
+        """Return one of a set of words."""
         value = self._take(key, default, listed(choices, ' or '))
         if value not in choices:
             raise self.error(key, f'{quoted(value)} is none', f'write {listed(choices, " or ")}')
         return cast(str, value)
 
     def point(self, key: str, *, most: float = inf) -> tuple[float, float]:
-        """Return two finite numbers, of which none is beyond ±most."""
+        """Return two finite numbers, each within ±most."""
         value = self._take(key, None, 'two numbers [x, y]')
         if (
             not isinstance(value, list)
@@ -176,9 +176,9 @@ class Section:
 
     def interval(self, key: str, *, most: float = inf) -> tuple[float, float]:
         """
-        Return two numbers [low, high]; infinite ones for no limit, and where the key is absent.
+        Return two numbers [low, high]; infinite for no limit, and if the key is absent.
 
-        Their order is left to who knows what they are of.
+        The caller checks their order.
         """
         value = self._take(key, [-inf, inf], 'two numbers [low, high]')
         if (
@@ -199,7 +199,7 @@ class Section:
         return float(value[0]), float(value[1])
 
     def section(self, key: str, *, required: bool = True) -> Section:
-        """Return a mapping within this one; an empty one where it is absent and not required."""
+        """Return a nested mapping; an empty one if it is absent and not required."""
         value = self._take(key, None if required else {}, 'a mapping')
         line = self._line_of(key)
         if not isinstance(value, dict):
@@ -223,7 +223,7 @@ class Section:
         return found
 
     def numbers(self, key: str, *, most: float = inf) -> list[float]:
-        """Return a list of finite numbers, of which none is beyond ±most."""
+        """Return a list of finite numbers, each within ±most."""
         value = self._take(key, None, 'a list of numbers')
         if not isinstance(value, list) or any(
             not _is_number(v) or not abs(v) <= most for v in value
@@ -236,7 +236,7 @@ class Section:
     def rows(
         self, key: str, columns: Sequence[str], *, most: float = inf
     ) -> tuple[tuple[float, ...], ...]:
-        """Return a list of rows of finite numbers, of which none is beyond ±most."""
+        """Return a list of rows of finite numbers, each within ±most."""
         value = self._take(key, None, 'a list of rows of numbers')
         row = f'[{", ".join(columns)}]'
         if not isinstance(value, list) or not value:
@@ -253,24 +253,24 @@ class Section:
         return tuple(tuple(map(float, found)) for found in value)
 
     def texts(self, key: str) -> list[str]:
-        """Return a list of names; an empty one where the key is absent."""
+        """Return a list of names; empty if the key is absent."""
         value = self._take(key, [], 'a list of names')
         if not isinstance(value, list) or any(not isinstance(v, str) or not v for v in value):
             raise self.error(key, f'{quoted(value)} is no list of names', 'write [one, other]')
         return list(value)
 
     def taken(self, key: str) -> None:
-        """Take a key off that serves another section."""
+        """Remove a key that another section uses."""
         self._taken.add(key)
 
     def finish(self, known: Sequence[str] = ()) -> None:
         """
-        Refuse the keys that nobody has taken.
+        Refuse the remaining keys.
 
         Parameters
         ----------
         known
-            Further keys that could have stood here, for the suggestion.
+            Further keys that could have been here, for the suggestion.
 
         """
         for key in self._content:
@@ -281,10 +281,10 @@ class Section:
                 raise self.error(key, 'unknown key', remedy)
 
     def _line_of(self, key: str) -> int:
-        """Return the line of a key, or of as much of a dotted one as there is."""
+        """Return the line of a key, or of the longest existing part of a dotted key."""
         line, content = self._line, self._content
         while isinstance(content, LinedDict):
-            # The name of an effect of one's own has dots within it.
+            # The name of a user-defined effect contains dots.
             part = key if key in content else key.partition('.')[0]
             if part not in content:
                 break

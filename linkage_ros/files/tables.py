@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-Tables of numbers as files, CSV and Parquet, written block by block.
+Write tables of numbers to CSV and Parquet files, block by block.
 
-Numbers keep every bit: CSV has the shortest text that reads back as the same number. What is not
-there is an empty cell, or null. A file comes into being as a whole: it is written under another
-name beside its place, and renamed.
+Numbers keep every bit: CSV has the shortest text that reads as the same number. A missing value is
+an empty cell, or null. A file appears as a whole: it is written under another name beside the
+target, and renamed.
 """
 
 from __future__ import annotations
@@ -39,31 +39,31 @@ Row = Sequence[float | int | None]
 Write = Callable[[Sequence[Row]], None]
 """Writes a block of rows."""
 
-_CELLS = 2**20  # a block of so many takes about 40 MB
+_CELLS = 2**20  # a block of this size takes about 40 MB
 
 
 @contextmanager
 def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterator[Write]:
     """
-    Give what writes a table; the file is there when all has been written, or not at all.
+    Yield a function that writes blocks of a table; the file appears complete at the end, or not.
 
     Parameters
     ----------
     file
-        Its ending says which kind it is; see `KINDS`. One that exists is replaced.
+        Target; its suffix selects the format, see `KINDS`. An existing file is replaced.
     heads
         Headings of the columns.
     whole
-        Those of them that hold whole numbers.
+        Headings of the columns of integers.
 
     Raises
     ------
     LinkageError
-        Where it cannot be written.
+        It cannot be written.
 
     """
     opened = KINDS[file.suffix.lower()]
-    # A link is followed: what it names is replaced, and not the link.
+    # A link is followed: its target is replaced, not the link.
     target = Path(os.path.realpath(file))
     temporary = target.with_name(f'.linkage_export_{os.getpid()}{target.suffix}')
     try:
@@ -87,12 +87,12 @@ def table_file(file: Path, heads: Sequence[str], whole: Sequence[str]) -> Iterat
 
 def check_kind(file: Path) -> None:
     """
-    Check that a table can be written to a file of this name.
+    Check that a table can be written to a file with this name.
 
     Raises
     ------
     LinkageError
-        Where its ending is not known, or what writes it is not installed or does not run here.
+        Its suffix is unknown, or the library for it is not installed or does not run here.
 
     """
     ending = file.suffix.lower()
@@ -107,7 +107,7 @@ def check_kind(file: Path) -> None:
 
 
 def _check_pyarrow() -> None:
-    """Check that pyarrow can be loaded: it is an extra, and from 26 on refuses numpy 1.x."""
+    """Check that pyarrow can be imported: it is an extra, and from 26 on refuses numpy 1.x."""
     try:
         import_module('pyarrow')
     except ImportError as error:
@@ -120,7 +120,7 @@ def _check_pyarrow() -> None:
 
 
 def block_rows(columns: int) -> int:
-    """Return how many rows a block should have."""
+    """Return the number of rows for a block."""
     return max(1, _CELLS // columns)
 
 
@@ -132,7 +132,7 @@ def _csv(stream: BinaryIO, heads: Sequence[str], _whole: Sequence[str]) -> Itera
         writer.writerow(heads)
         yield writer.writerows
     finally:
-        text.detach()  # else it would close the stream when it is collected
+        text.detach()  # else it would close the stream when it is garbage-collected
 
 
 @contextmanager
@@ -154,7 +154,7 @@ def _parquet(stream: BinaryIO, heads: Sequence[str], whole: Sequence[str]) -> It
             ) from None
         writer.write_table(pa.Table.from_arrays(columns, schema=schema))
 
-    # Numbers hardly ever repeat to the bit: a dictionary of them would be built in vain.
+    # Numbers hardly ever repeat exactly: a dictionary of them would be useless.
     with parquet.ParquetWriter(stream, schema, compression='zstd', use_dictionary=False) as writer:
         yield write
 
@@ -162,10 +162,8 @@ def _parquet(stream: BinaryIO, heads: Sequence[str], whole: Sequence[str]) -> It
 KINDS: dict[
     str, Callable[[BinaryIO, Sequence[str], Sequence[str]], AbstractContextManager[Write]]
 ] = {'.csv': _csv, '.parquet': _parquet}
-"""Ending of a file, and what writes it."""
+"""Writer for each suffix of a file."""
 
-
-# A CSV file of numbers, as spreadsheets write it: commas or semicolons, a heading or none.
 
 _MOST = 1000
 _LARGEST_FILE = 10_000_000
@@ -173,25 +171,25 @@ _LARGEST_FILE = 10_000_000
 
 def numbers_of(file: Path, columns: Sequence[int]) -> list[tuple[float, ...]]:
     """
-    Read rows of numbers.
+    Read rows of numbers from a CSV file with commas or semicolons, with or without a heading.
 
     Parameters
     ----------
     file
-        The file; lines that are empty or begin with ``#`` are passed over, and so is a heading.
+        The file; empty lines, lines that begin with ``#``, and a heading are skipped.
     columns
-        How many numbers a row may have; all rows have as many.
+        Allowed numbers of columns; all rows have the same number.
 
     Raises
     ------
     FileError
-        With the line.
+        The file is wrong; the error has the line.
 
     """
     try:
         data = read_regular(file, _LARGEST_FILE)
         text = data[:_LARGEST_FILE].decode('utf-8-sig')
-    except (OSError, ValueError) as error:  # the latter for what is no text, and a NUL in a name
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a NUL in the name
         reason = getattr(error, 'strerror', None) or 'is no text'
         raise FileError(file, '', f'cannot be read ({reason})', 'name a CSV file') from None
     if len(data) > _LARGEST_FILE:
@@ -225,7 +223,7 @@ def _lines(file: Path, text: str, delimiter: str) -> Iterator[tuple[int, list[st
     reader = csv.reader(text.splitlines(), delimiter=delimiter)
     try:
         yield from enumerate(reader, 1)
-    except csv.Error as error:  # a cell without end
+    except csv.Error as error:  # an unterminated cell
         raise FileError(
             file, '', f'line {reader.line_num}: {error}', 'write rows of numbers with commas'
         ) from None

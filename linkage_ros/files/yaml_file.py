@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-YAML files, read strictly.
+Read YAML files strictly.
 
-What PyYAML would let pass is refused here with file, line and key: a key that stands twice, a key
-that nobody reads, a value of the wrong type, a number that is none.
+Errors that PyYAML accepts are refused here with file, line and key: a duplicate key, an unknown
+key, a value of the wrong type, an invalid number.
 """
 
 from __future__ import annotations
@@ -31,31 +31,29 @@ from linkage_ros.files.regular_file import read_regular
 from linkage_ros.files.section import LinedDict, Section
 import yaml
 
-# YAML from anywhere, within limits.
-#
-# Ten lines of aliases stand for gigabytes, and PyYAML takes a twentieth of a millisecond for each
-# value. So aliases are not read, and of values and of levels there is a most. Scalars follow YAML
-# 1.2, so that ``1e-3`` is a number and ``off`` a name.
-
 MOST_VALUES = 200_000
-"""How many values a text may hold, keys, lists and mappings among them: some ten seconds."""
+"""Most values in a text, including keys, lists and mappings; parsing takes some ten seconds."""
 
 DEEPEST = 100
-"""How many levels it may have."""
+"""Greatest number of nested levels."""
 
 _LONGEST_INTEGER = 100
 
 
 class BoundedLoader(yaml.SafeLoader):
     """
-    PyYAML's safe loader with the scalars of YAML 1.2, without aliases, and with limits.
+    PyYAML's safe loader with YAML 1.2 scalars, without aliases, and with limits.
+
+    Ten lines of aliases can expand to gigabytes, and PyYAML takes 50 µs per value. So aliases are
+    refused, and the numbers of values and levels are limited. By YAML 1.2 ``1e-3`` is a number and
+    ``off`` a string.
 
     Parameters
     ----------
     text
-        What is read.
+        YAML text.
     most
-        How many values it may hold.
+        Most values that it may contain.
 
     """
 
@@ -68,7 +66,7 @@ class BoundedLoader(yaml.SafeLoader):
         self._depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        """Compose a value; refuse aliases, and what is too much or too deep."""
+        """Compose a value; refuse aliases, and too many values or levels."""
         self._left -= 1
         wrong = ''
         if self.check_event(yaml.AliasEvent):
@@ -88,19 +86,19 @@ class BoundedLoader(yaml.SafeLoader):
 
 def bounded_yaml(text: str, most: int = MOST_VALUES) -> Any:
     """
-    Return what a YAML text says.
+    Parse a YAML text.
 
     Parameters
     ----------
     text
         The text.
     most
-        How many values it may hold.
+        Most values that it may contain.
 
     Raises
     ------
     ValueError
-        It is not YAML, or beyond a limit; the text of the error says which, on one line.
+        It is not YAML, or exceeds a limit; the text of the error, one line, says which.
 
     """
     try:
@@ -118,7 +116,7 @@ def bounded_yaml(text: str, most: int = MOST_VALUES) -> Any:
 
 
 def _integer(text: str) -> float:
-    # Python refuses to convert integers without end, to and from text as well as to a float.
+    # Python limits the length of integers that it converts, from and to text and to float.
     return int(text) if len(text) <= _LONGEST_INTEGER else float(text)
 
 
@@ -162,12 +160,12 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
     content : Section
         The mapping.
     data : bytes
-        The file as it stands.
+        The content of the file.
 
     Raises
     ------
     FileError
-        Where it cannot be read, is not UTF-8, not YAML, not a mapping, or a key stands twice.
+        It cannot be read, is not UTF-8, not YAML, not a mapping, or has a duplicate key.
 
     """
     try:
@@ -176,7 +174,7 @@ def read_yaml(file: str | Path) -> tuple[Section, bytes]:
         raise FileError(
             file, '', f'cannot be read ({error.strerror})', 'name a file that can be read'
         ) from None
-    except ValueError as error:  # a NUL in the name
+    except ValueError as error:  # the name contains a NUL
         raise FileError(repr(str(file)), '', str(error), 'name a file') from None
     return parse_yaml(data, str(file)), data
 
@@ -190,12 +188,12 @@ def parse_yaml(data: bytes, file: str) -> Section:
     data
         The text, UTF-8.
     file
-        Its name, for messages.
+        Its name, for error messages.
 
     Raises
     ------
     FileError
-        As `read_yaml`.
+        As in `read_yaml`.
 
     """
     if len(data) > _LARGEST_FILE:
@@ -230,13 +228,13 @@ def parse_yaml(data: bytes, file: str) -> Section:
 
 
 class _StrictLoader(BoundedLoader):
-    """The loader of all YAML, with a line for each key, and without repeated keys."""
+    """Loader of all YAML files, with a line for each key, and without duplicate keys."""
 
     file: str
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        """Build a mapping whose keys are texts, each once."""
-        if not isinstance(node, yaml.MappingNode):  # one that is tagged !!map
+        """Build a mapping whose keys are strings without duplicates."""
+        if not isinstance(node, yaml.MappingNode):  # another node that is tagged !!map
             raise yaml.constructor.ConstructorError(
                 None, None, 'expected a mapping', node.start_mark
             )
@@ -258,7 +256,7 @@ class _StrictLoader(BoundedLoader):
         return cast(dict[Hashable, Any], mapping)
 
     def construct_yaml_map(self, node: yaml.MappingNode) -> Any:
-        """Build a mapping at once: nothing here refers to itself."""
+        """Build a mapping in one step: without aliases it cannot refer to itself."""
         yield self.construct_mapping(node)
 
 

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages as bytes: declarations, and what is compiled from them to read and write CDR."""
+"""ROS messages in CDR: declarations, and the compiler that reads and writes them."""

@@ -14,14 +14,14 @@
 
 
 """
-Effort commands as bytes (CDR): that of one joint read out of a ``sensor_msgs/msg/JointState``.
+Read effort commands for one joint from serialized ``sensor_msgs/msg/JointState`` messages.
 
-Controllers fill name and effort; positions and velocities may be there or not, and are not looked
-at. Nor is the stamp: a command holds from when it comes.
+Controllers fill name and effort; positions and velocities may be present, and are ignored. So is
+the stamp: a command holds from its arrival.
 
 The topic-based hardware of ros2_control (joint_state_topic_hardware_interface 1.1.0) names all
-joints of a system, and gives efforts of those alone that have a command: nothing says which. That
-a joint which follows from others has none is known.
+joints of a system, but gives efforts only for those that have a command, without saying which. A
+joint known to depend on others has none.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class EffortCommand(NamedTuple):
     Attributes
     ----------
     stamp
-        As the message has it, in [ns]; 0 where it has none.
+        Stamp of the message, in [ns]; 0 without one.
     effort
-        In [N·m], of a joint that slides in [N].
+        Effort in [N·m]; of a sliding joint in [N].
 
     """
 
@@ -52,14 +52,14 @@ class EffortCommand(NamedTuple):
 
 class JointEffortReader:
     """
-    Reads the effort of a joint out of serialized messages.
+    Reads the effort of a joint from serialized messages.
 
     Parameters
     ----------
     joint
-        Its name. In a message it may stand anywhere among others.
+        Name of the joint. A message may have it at any place among others.
     dependent
-        Names of joints that nobody can command. A message may name them without an effort.
+        Names of joints that cannot be commanded. A message may name them without an effort.
 
     """
 
@@ -71,25 +71,25 @@ class JointEffortReader:
         self._known: tuple[int, Callable[[bytes], tuple[Any, ...]], tuple[Any, ...]] | None = None
 
     def read(self, data: bytes) -> EffortCommand | Rejection:
-        """Return the command for the joint, or why there is none."""
+        """Return the command for the joint, or the reason for its rejection."""
         if self._known is not None:
             size, unpack_from, fixed = self._known
             if len(data) >= size:
                 order, seconds, nanoseconds, names, rates, efforts, effort = unpack_from(data)
                 if (order, names, rates, efforts) == fixed:
                     return EffortCommand(seconds * NANOSECONDS + nanoseconds, effort)
-        found = _pattern(data, self._joint, self._dependent)
-        if isinstance(found, Rejection):
-            return found
-        self._known = found.size, found.unpack_from, found.fixed
+        layout = _pattern(data, self._joint, self._dependent)
+        if isinstance(layout, Rejection):
+            return layout
+        self._known = layout.size, layout.unpack_from, layout.fixed
         return self.read(data)
 
 
 def _pattern(data: bytes, joint: bytes, dependent: Collection[bytes]) -> Pattern | Rejection:
-    found = arrays_of(data)
-    if isinstance(found, Rejection):
-        return found
-    _, names, arrays = found
+    arrays_or_reason = arrays_of(data)
+    if isinstance(arrays_or_reason, Rejection):
+        return arrays_or_reason
+    _, names, arrays = arrays_or_reason
     efforts = arrays[-1]
     if not efforts.length:
         return Rejection.NO_EFFORT

@@ -14,10 +14,10 @@
 
 
 """
-JointState messages as bytes (CDR): some joints read out of them, and a whole message written.
+Read some joints from serialized JointState messages, and write whole messages.
 
-A message taken as bytes and read here costs a tenth of one that is built as an object; and the
-same bytes go to the recorder. Encoding: CDR version 1 (encapsulation 00 00 or 00 01), of
+Reading a message from its bytes takes a tenth of the time of building the object, and the recorder
+gets the same bytes. Encoding: CDR version 1 (encapsulation 00 00 or 00 01) of
 ``sensor_msgs/msg/JointState``: stamp, frame_id, name[], position[], velocity[], effort[].
 """
 
@@ -51,7 +51,7 @@ JOINT_STATE = declared(
 
 
 class Rejection(Enum):
-    """Why a crank message was not used."""
+    """Reason for the rejection of a crank message."""
 
     MALFORMED = 'malformed message'
     EMPTY = 'no joints or no positions'
@@ -72,16 +72,16 @@ class Rejection(Enum):
 
 class CrankSample(NamedTuple):
     """
-    The crank as a message tells it: all inputs, in the order of the linkage.
+    State of all inputs in a message, in the order of the linkage.
 
     Attributes
     ----------
     stamp
         Time of the measurement, in [ns].
     angles
-        Angle of each input joint, in [rad]; of one that slides its position, in [m].
+        Value of each input, in [rad]; of a sliding input in [m].
     rates
-        Their rates, in [rad/s] or [m/s]; None where the message has no velocities.
+        Rates, in [rad/s] or [m/s]; None if the message has no velocities.
 
     """
 
@@ -92,12 +92,12 @@ class CrankSample(NamedTuple):
 
 class JointStateReader:
     """
-    Reads some joints out of serialized messages.
+    Reads some joints from serialized messages.
 
     Parameters
     ----------
     joints
-        Names of the joints, one or more. In a message they may stand in any order, among others.
+        Names of one or more joints. A message may have them in any order, among others.
 
     """
 
@@ -108,7 +108,7 @@ class JointStateReader:
         self._known: tuple[Any, ...] | None = None
 
     def read(self, data: bytes) -> CrankSample | Rejection:
-        """Return the sample of the joints, in the order of their names, or why there is none."""
+        """Return the sample of the joints, in the given order, or the reason for its rejection."""
         known = self._known
         if known is not None:
             size, unpack_from, pick_fixed, fixed, pick_positions, pick_rates = known
@@ -121,15 +121,15 @@ class JointStateReader:
                         return Rejection.STAMP_INVALID
                     stamp = seconds * NANOSECONDS + nanoseconds
                     return CrankSample(stamp, pick_positions(values), pick_rates(values) or None)
-        found = _pattern(data, self._joints)
-        if isinstance(found, Rejection):
-            return found
-        self._known = *found[:4], *found.picks
+        layout = _pattern(data, self._joints)
+        if isinstance(layout, Rejection):
+            return layout
+        self._known = *layout[:4], *layout.picks
         return self.read(data)
 
 
 def arrays_of(data: bytes) -> tuple[str, list[bytes], list[Numbers]] | Rejection:
-    """Return byte order, names, and where positions, rates and efforts stand."""
+    """Return byte order, names, and the places of positions, rates and efforts."""
     try:
         fields = parsed(data, JOINT_STATE)
     except MalformedError:
@@ -139,10 +139,10 @@ def arrays_of(data: bytes) -> tuple[str, list[bytes], list[Numbers]] | Rejection
 
 
 def _pattern(data: bytes, joints: Sequence[bytes]) -> Pattern | Rejection:
-    found = arrays_of(data)
-    if isinstance(found, Rejection):
-        return found
-    _, names, arrays = found
+    arrays_or_reason = arrays_of(data)
+    if isinstance(arrays_or_reason, Rejection):
+        return arrays_or_reason
+    _, names, arrays = arrays_or_reason
     positions, rates, efforts = arrays
     if not names or not positions.length:
         return Rejection.EMPTY
@@ -161,14 +161,14 @@ def _pattern(data: bytes, joints: Sequence[bytes]) -> Pattern | Rejection:
 
 class JointStateWriter(ArrayWriter):
     """
-    Writes messages for the same joints again and again.
+    Writes messages for a fixed list of joints.
 
     Positions are in [rad] or [m], rates in [rad/s] or [m/s], efforts in [N·m] or [N].
 
     Parameters
     ----------
     names
-        The joints, in the order in which they are published.
+        The joints, in the order of the message.
 
     """
 
@@ -185,7 +185,7 @@ class JointStateWriter(ArrayWriter):
         rates: Sequence[str],
         efforts: Sequence[str] = (),
     ) -> Lines:
-        """Return `write` as lines that make ``message`` of expressions; they are short."""
+        """Return `write` as generated lines that make ``message`` from expressions."""
         arrays = {'positions': positions, 'rates': rates, 'efforts': efforts}
         call = self.call({name: ', '.join(given) for name, given in arrays.items() if given})
         lines = [f'seconds, nanoseconds = divmod({stamp}, {NANOSECONDS})']
@@ -194,13 +194,13 @@ class JointStateWriter(ArrayWriter):
 
 class OwnJointStates:
     """
-    Tells the joint states of a scene from other messages on their topic, by their joints.
+    Recognises the joint states of a scene among other messages on their topic, by their joints.
 
     Parameters
     ----------
     linkages
-        The published joints of each linkage, in their order. Of several linkages any may be left
-        out of a message: those that are open.
+        The published joints of each linkage, in order. If there are several linkages, a message
+        may omit any that are open.
 
     """
 
@@ -215,7 +215,7 @@ class OwnJointStates:
         self._linkages = [(len(linkage), _names(linkage)) for linkage in linkages]
 
     def __call__(self, message: bytes) -> bool:
-        """Return whether a serialized message is one of them."""
+        """Return whether a serialized message is a joint state of the scene."""
         if message.startswith(self._all, STAMP_END):
             return True
         at = _FIRST_NAME
@@ -234,33 +234,33 @@ class OwnJointStates:
 _COUNT = Struct('<I')
 
 _NO_FRAME = packed(declared('Time stamp, string frame_id'), {})[STAMP_END:].ljust(8, b'\0')
-"""The bytes between the stamp and the count of the names: an empty frame_id."""
+"""Bytes between the stamp and the count of the names: an empty frame_id."""
 
 _COUNT_AT = STAMP_END + len(_NO_FRAME)
 _FIRST_NAME = _COUNT_AT + _COUNT.size
 
 
 def _names(joints: Sequence[str]) -> bytes:
-    """Return the names as they stand in a message, up to the next field."""
+    """Return the names as encoded in a message, up to the next field."""
     data = packed(declared('string[] name'), {'name': joints})[8:]
     return data + bytes(-len(data) % 4)
 
 
 def head_of(data: bytes) -> tuple[set[bytes], int] | None:
-    """Return the names in a message and where they end; nothing of a malformed one."""
-    found = arrays_of(data)
-    if isinstance(found, Rejection):
+    """Return the names in a message and the end of the names; None if malformed."""
+    arrays_or_reason = arrays_of(data)
+    if isinstance(arrays_or_reason, Rejection):
         return None
-    _, names, arrays = found
+    _, names, arrays = arrays_or_reason
     return set(names), arrays[0].count_at
 
 
 def with_every_number(data: bytes, value: float) -> bytes:
-    """Return a message with every position, rate and effort replaced; a malformed one as it is."""
-    found = arrays_of(data)
-    if isinstance(found, Rejection):
+    """Replace every position, rate and effort of a message; return a malformed one unchanged."""
+    arrays_or_reason = arrays_of(data)
+    if isinstance(arrays_or_reason, Rejection):
         return data
-    order, _, arrays = found
+    order, _, arrays = arrays_or_reason
     spoilt = bytearray(data)
     for _, n, first in arrays:
         Struct(f'{order}{n}d').pack_into(spoilt, first, *(value,) * n)

@@ -14,9 +14,9 @@
 
 
 """
-JointTrajectory messages of a single point as bytes (CDR): the state of the joints at one instant.
+Write JointTrajectory messages with a single point: the state of the joints at one instant.
 
-``trajectory_msgs/msg/JointTrajectory`` is the message of common_interfaces that has a field for
+``trajectory_msgs/msg/JointTrajectory`` is the message of common_interfaces with a field for
 accelerations. Its fields: stamp, frame_id, joint_names[], points[]; of a point: positions[],
 velocities[], accelerations[], effort[], time_from_start.
 """
@@ -38,14 +38,14 @@ JOINT_TRAJECTORY = declared(
 
 class JointTrajectoryWriter(ArrayWriter):
     """
-    Writes messages for the same joints again and again.
+    Writes messages for a fixed list of joints.
 
-    Positions are in [rad] or [m], rates and accelerations in these per second and second squared.
+    Positions are in [rad] or [m], rates and accelerations per [s] and [s²].
 
     Parameters
     ----------
     names
-        The joints, in the order in which they are published.
+        The joints, in the order of the message.
 
     """
 

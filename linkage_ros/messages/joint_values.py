@@ -14,13 +14,13 @@
 
 
 """
-The numbers in messages about joints, by joint and quantity: three message types, any joints.
+Read the numbers of messages about joints, by joint and quantity, for three message types.
 
-A message is parsed only if its layout differs from that of the last one; else it is unpacked at
-known places in one call. ``sensor_msgs/msg/JointState`` is read as it is. A message of
-``trajectory_msgs/msg/JointTrajectory`` is read where it has one point, as ``~/motion`` has: the
-state at an instant. One of ``sensor_msgs/msg/MultiDOFJointState`` is where it has wrenches alone,
-as ``~/pin_forces``; of these what acts in the plane: forces in x and y, moment about z.
+A message is parsed only if its layout differs from that of the previous one; else one call unpacks
+it. A ``sensor_msgs/msg/JointState`` is read completely. A ``trajectory_msgs/msg/JointTrajectory``
+must have one point, as in ``~/motion``: the state at an instant. A
+``sensor_msgs/msg/MultiDOFJointState`` must have wrenches only, as in ``~/pin_forces``; the planar
+components are read: forces in x and y, moment about z.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ UNITS = {
     FORCE_Y: ('N', 'N'),
     TORQUE: ('N·m', 'N·m'),
 }
-"""Of each quantity the unit where the joint turns, and where it slides."""
+"""Unit of each quantity for a revolute joint, and for a sliding one."""
 
 MALFORMED = Rejection.MALFORMED.value
 UNEQUAL = Rejection.UNEQUAL.value
@@ -81,9 +81,9 @@ class Values(NamedTuple):
     stamp
         In [ns].
     keys
-        What the numbers are; the same object as long as the layout is the same.
+        Meaning of each number; the same object as long as the layout is the same.
     names
-        The joints, in the order of the message; the same object as `keys` is.
+        The joints, in the order of the message; likewise the same object.
     numbers
         In [rad], [m], [N·m] or [N], and per second.
 
@@ -97,15 +97,15 @@ class Values(NamedTuple):
 
 class MessageValues:
     """
-    Reads the numbers of messages of one topic.
+    Reads the numbers in the messages of one topic.
 
     Parameters
     ----------
     message_type
-        One of `JOINT_STATE`, `TRAJECTORY` and `WRENCHES`; messages of other types have no values.
+        One of `JOINT_STATE`, `TRAJECTORY` and `WRENCHES`; messages of other types have no numbers.
     dependent
-        Names of joints that nobody can command. A JointState may name them without a number, as
-        `JointEffortReader` takes it.
+        Names of joints that cannot be commanded. A JointState may name them without a number, as
+        in `JointEffortReader`.
 
     """
 
@@ -118,7 +118,7 @@ class MessageValues:
         self._known: tuple[Pattern, tuple[Key, ...], tuple[str, ...]] | None = None
 
     def read(self, data: bytes) -> Values | str:
-        """Return the values of a message, or why it is left out."""
+        """Return the values of a message, or the reason why it is skipped."""
         if self._known is not None:
             (size, unpack_from, pick_fixed, fixed, (pick,)), keys, joints = self._known
             if len(data) >= size:
@@ -127,12 +127,12 @@ class MessageValues:
                     stamp = values[1] * NANOSECONDS + values[2]
                     return Values(stamp, keys, joints, pick(values))
         try:
-            found = self._parse(data)
+            parsed_or_reason = self._parse(data)
         except MalformedError:
             return MALFORMED
-        if isinstance(found, str):
-            return found
-        names, columns, width = found
+        if isinstance(parsed_or_reason, str):
+            return parsed_or_reason
+        names, columns, width = parsed_or_reason
         if len(set(names)) != len(names):
             return TWICE
         places = {
@@ -148,10 +148,10 @@ class MessageValues:
 
 
 _Column = tuple[Numbers, Sequence[str], Sequence[tuple[int, str]]]
-"""An array, the joints of its elements, and which number of an element is which quantity."""
+"""An array, the joints of its elements, and the quantity of each number of an element."""
 
 _Parsed = tuple[Sequence[str], Sequence[_Column], int]
-"""All joints, the arrays, and how many numbers an element has."""
+"""All joints, the arrays, and the number of numbers per element."""
 
 
 def _joint_state(data: bytes, dependent: Collection[str] = ()) -> _Parsed | str:
@@ -203,7 +203,7 @@ _PARSERS: dict[str, Callable[[bytes], _Parsed | str]] = {
 }
 
 TYPES = tuple(_PARSERS)
-"""Types of messages that can be read."""
+"""Message types that can be read."""
 
 
 def _texts(names: Sequence[bytes]) -> list[str]:

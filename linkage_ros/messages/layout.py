@@ -14,12 +14,12 @@
 
 
 """
-CDR version 1, compiled from declarations: a message is declared once, and read and written by it.
+Compiler for CDR version 1: each message is declared once, for reading and writing.
 
-Numbers stand at multiples of their size, counted from behind the four bytes of the encapsulation;
-a sequence or a text is a count, and then its content. `packed` and `parsed` go through a message
-field by field. Where many messages have the same layout, one of them is compiled: `pattern` takes
-the numbers out of the next ones in one call of `struct`, and `packing` writes them in one call.
+Numbers are aligned to multiples of their size, counted after the four bytes of the encapsulation;
+a sequence or a string is a count followed by its content. `packed` and `parsed` process a message
+field by field. For many messages of the same layout, one is compiled: `pattern` then reads the
+numbers of the next ones in one call of `struct`, and `packing` writes them in one call.
 
 Source: OMG, DDS-XTypes 1.3, section 7.4.1.
 """
@@ -40,15 +40,15 @@ NANOSECONDS = 1_000_000_000
 """A second, in [ns]."""
 
 ENCAPSULATION = b'\x00\x01\x00\x00'
-"""The first bytes of a message that is written here: little-endian, no options."""
+"""First bytes of a message written here: little-endian, no options."""
 
 STAMP_END = 12
-"""Where a stamp ends that begins a message: two numbers of four bytes."""
+"""End of the stamp at the start of a message: two numbers of four bytes."""
 
 _TEXT = 's'
 _COUNT = 'I'
 _COUNTS = {b'\x00\x00': Struct('>I'), b'\x00\x01': Struct('<I')}
-"""What reads a count, by the encapsulation."""
+"""Reader of a count, by encapsulation."""
 
 _KINDS = {
     'bool': 'B',
@@ -67,11 +67,11 @@ _KINDS = {
     'UVCoordinate': '2f',
     'string': _TEXT,
 }
-"""What a type holds: numbers of one size, as `struct` has them, or a text."""
+"""Content of a type: numbers of one size, by their `struct` format, or a string."""
 
 
 class Field(NamedTuple):
-    """A field of a message: its name, what it holds, and whether it is a sequence of these."""
+    """A field of a message: its name, its type, and whether it is a sequence of this type."""
 
     name: str
     kind: str | tuple[Field, ...]
@@ -80,14 +80,14 @@ class Field(NamedTuple):
 
 def declared(text: str, **nested: tuple[Field, ...]) -> tuple[Field, ...]:
     """
-    Return the declaration of a message.
+    Parse the declaration of a message.
 
     Parameters
     ----------
     text
         Types and names of its fields, as in the ``.msg`` file, separated by commas.
     nested
-        The declarations of types that are messages themselves.
+        Declarations of nested message types.
 
     """
     fields = []
@@ -99,11 +99,11 @@ def declared(text: str, **nested: tuple[Field, ...]) -> tuple[Field, ...]:
 
 
 class MalformedError(ValueError):
-    """The bytes are no message of the declared type."""
+    """Bytes that are not a message of the declared type."""
 
 
 class Numbers(NamedTuple):
-    """Where a sequence stands: its count, and its first number; a single number has no count."""
+    """Place of a sequence: its count, and its first number; a single number has no count."""
 
     count_at: int
     length: int
@@ -111,7 +111,7 @@ class Numbers(NamedTuple):
 
 
 def byte_order(data: bytes) -> str:
-    """Return the byte order of a message, as `struct` has it; MalformedError if it has none."""
+    """Return the byte order of a message for `struct`; raise MalformedError if it has none."""
     if data[:2] not in _COUNTS:
         raise MalformedError('unknown encapsulation')
     return _COUNTS[data[:2]].format[0]
@@ -119,9 +119,9 @@ def byte_order(data: bytes) -> str:
 
 def parsed(data: bytes, fields: Iterable[Field], most: int = 2**32) -> dict[str, Any]:
     """
-    Return the fields of a message by name; bytes behind its end are ignored.
+    Return the fields of a message by name; bytes after its end are ignored.
 
-    A text is bytes; of numbers it is `Numbers`, where they stand.
+    A string is returned as bytes, numbers as their places: `Numbers`.
 
     Parameters
     ----------
@@ -130,29 +130,29 @@ def parsed(data: bytes, fields: Iterable[Field], most: int = 2**32) -> dict[str,
     fields
         Its declaration.
     most
-        How many elements a sequence of texts or of nested messages may have.
+        Most elements of a sequence of strings or of nested messages.
 
     Raises
     ------
     MalformedError
-        It is not of this type, not whole, or has more elements.
+        It is not of this type, incomplete, or has too many elements.
 
     """
     byte_order(data)
     try:
-        found, end = _parse(data, 4, fields, _COUNTS[data[:2]], most)
+        values, end = _parse(data, 4, fields, _COUNTS[data[:2]], most)
     except StructError:
         raise MalformedError('ends too early') from None
     if end > len(data):
         raise MalformedError('ends too early')
-    return found
+    return values
 
 
 def _parse(
     data: bytes, at: int, fields: Iterable[Field], number: Struct, most: int
 ) -> tuple[dict[str, Any], int]:
-    """Return the fields that begin at a place, and where they end."""
-    found: dict[str, Any] = {}
+    """Return the fields from a position on, and the position of their end."""
+    values: dict[str, Any] = {}
     for name, kind, many in fields:
         count, count_at = 1, at
         if many:
@@ -163,12 +163,12 @@ def _parse(
             size, total = _sizes(kind)
             first = at + (4 - at) % size if count else at
             at = first + total * count
-            found[name] = Numbers(count_at if many else first, count, first)
+            values[name] = Numbers(count_at if many else first, count, first)
             continue
         if count > most:
             raise MalformedError(f'more than {most:,} elements')
         elements: list[Any] = []
-        # An element takes bytes, so that no count makes this loop longer than the message.
+        # Each element takes bytes, so the message limits the loop whatever the count says.
         for _ in range(count):
             if isinstance(kind, str):
                 at += -at % 4
@@ -179,27 +179,27 @@ def _parse(
             else:
                 element, at = _parse(data, at, kind, number, most)
                 elements.append(element)
-        found[name] = elements if many else elements[0]
-    return found, at
+        values[name] = elements if many else elements[0]
+    return values, at
 
 
 @cache
 def _sizes(kind: str) -> tuple[int, int]:
-    """Return the size of each of some numbers, and of all."""
+    """Return the size of each number of a type, and of all of them."""
     return calcsize(f'<{kind[-1]}'), calcsize(f'<{kind}')
 
 
 def packed(fields: Iterable[Field], values: Mapping[str, Any]) -> bytes:
     """
-    Return a message, little-endian.
+    Serialize a message, little-endian.
 
     Parameters
     ----------
     fields
         Its declaration.
     values
-        By name: a text, a number or a tuple of numbers, the values of a nested message; sequences
-        of these. A field without a value is zero, or empty.
+        Values by field name: a string, a number or a tuple of numbers, the values of a nested
+        message; sequences of these. A field without a value is zero, or empty.
 
     """
     data = bytearray(ENCAPSULATION)
@@ -232,11 +232,11 @@ def _pack(data: bytearray, fields: Iterable[Field], values: Mapping[str, Any]) -
 
 class Pattern(NamedTuple):
     """
-    The layout of a message; the messages of one publisher have the same.
+    Layout of a message; all messages of one publisher usually share it.
 
-    A message has it if it has `size` bytes or more, and `pick_fixed` takes `fixed` out of the
-    values that `unpack_from` returns: byte order, counts and texts. Values 1 and 2 are the stamp,
-    in [s] and [ns]; `picks` take each group of numbers out of them.
+    A message has the layout if it has at least `size` bytes, and `pick_fixed` returns `fixed` from
+    the values of `unpack_from`: byte order, counts and strings. Values 1 and 2 are the stamp, in
+    [s] and [ns]; each of `picks` returns a group of numbers from the values.
     """
 
     size: int
@@ -257,12 +257,12 @@ def pattern(
     data
         The message.
     arrays
-        Its sequences of numbers of eight bytes, one behind the other; all that stands before and
-        between them decides the layout. Padding does not.
+        Its consecutive sequences of 8-byte numbers; all data before and between them is part of
+        the layout, except padding.
     groups
-        In each group where the wanted numbers stand.
+        Places of the wanted numbers, for each group.
     width
-        So many numbers has an element of an array.
+        Number of numbers in an element of an array.
 
     """
     parts = [(0, 2, '2s'), (4, STAMP_END, 'iI')]
@@ -294,7 +294,7 @@ def pattern(
 
 
 def _pick(places: Sequence[int]) -> Callable[[tuple[Any, ...]], tuple[Any, ...]]:
-    """Return what takes some values out of a tuple, as a tuple, in one call of C."""
+    """Return a function that picks values of a tuple, as a tuple, in one C call."""
     if len(places) > 1:
         return itemgetter(*places)
     return itemgetter(slice(places[0], places[0] + 1) if places else slice(0))
@@ -304,21 +304,21 @@ def packing(
     message: bytes, arrays: Iterable[tuple[int, str]]
 ) -> tuple[Callable[..., bytes], list[bytes]]:
     """
-    Compile what writes messages that differ from one in their stamps and in arrays of numbers.
+    Compile a writer of messages that differ from a given one in stamps and arrays of numbers only.
 
     Parameters
     ----------
     message
         The message; it begins with a stamp.
     arrays
-        Where each array begins, and its format.
+        Start of each array, and its format.
 
     Returns
     -------
     pack : callable
         Takes bytes, the stamp in [s] and [ns], bytes, the first array, bytes, and so on.
     constants : list of bytes
-        These bytes.
+        The constant bytes.
 
     """
     fields, constants, at = '<', [], 0
@@ -334,24 +334,24 @@ def packing(
 
 class ArrayWriter:
     """
-    Writes messages of a stamp and of arrays of numbers, for the same joints again and again.
+    Writes messages with a stamp and arrays of numbers, for a fixed list of joints.
 
     Parameters
     ----------
     fields
-        Their declaration.
+        Declaration of the message.
     names
-        The joints in the order of the message, by the name of their field.
+        Names of the joints, in the order of the message, by name of the field that holds them.
     arrays
-        Field of each array by its name as a parameter of `write`.
+        Field of each array, by its name as a parameter of `write`.
     within
-        The sequence of one element in which the arrays stand; '' where they stand in none.
+        The sequence, with one element, that contains the arrays; '' if none does.
 
     Attributes
     ----------
     write
-        Returns a message, given its stamp in [ns], and for each array a number for each joint.
-        All arrays but the first may be empty; empty is also their default.
+        Returns a message from its stamp in [ns] and, for each array, a number per joint. All
+        arrays but the first may be empty, which is their default.
 
     """
 
@@ -384,23 +384,23 @@ class ArrayWriter:
 
     def call(self, numbers: Mapping[str, str], name: str = 'pack') -> Lines:
         """
-        Return an expression for a message, of ``seconds``, ``nanoseconds`` and numbers.
+        Return an expression for a message from ``seconds``, ``nanoseconds`` and numbers.
 
         Parameters
         ----------
         numbers
-            By the names of the arrays that are not empty, their numbers as expressions, separated
-            by commas.
+            Expressions of the numbers, separated by commas, by name of each array that is not
+            empty.
         name
-            The names in it that are bound begin with this.
+            Prefix of the names bound in the expression.
 
         """
         (joints,) = self._names.values()
         values = dict.fromkeys((self._arrays[array] for array in numbers), (0.0,) * len(joints))
         within = {self._within: [values]} if self._within else values
         message = packed(self._fields, {**self._names, **within})
-        found = parsed(message, self._fields)
-        places = found[self._within][0] if self._within else found
+        places_by_name = parsed(message, self._fields)
+        places = places_by_name[self._within][0] if self._within else places_by_name
         pack, constants = packing(
             message, [(places[field].first, f'{len(joints)}d') for field in values]
         )

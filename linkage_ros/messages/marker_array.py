@@ -14,10 +14,10 @@
 
 
 """
-MarkerArray messages as bytes (CDR): packed once; each next message changes only what moves.
+Serialize MarkerArray messages; after the first, only moving markers are changed in the bytes.
 
-``visualization_msgs/msg/MarkerArray`` is what RViz and Foxglove draw. Of its fields those stay
-empty that hold textures, meshes and colours of single points.
+``visualization_msgs/msg/MarkerArray`` is the message that RViz and Foxglove draw. Its fields for
+textures, meshes and per-point colours stay empty.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ Place = tuple[float, float, float]
 
 class Marker(NamedTuple):
     """
-    A marker as it is packed.
+    A marker before serialization.
 
     Attributes
     ----------
@@ -54,19 +54,19 @@ class Marker(NamedTuple):
     kind
         Its type.
     scale
-        Widths and lengths of its kind, in [m].
+        Widths and lengths, depending on its type, in [m].
     colour
         Its colour.
     points
-        In its own frame.
+        Points in its own frame, in [m].
     at, z
-        Where its frame's origin is, in [m].
+        Origin of its frame, in [m].
     text
         The text, of a text marker.
     action
         `ADD` or `DELETE`.
     lifetime
-        After which it goes if it does not come again, in [ns]; 0 for never.
+        Time after which it disappears without an update, in [ns]; 0 for never.
 
     """
 
@@ -103,7 +103,7 @@ MARKER_ARRAY = declared(
 
 
 def _values(frame: str, marker: Marker) -> dict[str, Any]:
-    """Return the fields of a marker that are neither zero nor empty."""
+    """Return the fields of a marker that are not zero or empty."""
     return {
         'frame_id': frame,
         'ns': marker.ns,
@@ -121,16 +121,16 @@ def _values(frame: str, marker: Marker) -> dict[str, Any]:
 
 class MarkerArrayWriter:
     """
-    Writes the same markers again and again.
+    Writes the same markers repeatedly.
 
-    What is changed stays so until it is changed again.
+    A change holds until the next change.
 
     Parameters
     ----------
     frame
-        In which all of them stand.
+        Frame of all markers.
     markers
-        The markers, in their order.
+        The markers, in order.
 
     """
 
@@ -145,14 +145,14 @@ class MarkerArrayWriter:
         ]
 
     def message(self, stamp: int) -> bytes:
-        """Return the message of a state at a time in [ns]."""
+        """Return the message for a time, in [ns]."""
         time = divmod(stamp, NANOSECONDS)
         for where in self._where:
             _STAMP.pack_into(self._buffer, where['stamp'], *time)
         return bytes(self._buffer)
 
     def show(self, number: int, shown: bool) -> None:
-        """Add a marker, or delete it."""
+        """Show or delete a marker."""
         _COUNT.pack_into(self._buffer, self._where[number]['action'], ADD if shown else DELETE)
 
     def place(self, number: int, place: complex, angle: float) -> None:

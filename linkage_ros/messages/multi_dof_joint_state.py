@@ -14,11 +14,11 @@
 
 
 """
-MultiDOFJointState messages with wrenches alone, as bytes (CDR).
+Write MultiDOFJointState messages with wrenches only.
 
-``sensor_msgs/msg/MultiDOFJointState`` is the message of common_interfaces that says what several
-joints carry at one instant. Its fields: stamp, frame_id, joint_names[], transforms[], twist[],
-wrench[]; of a wrench: force (x, y, z), torque (x, y, z). An array that does not apply stays empty.
+``sensor_msgs/msg/MultiDOFJointState`` is the message of common_interfaces for the wrenches of
+several joints at one instant. Its fields: stamp, frame_id, joint_names[], transforms[], twist[],
+wrench[]; of a wrench: force (x, y, z), torque (x, y, z). Arrays without values stay empty.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ MULTI_DOF_JOINT_STATE = declared(
 
 class PlanarWrenchWriter:
     """
-    Writes messages for the same joints again and again.
+    Writes messages for a fixed list of joints.
 
     Parameters
     ----------
     names
-        The joints, in the order in which they are published.
+        The joints, in the order of the message.
 
     """
 
@@ -50,7 +50,7 @@ class PlanarWrenchWriter:
         values = {'joint_names': names, 'wrench': [(0.0,) * 6] * len(names)}
         message = packed(MULTI_DOF_JOINT_STATE, values)
         wrenches = parsed(message, MULTI_DOF_JOINT_STATE)['wrench']
-        # Of each wrench force z and torque x, y are zeros, which stand between the moving numbers.
+        # Force z and torque x, y of a wrench are zeros between the changing numbers.
         self._pack, self._constants = packing(message, [(wrenches.first, 'dd24xd' * len(names))])
 
     def write(self, stamp: int, wrenches: Sequence[tuple[float, float, float]]) -> bytes:

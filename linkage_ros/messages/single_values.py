@@ -23,7 +23,7 @@ _PACK_TIME, (_ENCAPSULATION,) = packing(packed(declared('Time time'), {}), ())
 _STRING = declared('string data')
 
 TIME_END = 2**31 * NANOSECONDS
-"""No stamp of a message is as late as this, in [ns]."""
+"""Upper bound of message stamps (exclusive), in [ns]."""
 
 
 def time_message(time: int) -> bytes:

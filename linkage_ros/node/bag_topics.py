@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A bag's topics and the graph: how a bag describes a topic, and a bag's topics published."""
+"""Describe topics for a bag, and publish a bag's topics on the ROS graph."""
 
 from __future__ import annotations
 
@@ -57,19 +57,19 @@ _SEPARATOR = f'\n{"=" * 80}\n'
 
 def message_type(name: str, key: str) -> Any:
     """
-    Return the class of a message; it is imported here, so that only what is called for is.
+    Return the class of a message type; imports it only here, when the scene asks for it.
 
     Parameters
     ----------
     name
         package/msg/Type.
     key
-        Of the scene, that calls for it.
+        Key of the scene that asks for it.
 
     Raises
     ------
     LinkageError
-        Where its package is not installed.
+        The package of the type is not installed.
 
     """
     package, _, kind = name.split('/')
@@ -94,12 +94,12 @@ def bag_topic(name: str, message_type: Any, qos: QoSProfile) -> Topic:
     message_type
         The message's class.
     qos
-        What is offered on the topic.
+        QoS offered on the topic.
 
     Raises
     ------
     RecordingError
-        Where the message's definition is not installed.
+        The definition of the message is not installed.
 
     """
     package, _, kind = message_type.__module__.split('.')[0], None, message_type.__name__
@@ -113,11 +113,11 @@ def bag_topic(name: str, message_type: Any, qos: QoSProfile) -> Topic:
 
 
 def _collect(package: str, kind: str, texts: dict[str, str]) -> None:
-    """Collect the text of a type and, behind it, of all that it needs."""
+    """Collect the text of a type and, after it, those of all types that it contains."""
     if f'{package}/{kind}' in texts:
         return
     text = texts[f'{package}/{kind}'] = _share(package, f'{kind}.msg').read_text('utf-8')
-    # In the order of their full names, as rosbag2 has them.
+    # Sorted by full name, as rosbag2 does.
     for needed in sorted(name if '/' in name else f'{package}/{name}' for name in _types(text)):
         needed_package, _, needed_kind = needed.rpartition('/')
         _collect(needed_package, needed_kind, texts)
@@ -151,7 +151,7 @@ def _qos(profile: QoSProfile) -> QosProfile:
         depth=profile.depth,
         reliability=profile.reliability.name.lower(),
         durability=profile.durability.name.lower(),
-        # Of rclpy's own profiles these are 0, which stands for no limit and for automatic.
+        # In rclpy's own profiles these are 0, which stands for no limit and for automatic.
         deadline=profile.deadline.nanoseconds or INFINITE,
         lifespan=profile.lifespan.nanoseconds or INFINITE,
         liveliness=profile.liveliness.name.lower() if profile.liveliness else 'automatic',
@@ -168,7 +168,7 @@ def offer(
     node: Node, topics: Collection[Topic], left_out: Callable[[LinkageError], None]
 ) -> dict[str, Publisher]:
     """
-    Offer a bag's topics on the graph.
+    Create a publisher for each topic of a bag.
 
     Parameters
     ----------
@@ -177,12 +177,12 @@ def offer(
     topics
         The topics.
     left_out
-        Takes why a topic cannot be offered.
+        Called with the reason if a topic cannot be published.
 
     Returns
     -------
     publishers : dict of str to Publisher
-        By the names in the bag.
+        By topic name in the bag.
 
     """
     publishers = {}
@@ -196,10 +196,10 @@ def offer(
 
 def offered(qos: QosProfile) -> QoSProfile:
     """
-    Return what is offered where this was recorded.
+    Return the QoS to offer for a topic that was recorded with this one.
 
-    Deadline, lifespan and liveliness are promises about the recorded publisher's life, which
-    playing at another rate would break.
+    Deadline, lifespan and liveliness are left out: they are promises about the recorded publisher,
+    which a playback at another rate would break.
     """
     return QoSProfile(
         history=HistoryPolicy.KEEP_ALL if qos.history == 'keep_all' else HistoryPolicy.KEEP_LAST,
@@ -218,12 +218,12 @@ def offered(qos: QosProfile) -> QoSProfile:
 
 
 def _publisher(node: Node, topic: Topic) -> Publisher:
-    """Return what publishes a topic; raises LinkageError where that cannot be."""
+    """Return a publisher for a topic; raise LinkageError if there can be none."""
     kind = _class_of(topic)
     unfit = LinkageError(
         quoted(topic.name)[1:-1] or "''", 'is no name of a ROS 2 topic', 'convert the bag'
     )
-    if '\0' in topic.name:  # rclpy would publish on what stands before it
+    if '\0' in topic.name:  # rclpy would publish on the part before it
         raise unfit
     try:
         return node.create_publisher(kind, topic.name, offered(topic.qos))
@@ -238,7 +238,7 @@ def _class_of(topic: Topic) -> Any:
     Raises
     ------
     LinkageError
-        There is none, or it is not what was recorded.
+        The type is not installed, or differs from the recorded one.
 
     """
     matched = _TYPE.fullmatch(topic.type)
@@ -249,19 +249,19 @@ def _class_of(topic: Topic) -> Any:
             'convert the bag',
         )
     package, kind = matched.groups()
-    # A bag comes from anywhere: nothing is imported by a name in it that is no message package.
+    # A bag is untrusted: a name in it must not import anything but a message package.
     if not any((folder / 'msg' / f'{kind}.idl').is_file() for folder in share_folders(package)):
         raise LinkageError(
             topic.name, f'{topic.type} is not installed', f'install the ROS package {package}'
         )
-    found = message_type(topic.type, topic.name)
+    message_class = message_type(topic.type, topic.name)
     installed = ''
     with suppress(LinkageError):
-        installed = bag_topic(topic.name, found, QoSProfile(depth=1)).type_hash
+        installed = bag_topic(topic.name, message_class, QoSProfile(depth=1)).type_hash
     if topic.type_hash and installed and topic.type_hash != installed:
         raise LinkageError(
             topic.name,
             f'{topic.type} was another when it was recorded',
             f'install the ROS package {package} of that time',
         )
-    return found
+    return message_class

@@ -13,14 +13,19 @@
 # limitations under the License.
 
 """
-A PD controller of one joint, for demos and tests: plain rclpy, as a user's own would be.
+Nodes for demos and tests, in plain rclpy, as a user would write them.
 
-It hears where the joint is on ``joint_states`` and commands its effort on ``crank_commands``::
+`PDController` reads the position of one joint from ``joint_states`` and commands its effort on
+``crank_commands``::
 
     τ = kp·(r − q) + kd·(ṙ − q̇)        r(t) = target + swing·sin(2π·t/period)
 
-It knows nothing of weight and friction: where they pull, it stands off its target by what kp needs
-to hold against them. Where it hears nothing it commands nothing.
+It has no model of weight and friction: under load it stays off its target by the error at which kp
+balances the load. Without joint states it publishes no command.
+
+`CrankSource` publishes angle and rate of one joint as ``sensor_msgs/JointState`` on
+``crank_states``. The speed varies about its mean, as in a machine whose load varies with the
+angle: angle(t) = start + speed·t + (ripple·speed/2π)·sin(2πt).
 """
 
 from __future__ import annotations
@@ -45,11 +50,9 @@ from rclpy.qos import qos_profile_sensor_data
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
-# What the small nodes have in common that run beside the linkage's own, for demos and tests.
-
 
 class DemoNode(Node):
-    """A node whose parameters are numbers within bounds, and the name of a joint."""
+    """A node whose parameters are bounded numbers and a joint name."""
 
     def joint(self) -> str:
         """Declare and return the name of the joint."""
@@ -59,7 +62,7 @@ class DemoNode(Node):
     def number(
         self, name: str, default: float, description: str, least: float, most: float
     ) -> float:
-        """Declare and return a number; rclpy itself refuses one that is out of bounds."""
+        """Declare a numeric parameter and return its value; rclpy refuses one out of bounds."""
         bounds = FloatingPointRange(from_value=least, to_value=most)
         descriptor = ParameterDescriptor(
             description=description, read_only=True, floating_point_range=[bounds]
@@ -74,16 +77,16 @@ def run_demo_node(
     name: str, make: Callable[[], AnyNode], run: Callable[[AnyNode, Event], None], stop: Event
 ) -> int:
     """
-    Run a node of its own process, and return the exit code.
+    Run a demo node in this process, and return the exit code.
 
     Parameters
     ----------
     name
-        What messages call it.
+        Name of the node in messages.
     make
-        Makes the node.
+        Creates the node.
     run
-        Runs it until the event.
+        Runs the node until the event is set.
     stop
         Ends the run.
 
@@ -92,7 +95,7 @@ def run_demo_node(
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = make()
-    except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
+    except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
         print(f'{name}: {str(error).splitlines()[0]}; see the README', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
@@ -105,7 +108,7 @@ def run_demo_node(
 
 _LOOK = 0.1
 _OLDEST = 0.1
-"""A state that came longer ago is none, in [s]."""
+"""Greatest age of a joint state that is still used, in [s]."""
 
 
 class PDController(DemoNode):
@@ -126,18 +129,18 @@ class PDController(DemoNode):
         self._state = (0.0, 0.0)
         self._heard = -inf
         self._begun = self.get_clock().now()
-        # Reliable, for whoever listens, and no more than the newest, since it alone counts.
+        # Reliable, for any subscriber; depth 1, since only the newest command matters.
         self._publisher = self.create_publisher(JointState, 'crank_commands', 1)
         self.create_subscription(JointState, 'joint_states', self._hear, 10)
         self.create_timer(1.0 / rate, self._command)
         ClockGuard(self._time_source)
 
     def _hear(self, message: JointState) -> None:
-        """Keep position and rate of the joint."""
+        """Store position and rate of the joint."""
         if self._joint not in message.name:
             return
         place = message.name.index(self._joint)
-        # An array without values is an empty one.
+        # Array fields without values are empty, not None.
         if place < min(len(message.position), len(message.velocity)):
             self._state = message.position[place], message.velocity[place]
             self._heard = monotonic()
@@ -158,7 +161,7 @@ class PDController(DemoNode):
         self._publisher.publish(message)
 
     def run(self, stop: Event) -> None:
-        """Control until the event, or for the time that was set."""
+        """Control until the event is set, or for the configured time."""
         executor = SingleThreadedExecutor()
         executor.add_node(self)
         end = monotonic() + (self._seconds or inf)
@@ -168,19 +171,12 @@ class PDController(DemoNode):
 
 
 def run_pd_controller(stop: Event) -> int:
-    """Control until the event, or for the time that was set, and return the exit code."""
+    """Control until the event is set, or for the configured time, and return the exit code."""
     return run_demo_node('pd_controller', PDController, PDController.run, stop)
 
 
-# A crank that turns, for demos and tests.
-#
-# It publishes angle and rate of one joint as ``sensor_msgs/JointState`` on ``crank_states``. The
-# speed swings about its mean, as that of a machine under a load that varies with the angle does:
-# angle(t) = start + speed·t + (ripple·speed/2π)·sin(2πt).
-
-
 class CrankSource(DemoNode):
-    """Publishes a turning crank."""
+    """Publishes the angle of a turning crank."""
 
     def __init__(self) -> None:
         super().__init__('crank_source')
@@ -196,7 +192,7 @@ class CrankSource(DemoNode):
         )
 
     def run(self, stop: Event) -> None:
-        """Publish until the event, or for the time that was set."""
+        """Publish until the event is set, or for the configured time."""
         period = NANOSECONDS / self._rate
         swing = self._ripple * self._speed
         begin = monotonic_ns()
@@ -216,5 +212,5 @@ class CrankSource(DemoNode):
 
 
 def run_crank_source(stop: Event) -> int:
-    """Publish a turning crank until the event, and return the exit code."""
+    """Publish a turning crank until the event is set, and return the exit code."""
     return run_demo_node('crank_source', CrankSource, CrankSource.run, stop)

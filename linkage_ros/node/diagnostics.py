@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What the node says of its health: ``diagnostic_msgs/DiagnosticArray``, once a period."""
+"""Diagnostics of the node: ``diagnostic_msgs/DiagnosticArray``, once a period."""
 
 from __future__ import annotations
 
@@ -46,19 +46,19 @@ OK, WARN, ERROR, STALE = (
 _RATE_TOLERANCE = 0.1
 
 CLOCK_PATIENCE = 2.0
-"""For how long ``/clock`` may be silent, in [s] of the machine."""
+"""How long ``/clock`` may be silent without a warning, in [s] of the steady clock."""
 
 _NEARNESS = {
     'transmission_angle': 'Transmission angle (rad)',
     'conditioning': 'Conditioning',
     'toggle_distance': 'Input to the nearest toggle ({unit})',
 }
-"""What is told of `Closure.singularity_margin`, and as what."""
+"""Attributes of `Closure.singularity_margin` in the diagnostics, with their keys."""
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Counts at one instant, of which two make a window."""
+    """Counts at one instant; two snapshots delimit a window."""
 
     time: int = 0
     ticks: int = 0
@@ -87,7 +87,7 @@ class Snapshot:
 @dataclass(frozen=True, slots=True)
 class DiagnosticsSummary:
     """
-    All that the diagnostics tell.
+    Data for all diagnostic statuses.
 
     Attributes
     ----------
@@ -96,31 +96,31 @@ class DiagnosticsSummary:
     scene
         Name of the scene.
     rate
-        Ticks wanted a second; 0 for one for every sample.
+        Wanted ticks per second, in [Hz]; 0 for one tick per sample.
     clock
-        Time by the node's clock, in [ns].
+        Time of the node's clock, in [ns].
     crank_topic
-        Resolved name of the topic that the drives listen to; '' for none.
+        Resolved name of the drives' topic; '' for none.
     publishers
-        Who else publishes on it.
+        Other publishers on that topic.
     loop
-        The tick.
+        The tick loop.
     before, now
-        Its counts at the beginning and the end of the window.
+        Counts of the tick at the start and at the end of the window.
     recording_failure
-        Why there is no recording although one was wanted; '' where there is none to tell.
+        Reason why a wanted recording does not run; '' otherwise.
     limits
-        For each attribute of the nearness to trouble below what it is warned of; 0 for never.
+        Warning threshold for each attribute of `Nearness`; 0 for never.
     snapshots
-        The memory of the last seconds; nothing where a bag is written as the run goes.
+        Memory of the last seconds; None when a bag is recorded continuously.
     clock_silence
-        For how long ``/clock`` has been silent, in [s]; 0 where the node does not follow it.
+        Time since the last ``/clock`` message, in [s]; 0 where the node does not use it.
     clock_refused
-        How many of its messages held no time.
+        Number of ``/clock`` messages without a valid time.
     crank_shared
-        Whether the crank's topic is for other joints, too: then it may have several publishers.
+        Whether other joints share the crank's topic: it may then have several publishers.
     system
-        What of middleware and operating system bears on the ticks.
+        Settings of middleware and operating system that affect the ticks.
 
     """
 
@@ -161,7 +161,7 @@ class DiagnosticsSummary:
             level, message = WARN, f'{actual:.1f} ticks a second, {self.rate:g} wanted'
         elif lost:
             level, message = WARN, f'{lost} ticks lost'
-        # The keys of diagnostic_updater's FrequencyStatus, then our own.
+        # The keys of diagnostic_updater's FrequencyStatus come first.
         values: dict[str, object] = {
             'Events in window': ticks,
             'Events since startup': self.loop.counts.ticks,
@@ -191,7 +191,7 @@ class DiagnosticsSummary:
         return self._status('tick', level, message, values)
 
     def _lost_time(self) -> dict[str, object]:
-        """Return the time that drives which integrate could not follow, and left out."""
+        """Return the time that integrating drives skipped because they could not keep up."""
         lines = self.loop.pipeline.lines
         drives = [line.drive for line in lines]
         lost = [drive.lost for drive in drives if hasattr(drive, 'lost')]
@@ -293,7 +293,7 @@ class DiagnosticsSummary:
     def _nearness(
         self, posed: Sequence[tuple[LinkagePipeline, Position]]
     ) -> tuple[dict[str, str], str]:
-        """Return how near trouble the linkage is that is nearest, and what there is to warn."""
+        """Return the singularity measures of the worst linkage, and the warning text."""
         nearness = [(line, line.closure.singularity_margin(position)) for line, position in posed]
         inputs = [driven for line, _ in posed for driven in line.member.linkage.inputs]
         unit = ' or '.join(sorted({_unit(driven) for driven in inputs}))
@@ -388,12 +388,12 @@ class DiagnosticsSummary:
 
 
 def no_clock(silence: float) -> str:
-    """Return that ``/clock`` has been silent for a time, in [s]."""
+    """Return the text for a ``/clock`` that has been silent for a time, in [s]."""
     return 'No /clock yet' if silence == inf else f'No /clock for {silence:.1f} s'
 
 
 def _shares(looks: Sequence[tuple[LinkagePipeline, LinkageTick]]) -> tuple[dict[str, str], str]:
-    """Return what of its limits each joint takes at the last tick, and what is too much."""
+    """Return the share of its limits that each joint used at the last tick, and the excess."""
     values, warnings = {}, []
     for line, look in looks:
         for name, (rate, effort) in _exertions(line, look).items():
@@ -412,7 +412,7 @@ def _shares(looks: Sequence[tuple[LinkagePipeline, LinkageTick]]) -> tuple[dict[
 
 
 def _inputs(line: LinkagePipeline, look: LinkageTick) -> dict[str, str]:
-    """Return the inputs of the only linkage."""
+    """Return the inputs of a linkage, as diagnostic values."""
     angles = look.crank.angles if look.crank is not None else ()
     return {
         f'Input {driven.joint} ({_unit(driven)})': f'{angle:.6f}'
@@ -425,20 +425,20 @@ def _exertions(
 ) -> dict[str, tuple[float | None, float | None]]:
     """Return rate and effort of the joints that have limits, as far as they are known."""
     linkage, reading = line.member.linkage, look.reading
-    found: dict[str, tuple[float | None, float | None]] = {}
+    exertions: dict[str, tuple[float | None, float | None]] = {}
     if reading is not None:
         for number, name in enumerate(linkage.joints):
-            # Rates and efforts are of all joints, or of none; of those that are driven no others.
+            # A reading has rates, and efforts, for all of its joints or for none.
             rate = reading.rates[number] if reading.rates else None
-            found[name] = rate, reading.efforts[number] if reading.efforts else None
+            exertions[name] = rate, reading.efforts[number] if reading.efforts else None
     driven = look.crank.rates if look.crank is not None else ()
     for given, rate in zip(linkage.inputs, driven, strict=False):
-        found[given.joint] = rate, found.get(given.joint, (None, None))[1]
-    return {name: of for name, of in found.items() if name in linkage.limits}
+        exertions[given.joint] = rate, exertions.get(given.joint, (None, None))[1]
+    return {name: of for name, of in exertions.items() if name in linkage.limits}
 
 
 def _of(line: LinkagePipeline) -> str:
-    """Return which linkage it is, where there are several."""
+    """Return the name of the linkage for a message, if there are several."""
     return f' ({line.member.name})' if line.member.name else ''
 
 

@@ -26,8 +26,8 @@ from linkage_ros.signals import stop_on_signals, StoppedError
 
 def main() -> int:
     """Run the node and return the exit code."""
-    # First of all, and before the second that rclpy takes to load: a signal at any moment is
-    # heeded.
+    # Before anything else, since rclpy takes a second to load: signals must be handled from the
+    # start.
     stop = stop_on_signals()
     try:
         with missing_packages_reported():
@@ -37,7 +37,7 @@ def main() -> int:
         print(f'linkage_node: {error}', file=sys.stderr)
         return 2
     except StoppedError:
-        return 0  # as a signal ends a node at any other moment
+        return 0  # as for a signal at any other time
 
 
 if __name__ == '__main__':

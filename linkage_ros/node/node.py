@@ -15,8 +15,8 @@
 """
 The node: crank samples in, joint states of the dependent joints out.
 
-A lifecycle node. The tick has a thread of its own (`tick_loop`); what is here runs on the
-executor: transitions, services, parameters, diagnostics, and all that is logged.
+A lifecycle node. The tick runs on a thread of its own (`tick_loop`). This module runs on the
+executor: transitions, services, parameters, diagnostics, and all logging.
 """
 
 from __future__ import annotations
@@ -61,20 +61,18 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
-# A service whose answer comes when it is known, without an executor that waits for it.
-
 
 class DeferredResponse:
     """
-    Lets the callback of a service return before it knows the answer.
+    Defers the answer of a service, so that its callback returns before the answer is known.
 
-    A callback that is a coroutine would do so too, but rclpy's executor then asks it again and
-    again, and each of its rounds costs as much as five ticks.
+    A coroutine as callback would do so too, but then rclpy's executor polls it continuously, and
+    each round of the executor costs as much as five ticks.
 
     Parameters
     ----------
     service
-        The service, an rclpy ``Service``; one answer at a time is late.
+        The service, an rclpy ``Service``; at most one answer can be pending.
 
     """
 
@@ -85,12 +83,12 @@ class DeferredResponse:
         service.send_response = self._send_or_keep
 
     def defer(self, response: Any) -> Any:
-        """Return the response, to be returned by the callback, which is not sent yet."""
+        """Return the response for the callback to return; it is not sent yet."""
         self._late = response
         return response
 
     def answer(self, success: bool, message: str) -> None:
-        """Send the response that was deferred; on the executor's thread, or when it has ended."""
+        """Send the deferred response; call it on the executor's thread or after its end."""
         response, self._late = self._late, None
         response.success, response.message = success, message
         self._send(response, self._to)
@@ -111,13 +109,13 @@ Transition = Callable[['LinkageNode', LifecycleState], TransitionCallbackReturn]
 
 
 def _reporting(transition: Transition) -> Transition:
-    """Log what a transition raises: rclpy would swallow it."""
+    """Log an exception that a transition raises; rclpy would hide it."""
 
     @wraps(transition)
     def reported(node: LinkageNode, state: LifecycleState) -> TransitionCallbackReturn:
         try:
             return transition(node, state)
-        except Exception as error:  # noqa: BLE001 (whatever it is, rclpy would hide it)
+        except Exception as error:  # noqa: BLE001 (rclpy would hide any of them)
             node.get_logger().error(f'{transition.__name__}: {type(error).__name__}: {error}')
             return TransitionCallbackReturn.ERROR
 
@@ -131,12 +129,12 @@ class LinkageNode(LifecycleNode):
         super().__init__('linkage_node', **options)
         declare_parameters(self)
         self.failure: LinkageError | None = None
-        """Why the node could not be configured."""
+        """Reason why the node could not be configured."""
         self.recording = RunRecording(self.get_logger())
         self.scene: Scene | None = None
         self._closures: list[Closure] = []
         self.loop: TickLoop | None = None
-        """The tick of this run, or of the last; nothing before the first."""
+        """Tick loop of this run, or of the last one; None before the first."""
 
         overridable = QoSOverridingOptions.with_default_policies()
         self._joint_states = self.create_publisher(
@@ -156,7 +154,7 @@ class LinkageNode(LifecycleNode):
             self.create_service(Trigger, '~/snapshot', self._on_snapshot)
         )
         self._snapshot_written = self.create_guard_condition(self.recording.collect)
-        # Not by the node's clock, which stands still where the simulation does.
+        # On the steady clock: the node's clock stops when the simulation does.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_WATCH_PERIOD, self._watch, clock=steady)
         change = self._service_change_state
@@ -176,14 +174,14 @@ class LinkageNode(LifecycleNode):
 
     @property
     def crank_topic(self) -> str:
-        """Return the resolved name of the topic that the drives listen to; '' for none."""
+        """Return the resolved name of the topic of the drives; '' for none."""
         return self._scene_topics.crank_topic
 
     # Transitions.
 
     @_reporting
     def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
-        """Load the scene and prove that it can be built."""
+        """Load the scene and check that it can be built."""
         file = self.get_parameter('scene').value
         try:
             if not file:
@@ -191,11 +189,11 @@ class LinkageNode(LifecycleNode):
                     'parameter scene', "'' names no file", 'start with --ros-args -p scene:=FILE'
                 )
             scene = load_scene(file)
-            pipeline = Pipeline(scene)  # what it calls for is proven now, not at the first tick
+            pipeline = Pipeline(scene)  # fails here if it cannot be built, not at the first tick
             self._scene_topics.connect(pipeline)
             for closure in pipeline.closures:
-                # Found before the first tick, which would wait for it: iterated links are followed
-                # there.
+                # Computed here, so that the first tick does not wait: the branch of an iterated
+                # linkage is followed at this point.
                 _ = closure.singular_inputs
             if scene.robot_description:
                 self._scene_topics.describe(scene, pipeline)
@@ -214,12 +212,12 @@ class LinkageNode(LifecycleNode):
 
     @_reporting
     def on_activate(self, _: LifecycleState) -> TransitionCallbackReturn:
-        """Start to tick, and to record where the scene says so."""
+        """Start ticking, and recording if the scene says so."""
         assert self.scene is not None
         self.loop = self._build_loop(self.scene)
-        self._warnings = Warnings(self.get_logger())  # as new as the counts that it compares
+        self._warnings = Warnings(self.get_logger())  # starts with the counts that it compares
         while (take := self._scene_topics.take) is not None and take() is not None:
-            pass  # what came before this moment is not of this run
+            pass  # discard messages from before this run
         self._activated = time.monotonic_ns()
         self._before = Snapshot.of(self.loop.counts, self._activated)
         if self.scene.record is not None:
@@ -254,7 +252,7 @@ class LinkageNode(LifecycleNode):
 
     @_reporting
     def on_shutdown(self, _: LifecycleState) -> TransitionCallbackReturn:
-        """End, from any state."""
+        """End the run, from any state."""
         self.end()
         return TransitionCallbackReturn.SUCCESS
 
@@ -278,7 +276,7 @@ class LinkageNode(LifecycleNode):
             own_joint_states(scene) if shared else None,
             [extra.handle.publish_raw for extra in self._scene_topics.extras],
             self._scene_topics.publish_change,
-            # A queue without bounds is taken from for as long as a tick may.
+            # An unbounded queue: only the time of a tick limits how many messages it takes.
             depth=(crank.qos_profile.depth if crank is not None else 0) or maxsize,
         )
 
@@ -288,13 +286,13 @@ class LinkageNode(LifecycleNode):
             return pacing.on_clock(self.context, self._simulation, rate)
         if rate:
             return pacing.steady(rate)
-        assert self._scene_topics.crank is not None  # without samples a scene has a rate
+        assert self._scene_topics.crank is not None  # a scene without samples has a rate
         clock = self.get_clock()
         now = (lambda: int(clock.now().nanoseconds)) if simulated else time.time_ns
         return pacing.on_samples(self.context, self._scene_topics.crank, now)
 
     def end(self) -> None:
-        """Stop ticking and close the bag; where nothing runs, do nothing."""
+        """Stop ticking and close the bag; do nothing if nothing runs."""
         if self.loop is not None and self.loop.running:
             self.loop.stop()
             self._diagnose()
@@ -311,7 +309,7 @@ class LinkageNode(LifecycleNode):
         )
 
     def _bag_topics(self) -> list[tuple[str, Topic]]:
-        """Describe what is recorded, in the order of the handles."""
+        """Describe the recorded topics, in the order of their handles."""
         assert self.loop is not None
         handles, states = self.loop.topics, self._joint_states
         joint_states = bag_topic(states.topic_name, JointState, states.qos_profile)
@@ -328,7 +326,7 @@ class LinkageNode(LifecycleNode):
     def _on_change_state(
         self, change: Callable[[Any, Any], Any], request: Any, response: Any
     ) -> Any:
-        """Answer where rclpy raises: to a transition that the state does not have."""
+        """Answer a request for a transition that the state does not have; rclpy would raise."""
         try:
             return change(request, response)
         except RCLError as error:
@@ -379,8 +377,8 @@ class LinkageNode(LifecycleNode):
         return self._snapshot_answers.defer(response)
 
     def _wake(self) -> None:
-        """Have the executor collect a snapshot; from the thread that has written it."""
-        with suppress(InvalidHandle):  # a disk may answer when the node is gone
+        """Make the executor collect a snapshot; called on the thread that has written it."""
+        with suppress(InvalidHandle):  # the write may finish after the node is destroyed
             self._snapshot_written.trigger()
 
     def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
@@ -396,13 +394,13 @@ class LinkageNode(LifecycleNode):
         return SetParametersResult(successful=True)
 
     def report(self, failure: str) -> None:
-        """Warn of a call that failed, once in a while."""
+        """Log a warning about a call that failed, at a limited rate."""
         self._warnings.say('failure', failure, self.get_parameter('warning_period').value)
 
-    # Watching.
+    # Monitoring.
 
     def _watch(self) -> None:
-        """Log what the tick has counted, and publish the diagnostics when they are due."""
+        """Log the counts of the tick, and publish the diagnostics when they are due."""
         loop = self.loop
         if loop is None or not loop.running:
             return
@@ -415,7 +413,7 @@ class LinkageNode(LifecycleNode):
         while self._real_time.refused:
             self.get_logger().warning(self._real_time.refused.pop(0))
         listening = [line.member for line in loop.pipeline.lines if line.topic]
-        # Where /clock does not come, no message has been looked for.
+        # Without /clock messages no tick has taken crank messages yet.
         assert self.scene is not None
         if listening and (loop.counts.ticks or not self.scene.rate):
             inputs = [name for member in listening for name in member.inputs]
@@ -433,7 +431,8 @@ class LinkageNode(LifecycleNode):
         publishers = self._crank_publishers()
         several = len(publishers) > 1
         self.loop.several_publishers |= several
-        # Where messages come without the crank, others share the topic, and no one can tell.
+        # If messages come without the crank's joints, other publishers share the topic, and it is
+        # unknown which publisher sends the crank.
         shared = self.crank_topic == self._joint_states.topic_name or self.loop.counts.ignored
         if several and not shared:
             self._warnings.say(
@@ -474,7 +473,7 @@ class LinkageNode(LifecycleNode):
             )
 
     def _crank_publishers(self) -> list[str]:
-        """Return who else publishes on the drives' topic."""
+        """Return the other publishers on the drives' topic."""
         names = [
             f'{info.node_namespace.rstrip("/")}/{info.node_name}'
             for info in self._scene_topics.crank_publishers
@@ -483,7 +482,7 @@ class LinkageNode(LifecycleNode):
         return [name for name in names if name != self.get_fully_qualified_name()]
 
     def _clock_silence(self) -> float:
-        """Return for how long ``/clock`` has been silent, in [s]; 0 where it does not count."""
+        """Return the time since the last ``/clock`` message, in [s]; 0 if unused."""
         if not self.get_parameter('use_sim_time').value:
             return 0.0
         heard = self._clock_guard.heard

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a tick loop waits for: the time, a crank sample, or the simulation's clock."""
+"""Pacing of the tick loop: by time, by crank samples, or by the simulation's clock."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 CATCH_UP = 20_000_000
-"""How far ticks may lag, in [ns], and all still be made up for; beyond it they are lost."""
+"""Lag up to which late ticks still run, in [ns]; beyond it they are lost."""
 
 _FINE = 20_000_000
-"""The last part of a wait, in [ns], that is slept through whole; before it a stop is heeded."""
+"""Last part of a wait, in [ns], that cannot be interrupted; a stop is checked before it."""
 
 _LONGEST_WAIT = 100_000_000
-"""How long a wait for a message may last, in [ns], before a stop is heeded."""
+"""Longest wait for a message, in [ns], between two checks for a stop."""
 
 
 def steady(rate: float) -> Pace:
     """
     Tick at a rate, in [Hz], on the steady clock, stamped with the system's time.
 
-    Ticks are due at whole multiples of the period from the start, so that a late one does not
-    shift those that follow.
+    Ticks are due at whole multiples of the period after the start, so a late tick does not shift
+    the next ones.
     """
     period = NANOSECONDS / rate
 
@@ -77,16 +77,16 @@ def steady(rate: float) -> Pace:
 
 def on_samples(context: Context, subscription: Subscription, now: Callable[[], int]) -> Pace:
     """
-    Tick once for every crank sample, stamped as the sample is.
+    Tick once for every crank sample, with the stamp of the sample.
 
     Parameters
     ----------
     context
         The node's context.
     subscription
-        The crank's.
+        Subscription to the crank's topic.
     now
-        Returns the time by which stamps are judged, in [ns].
+        Returns the time against which stamps are checked, in [ns].
 
     """
 
@@ -101,7 +101,7 @@ def on_samples(context: Context, subscription: Subscription, now: Callable[[], i
 
 def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
     """
-    Tick at a rate, in [Hz], of the simulation's time, at most once for every ``/clock`` message.
+    Tick at a rate, in [Hz], of simulated time, at most once per ``/clock`` message.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
     clock
         Subscription to ``/clock``.
     rate
-        Ticks a second of simulated time.
+        Ticks per second of simulated time.
 
     """
     period = round(NANOSECONDS / rate)
@@ -122,7 +122,7 @@ def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
 
         def read() -> int:
             nonlocal newest
-            # The queue is one message deep, so that what is taken is the newest.
+            # The queue has depth 1, so the message taken is the newest.
             taken = clock.handle.take_message(ClockMessage, False)
             now = None if taken is None else nanoseconds_of(taken[0])
             newest = newest if now is None else now
@@ -144,8 +144,8 @@ def on_clock(context: Context, clock: Subscription, rate: float) -> Pace:
 
 
 def _waiter(context: Context, subscription: Subscription) -> Callable[[], bool]:
-    """Return a function that waits for a message and tells whether one has come."""
-    # As rclpy.wait_for_message does it; an executor would cost more than the tick.
+    """Return a function that waits for a message and returns whether one has arrived."""
+    # Like rclpy.wait_for_message; an executor would cost more than the tick.
     wait_set = _rclpy.WaitSet(1, 0, 0, 0, 0, 0, context.handle)
 
     def wait() -> bool:

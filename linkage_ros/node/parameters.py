@@ -39,7 +39,7 @@ _LIMITS = {
 
 
 def declare_parameters(node: Node) -> None:
-    """Declare the parameters of the linkage node; rclpy itself refuses what is out of bounds."""
+    """Declare the parameters of the linkage node; rclpy refuses values out of bounds."""
     for name, default, description in (
         ('scene', '', 'Path of the scene file'),
         ('runs_directory', '', "Folder of the bags; '' for the scene's own"),
@@ -101,7 +101,7 @@ def _declare_real_time(node: Node) -> None:
     )
     node.declare_parameter(
         'cpu_affinity',
-        Parameter.Type.INTEGER_ARRAY,  # of an empty list rclpy would not know of what
+        Parameter.Type.INTEGER_ARRAY,  # rclpy cannot infer the type of an empty list
         ParameterDescriptor(
             type=ParameterType.PARAMETER_INTEGER_ARRAY,
             description='Numbers of the processors that may run the tick; not set: all',
@@ -120,5 +120,5 @@ def _declare_real_time(node: Node) -> None:
 
 
 def nearness_limits(node: Node) -> dict[str, float]:
-    """Return below what each measure of the nearness to trouble is warned of."""
+    """Return the warning threshold of each singularity measure."""
     return {name.removeprefix('warn.'): float(node.get_parameter(name).value) for name in _LIMITS}

@@ -14,11 +14,11 @@
 
 
 """
-A bag's messages, read before they are due and sent at their times.
+Read the messages of a bag ahead of time, and send each when it is due.
 
-The time of the bag runs on the steady clock from the first message on, at a rate. Each message is
-due at a time that follows from its log time alone, so that a late one delays no other. The clock
-for ``/clock`` ticks on the same thread: it never is ahead of a message that has not been sent.
+Bag time runs on the steady clock from the first message on, at the playback rate. The due time of
+a message depends on its log time alone, so a late message delays no other. The same thread
+publishes ``/clock``, so the clock is never ahead of a message that has not been sent.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from linkage_ros.errors import LinkageError
 _BATCH = 256
 _BATCH_SIZE = 2**20
 _BATCHES = 8
-"""How many batches of how many messages, or bytes, are read ahead."""
+"""Limits of reading ahead: batches, and messages and bytes per batch."""
 
 _LOOK = 0.1
 
@@ -48,11 +48,11 @@ class Part(NamedTuple):
     Attributes
     ----------
     first, last
-        Log times between which messages are played, in [ns].
+        Range of log times to play, in [ns].
     topics
-        Their topics.
+        Topics to play.
     loop
-        Whether it begins again at its end.
+        Whether to start again at the end.
 
     """
 
@@ -64,12 +64,12 @@ class Part(NamedTuple):
 
 class QueuedMessage(NamedTuple):
     """
-    A message and its time.
+    A message and its time in the playback.
 
     Attributes
     ----------
     base
-        Duration of the passes before this one, in [ns] of the bag's time.
+        Duration of the passes before this one, in [ns] of bag time.
     log_time
         In [ns].
     topic, data
@@ -85,14 +85,14 @@ class QueuedMessage(NamedTuple):
 
 def playback_queue(order: LogTimeOrder, part: Part) -> Iterator[QueuedMessage]:
     """
-    Yield the messages that are played.
+    Yield the messages to play.
 
     Raises
     ------
     BagError
-        The bag is damaged; what lies before the damage has been given by then.
+        The bag is damaged; the messages before the damage have been yielded by then.
     LinkageError
-        A loop would take no time.
+        The part to loop has no duration.
 
     """
     base = 0
@@ -117,10 +117,10 @@ def read_ahead(
     messages: Iterator[QueuedMessage], stop: Event
 ) -> Generator[QueuedMessage, None, None]:
     """
-    Yield messages that a thread of its own has read before they are asked for, until the event.
+    Read messages on another thread, and yield them, until the event is set.
 
-    It reads some batches ahead and no further. What is raised while reading is raised here, behind
-    the messages that were read before.
+    The thread reads a few batches ahead at most. An exception raised while reading is raised here,
+    after the messages that were read before it.
     """
     batches: Queue[list[QueuedMessage] | Exception] = Queue(_BATCHES)
     ended = Event()
@@ -146,7 +146,7 @@ def read_ahead(
                     if not hand_over(batch):
                         return
                     batch, size = [], 0
-        except Exception as raised:  # noqa: BLE001 (it goes to who reads)
+        except Exception as raised:  # noqa: BLE001 (raised again for the caller)
             error = raised
         if batch and not hand_over(batch):
             return
@@ -166,39 +166,39 @@ def read_ahead(
                 return
             yield from batch
     finally:
-        # The reader is not waited for: what it passes over on its way to a start may be long.
+        # The reader thread is not joined: skipping to the start of the part may take long.
         ended.set()
 
 
 LATE = 10_000_000
-"""How long after it was due a message is sent that counts as late, in [ns]."""
+"""Delay after the due time beyond which a sent message counts as late, in [ns]."""
 
 _FINE = 20_000_000
-"""The last part of a wait, in [ns], that is slept through whole; before it a stop is heeded."""
+"""Last part of a wait, in [ns], that cannot be interrupted; a stop is checked before it."""
 
-_LONGEST_WAIT = 60.0  # [s]; `Event.wait` does not take any number
+_LONGEST_WAIT = 60.0  # [s]; `Event.wait` has an upper limit
 _TOLD_EVERY = 250_000_000
 
 
 class Steady(Protocol):
-    """A clock that never jumps, and waits."""
+    """A monotonic clock that can wait."""
 
     def now(self) -> int:
         """Return the time, in [ns]."""
 
     def wait_until(self, due: int) -> bool:
-        """Wait until a time, in [ns]; return whether it was stopped."""
+        """Wait until a time, in [ns]; return whether the playback was stopped."""
 
 
 class SteadyClock:
-    """The machine's steady clock, until an event."""
+    """The steady clock of the machine; an event stops its waits."""
 
     def __init__(self, stop: Event) -> None:
         self._stop = stop
         self.now = monotonic_ns
 
     def wait_until(self, due: int) -> bool:
-        """Wait until a time, in [ns]; return whether it was stopped."""
+        """Wait until a time, in [ns]; return whether the playback was stopped."""
         while (left := due - monotonic_ns()) > _FINE:
             if self._stop.wait(min((left - _FINE) * 1e-9, _LONGEST_WAIT)):
                 return True
@@ -208,7 +208,7 @@ class SteadyClock:
 
 
 class Ticks(NamedTuple):
-    """A clock that tells the bag's time: its period, in [ns], and what takes the time."""
+    """Publication of bag time on ``/clock``: the period, in [ns], and the publishing function."""
 
     period: float
     publish: Callable[[int], None]
@@ -216,35 +216,35 @@ class Ticks(NamedTuple):
 
 class Playback:
     """
-    Sends messages at their times, and counts them.
+    Sends messages when they are due, and counts them.
 
     Parameters
     ----------
     first
-        Log time with which it begins, in [ns].
+        Log time of the start, in [ns].
     rate
-        Seconds of the bag a second.
+        Seconds of bag time per second.
     publish
-        Of each topic what publishes a message.
+        Function that publishes a message, for each topic.
     steady
-        By which it goes.
+        The clock for due times.
     ticks
         Publish the bag's time; None if ``/clock`` is not wanted.
     told
-        Takes the log time, in [ns], now and then.
+        Progress callback; receives the log time, in [ns], now and then.
 
     Attributes
     ----------
     counts
-        Of each topic how many messages were sent.
+        Messages sent, for each topic.
     late
-        How many of them later than they were due, by more than `LATE`.
+        Messages sent later than due by more than `LATE`.
     latest
-        The most that one was late, in [ns].
+        Greatest delay of a message, in [ns].
     played
-        How much of the bag was played, in [ns] of its time.
+        Bag time played, in [ns].
     took
-        How long that took, in [ns].
+        Duration of the playback, in [ns].
 
     """
 
@@ -267,7 +267,7 @@ class Playback:
         self.late = self.latest = self.played = self.took = 0
 
     def run(self, cues: Iterable[QueuedMessage]) -> None:
-        """Send the messages, to their end or until the clock says that it was stopped."""
+        """Send the messages, until there are no more or the clock reports a stop."""
         steady, counts = self._steady, self.counts
         begun: int | None = None
         last_base = number = 0
@@ -282,7 +282,7 @@ class Playback:
                 if steady.wait_until(round(tick)):
                     return
                 at = round((tick - begun) * self._rate)
-                # Rounding must not lead to before the beginning of a pass.
+                # Rounding must not give a time before the start of a pass.
                 self._ticks.publish(self._first + max(0, at - base))
                 number += 1
                 tick = begun + number * self._ticks.period
@@ -300,5 +300,5 @@ class Playback:
                 self._told(log_time)
                 tell = now + _TOLD_EVERY
         if self._ticks and begun is not None:
-            # So that who lives by it comes to the end of the bag too.
+            # So that nodes on simulated time also reach the end of the bag.
             self._ticks.publish(self._first + self.played - last_base)

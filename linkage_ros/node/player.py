@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A bag on the graph: a node that plays it."""
+"""Publish the messages of a bag on the ROS graph."""
 
 from __future__ import annotations
 
@@ -50,25 +50,25 @@ CLOCK = '/clock'
 _SWITCH_INTERVAL = 1e-4
 _LOOK = 0.05
 _ACQUAINTANCE = 0.3
-"""How long who listens may take to know of a publisher that knows of it already, in [s]."""
+"""Time that a subscriber may take to match a publisher that has matched it, in [s]."""
 
 _DELIVERY = 1.0
-"""How long at the end is waited for those that have not confirmed the last messages, in [s]."""
+"""Longest wait at the end for subscribers to confirm the last messages, in [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wishes:
     """
-    How a bag shall be played.
+    Options of a playback.
 
     Parameters
     ----------
     rate
-        Seconds of the bag a second.
+        Seconds of bag time per second.
     clock
-        How often a second ``/clock`` is published; 0 for never.
+        Rate of ``/clock``, in [Hz]; 0 for never.
     wait
-        How long is waited for somebody who listens to one of the topics, in [s].
+        Longest wait for a subscriber to one of the topics, in [s].
 
     """
 
@@ -80,20 +80,20 @@ class Wishes:
 @contextmanager
 def player_node(arguments: Sequence[str]) -> Iterator[Node]:
     """
-    Have a node to play with.
+    Create a node for playback, within a context.
 
     Parameters
     ----------
     arguments
-        Command line with ``--ros-args``, without the program's name.
+        Command-line arguments with ``--ros-args``, without the program's name.
 
     Raises
     ------
     LinkageError
-        There is no ROS, or it does not understand the arguments.
+        ROS is not installed, or does not accept the arguments.
 
     """
-    # As for the tick: a message would wait for the thread that reads ahead.
+    # As for the tick: else a message would wait for the thread that reads ahead.
     sys.setswitchinterval(_SWITCH_INTERVAL)
     leave_out_shared_memory()
     try:
@@ -101,7 +101,7 @@ def player_node(arguments: Sequence[str]) -> Iterator[Node]:
             args=['linkage_player', *arguments], signal_handler_options=SignalHandlerOptions.NO
         )
         node = Node('linkage_player', start_parameter_services=False)
-    except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
+    except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
         rclpy.try_shutdown()
         reason = ' '.join(str(error).strip().splitlines()[:1]) or type(error).__name__
         raise LinkageError('--ros-args', reason, 'see the README') from None
@@ -123,41 +123,41 @@ def play(
     told: Callable[[int], None],
 ) -> tuple[Playback, LinkageError | None]:
     """
-    Publish messages until their end, or the event.
+    Publish messages until there are no more or the event is set.
 
     Parameters
     ----------
     node
         The node.
     publishers
-        Of each topic that is played.
+        Publisher of each played topic.
     order
-        The bag's messages.
+        Messages of the bag, in order of log time.
     part
-        Which of them.
+        Part of the bag to play.
     wishes
-        How.
+        Options.
     stop
-        Ends it.
+        Stops the playback.
     told
-        Takes the log time, in [ns], now and then.
+        Progress callback; receives the log time, in [ns], now and then.
 
     Returns
     -------
     playback : Playback
-        What was played.
+        Counts of the playback.
     error : LinkageError or None
-        What ended it early; where the bag is damaged, for example.
+        Reason for an early end, for example a damaged bag; None without one.
 
     Raises
     ------
     LinkageError
-        ``/clock`` cannot tell the bag's times.
+        ``/clock`` cannot represent the times of the bag.
 
     """
     ticks = None
     if wishes.clock:
-        _clock_message(part.first)  # whether it can be told is found before anything is sent
+        _clock_message(part.first)  # checks the time before anything is sent
         publish = node.create_publisher(Clock, CLOCK, 10).publish
         ticks = Ticks(NANOSECONDS / wishes.clock, lambda time: publish(_clock_message(time)))
     if wishes.wait:
@@ -182,7 +182,7 @@ def play(
 
 
 def _clock_message(time: int) -> bytes:
-    """Return a ``rosgraph_msgs/msg/Clock``, whose one field is a time."""
+    """Return a serialized ``rosgraph_msgs/msg/Clock``, whose only field is a time."""
     if not 0 <= time < TIME_END:
         raise LinkageError(
             '--clock', f'{time} ns is beyond the times of messages', 'play it without --clock'
@@ -191,7 +191,7 @@ def _clock_message(time: int) -> bytes:
 
 
 def _wait_for_listener(publishers: Collection[Publisher], stop: Event, seconds: float) -> None:
-    """Wait until somebody listens to one of these, for so many seconds at most."""
+    """Wait until one of the publishers has a subscriber, for at most so many seconds."""
     deadline = monotonic() + seconds
     while monotonic() < deadline and not stop.is_set():
         if any(publisher.get_subscription_count() for publisher in publishers):
@@ -201,7 +201,7 @@ def _wait_for_listener(publishers: Collection[Publisher], stop: Event, seconds: 
 
 
 def _see_delivered(publishers: Collection[Publisher]) -> None:
-    """Give the last reliable messages the time to come to those who listen."""
+    """Wait until the last reliable messages have reached the subscribers."""
     deadline = monotonic() + _DELIVERY
     for publisher in publishers:
         left = max(0.0, deadline - monotonic())

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-What a run asks of the operating system for its ticks: priority, processors, memory that stays.
+Real-time settings of the tick: priority, processors, locked memory.
 
-All of it is asked for by the thread that ticks, but the memory, which is the process's. What the
-system refuses is told, and the ticks go on without it.
+The tick's own thread requests them, except locked memory, which belongs to the process. A refused
+request is reported, and the ticks go on without it.
 """
 
 from __future__ import annotations
@@ -43,20 +43,20 @@ _ALLOW = 'allow it in /etc/security/limits.d (USER - {limit}) and log in anew'
 @dataclass(slots=True)
 class RealTime:
     """
-    What is asked for, and what has come of it.
+    Requested real-time settings, and their outcome.
 
     Attributes
     ----------
     priority
         Priority under SCHED_FIFO, 1 to 99; 0 for none.
     processors
-        Numbers of those that may run the tick; none for all.
+        Numbers of the processors that may run the tick; () for all.
     lock
-        Whether the memory of the process shall stay in the machine's.
+        Whether to lock the memory of the process into RAM.
     in_force
-        For each that was asked for what the system says of it now; written by who asks.
+        Setting that the system reports, for each request; written by the requesting thread.
     refused
-        A line for each that the system has refused, with what helps.
+        One line for each refused request, with a remedy.
 
     """
 
@@ -67,10 +67,10 @@ class RealTime:
     refused: list[str] = field(default_factory=list)
 
     def lock_memory(self) -> None:
-        """Keep the memory of the process in that of the machine, where that is asked for."""
+        """Lock the memory of the process into RAM, if requested."""
         if not self.lock:
             return
-        # With a limit, what is allocated later would fail: Python would end in the middle.
+        # Under a limit later allocations would fail, and Python would abort.
         most = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
         if most != resource.RLIM_INFINITY and not _may_lock():
             remedy = _ALLOW.format(limit='memlock unlimited')
@@ -83,7 +83,7 @@ class RealTime:
         self.in_force['Locked memory'] = _status('VmLck')
 
     def paced(self, pace: Pace) -> Pace:
-        """Return a pace that first asks for what the thread needs which runs it."""
+        """Wrap a pace so that its thread first requests the settings."""
 
         def asking(loop: TickLoop, stopping: Event) -> None:
             self.refused += [*self._ask()]
@@ -92,9 +92,9 @@ class RealTime:
         return asking if self.priority or self.processors else pace
 
     def _ask(self) -> Iterator[str]:
-        """Ask for the calling thread; yield a line for each that is refused."""
+        """Make the requests for the calling thread; yield a line for each refused one."""
         if self.processors:
-            with suppress(OSError, ValueError, OverflowError):  # no such processor
+            with suppress(OSError, ValueError, OverflowError):  # such a processor may not exist
                 os.sched_setaffinity(0, self.processors)
             has = sorted(os.sched_getaffinity(0))
             if has != sorted(set(self.processors)):
@@ -119,6 +119,6 @@ def _may_lock() -> bool:
 
 
 def _status(key: str) -> str:
-    """Return what the kernel says of this process."""
+    """Return a value of this process from the kernel's status file."""
     lines = Path('/proc/self/status').read_text().splitlines()
     return next(line.split(':')[1].strip() for line in lines if line.startswith(f'{key}:'))

@@ -44,17 +44,17 @@ EXIT_OK, EXIT_INCOMPLETE, EXIT_CONFIGURATION = 0, 1, 2
 _SWITCH_INTERVAL = 1e-4
 _LOOK = 0.1
 _AFTER_FAILURE = 0.01
-"""How long the executor rests, in [s], lest it does nothing but fail."""
+"""Pause of the executor after a failure, in [s], so that it does not fail continuously."""
 
 
 class View(Protocol):
-    """Shows a run as it goes."""
+    """Displays a run while it goes on."""
 
     def show(self, node: LinkageNode) -> None:
-        """Show the node as it is now; called ten times a second, beside its executor."""
+        """Show the current state of the node; called ten times a second on another thread."""
 
     def close(self) -> None:
-        """Leave the screen to others; called before the node ends its run."""
+        """Release the screen; called before the node ends its run."""
 
 
 def run_linkage_node(
@@ -67,7 +67,7 @@ def run_linkage_node(
     at_end: Callable[[LinkageNode], None] | None = None,
 ) -> int:
     """
-    Run the linkage node until the event, or for a time.
+    Run the linkage node until the event is set, or for a time.
 
     Parameters
     ----------
@@ -76,28 +76,27 @@ def run_linkage_node(
     arguments
         Command line with ``--ros-args``, without the program's name.
     overrides
-        Parameters of the node, beside those of the command line.
+        Parameters of the node, in addition to those of the command line.
     seconds
-        How long the run lasts, in [s].
+        Duration of the run, in [s].
     view
-        What shows it.
+        Displays the run.
     at_end
-        Called when the run has ended and its bag is closed.
+        Called after the run has ended and its bag is closed.
 
     Returns
     -------
     code : int
-        0; 1 where the recording failed or the tick ended early; 2 for a configuration that is
-        wrong.
+        0; 1 if the recording failed or the tick ended early; 2 if the configuration is wrong.
 
     Raises
     ------
     StoppedError
-        A signal came before the node was configured.
+        A signal arrived before the node was configured.
 
     """
-    # The tick shares the interpreter with executor and recorder: at the default of 5 ms it would
-    # wait for them that long.
+    # The tick shares the interpreter with executor and recorder: at the default switch interval it
+    # would wait 5 ms for them.
     sys.setswitchinterval(_SWITCH_INTERVAL)
     leave_out_shared_memory()
     try:
@@ -106,7 +105,7 @@ def run_linkage_node(
         )
         given = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
         node = LinkageNode(parameter_overrides=given)
-    except Exception as error:  # noqa: BLE001 (rcl's errors have no common root)
+    except Exception as error:  # noqa: BLE001 (rcl's errors have no common base class)
         print(f'linkage_node: {_first_line(error)}; see the README', file=sys.stderr)
         rclpy.try_shutdown()
         return EXIT_CONFIGURATION
@@ -134,11 +133,11 @@ def _spin(
     deadline: float,
     view: View | None,
 ) -> int:
-    """Start the node unless it is told not to, and see it through."""
+    """Start the node, unless told otherwise, and run it to its end."""
     autostart = node.get_parameter('autostart').value
     if autostart:
         with raising():
-            if stop.is_set():  # by a signal that came before
+            if stop.is_set():  # by an earlier signal
                 raise StoppedError
             node.trigger_configure()
         if node.failure is not None:
@@ -146,17 +145,18 @@ def _spin(
     with _no_garbage_in_ticks():
         if autostart and node.trigger_activate() != TransitionCallbackReturn.SUCCESS:
             return EXIT_INCOMPLETE
-        gc.freeze()  # what was built for the ticks, too
+        gc.freeze()  # includes the objects built for the ticks
         return _attend(node, executor, stop, deadline, view)
 
 
 @contextmanager
 def _no_garbage_in_ticks() -> Iterator[None]:
     """
-    Leave Python's search for cycles of objects to who calls `gc.collect`.
+    Disable Python's automatic cyclic garbage collection; explicit `gc.collect` calls replace it.
 
-    A tick makes no cycles, but with a hundred linkages so many objects that they would be searched
-    in every tick. What is there before the first is left out for good: that search takes 10 ms.
+    A tick makes no cycles, but with a hundred linkages it makes enough objects to trigger a
+    collection in every tick. Objects that exist before the first tick are frozen: to search them
+    takes 10 ms.
     """
     gc.collect()
     gc.freeze()
@@ -175,9 +175,9 @@ def _attend(
     deadline: float,
     view: View | None,
 ) -> int:
-    """Spin until the end, and end the node's run."""
-    # The executor waits without a timeout, which no signal would end. So it has a thread of its
-    # own, and polls for nothing: each of its rounds costs as much as five ticks.
+    """Spin until the end, and end the run of the node."""
+    # The executor waits without a timeout, which no signal would interrupt. So it has its own
+    # thread and does not poll: each of its rounds costs as much as five ticks.
     ended = Event()
     serving = Thread(target=_serve, args=(node, executor, ended), name='executor', daemon=True)
     serving.start()
@@ -188,8 +188,8 @@ def _attend(
         if node.loop is not None and node.loop.failure:
             break
     served = serving.is_alive()
-    # To shut the executor down while it waits is a race that it can lose, and then waits for ever.
-    # The node's watch wakes it, several times a second.
+    # A shutdown of the executor while it waits is a race: if lost, it waits forever. The node's
+    # watch timer wakes it several times a second.
     ended.set()
     serving.join()
     if view is not None:
@@ -199,8 +199,8 @@ def _attend(
 
 
 def _serve(node: LinkageNode, executor: SingleThreadedExecutor, ended: Event) -> None:
-    # rclpy raises here what a service raises, as its own do for a parameter of no known type: what
-    # somebody asks for must not end the node, nor show a traceback.
+    # rclpy raises here what a service callback raises; its own services raise for a parameter of
+    # unknown type. A client's request must neither end the node nor show a traceback.
     while not ended.is_set():
         try:
             executor.spin_once()

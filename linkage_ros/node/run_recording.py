@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The bags of a run: where they go, what they say of themselves, and how they went."""
+"""The bags of a run: their folder, their description of the run, and their outcome."""
 
 from __future__ import annotations
 
@@ -56,38 +56,38 @@ from linkage_ros.scene.scene import RecordParameters, Scene
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _DEFAULT = RecordParameters(directory='runs', name='', queue=20_000)
-"""How a run is recorded that a service asks for where the scene says nothing."""
+"""Recording settings for a service call if the scene has none."""
 
 
 EXTRA = 'extra'
-"""The key of a topic of which there may be several."""
+"""Key of the auxiliary topics, of which there may be several."""
 
 DESCRIPTION = 'description_topic'
-"""The key of the topic of the robot model."""
+"""Key of the robot model's topic."""
 
 
 class RunRecording:
     """
-    Starts and stops the bags of a node, or its memory of the last seconds, and keeps account.
+    Starts and stops the bags of a node, or its memory of the last seconds, and reports on them.
 
     Parameters
     ----------
     logger
-        Where it says what it does.
+        Logger for its messages.
 
     """
 
     def __init__(self, logger: RcutilsLogger) -> None:
         self._logger = logger
         self.ended: list[RecordingSummary] = []
-        """The recordings that have ended, and the snapshots."""
+        """Summaries of finished recordings and snapshots."""
         self.memories: list[MemorySummary] = []
-        """The memories that have ended."""
+        """Summaries of finished memories."""
         self.failure = ''
-        """Why a recording is not whole, or could not be started; '' while all are."""
+        """Reason why a recording is incomplete or could not be started; '' otherwise."""
         self._seen: tuple[RecordingError, bool] | None = None
         self.snapshots: RunSnapshots | None = None
-        """The memory; nothing where a bag is written as the run goes."""
+        """The memory; None when a bag is recorded continuously."""
 
     def start(
         self,
@@ -98,26 +98,26 @@ class RunRecording:
         description: bytes = b'',
     ) -> str:
         """
-        Start a bag that explains itself, or a memory; return what came of it, as one line.
+        Start a bag that describes its own run, or a memory; return the outcome, as one line.
 
         Parameters
         ----------
         scene
-            What is run; its files go into the bag.
+            The scene that runs; the bag gets its files.
         loop
-            The tick, which from here on hands over what it takes and publishes.
+            The tick loop, which from now on passes on the messages that it takes and publishes.
         directory
-            Where the bag's folder is made; '' for where the scene says.
+            Parent of the bag's folder; '' for the folder that the scene names.
         topics
-            Returns what will be recorded, in the order of their handles, each with the
-            key under which the bag's account of the run names it; that of several names a list.
+            Returns the topics to record, in the order of their handles, each with its key in the
+            run's account in the bag; topics with the same key form a list.
         description
-            The message of the topic `DESCRIPTION`, with which each file begins; empty for none.
+            Robot model message (topic `DESCRIPTION`) that begins each file; empty for none.
 
         """
         record = scene.record or _DEFAULT
         storage = record.storage
-        # What a running tick remembers is not in the bag: a replay has to know.
+        # The bag lacks what a running tick remembers: a replay has to know that.
         with_the_run = not loop.running
 
         def new_bag(whole: bool) -> BagWriter:
@@ -132,14 +132,14 @@ class RunRecording:
             return BagWriter(folder, [t for _, t in described], files, storage, opening)
 
         try:
-            # Who calls a service does not know in which folder this process runs.
+            # The client of a service does not know the working directory of this process.
             runs = Path(directory or record.directory).absolute()
             described = topics()
             if storage.snapshot_seconds:
-                compression_type(storage.compression, runs)  # not found out at the first snapshot
+                compression_type(storage.compression, runs)  # fails now, not at the first snapshot
                 return self._remember(loop, storage, [t for _, t in described], new_bag)
             writer = new_bag(True)
-        except (RecordingError, FileNotFoundError) as error:  # the folder we run in may be gone
+        except (RecordingError, FileNotFoundError) as error:  # no working directory any more
             self.failure = f'not recording: {error}'
             self._logger.error(self.failure)
             return self.failure
@@ -151,7 +151,7 @@ class RunRecording:
         return line
 
     def describe(self, loop: TickLoop) -> str:
-        """Return what is being done, in words; '' for nothing."""
+        """Return the state of the recording as text; '' for none."""
         if self.snapshots is not None:
             return str(self.snapshots)
         if loop.recorder is None:
@@ -160,11 +160,11 @@ class RunRecording:
         return f'recording to {loop.recorder.folder}{waits}'
 
     def has_ended(self, loop: TickLoop) -> bool:
-        """Return whether a bag has failed for good and is still there to be accounted for."""
+        """Return whether a bag has failed for good and is not reported on yet."""
         return self.snapshots is None and loop.recorder is not None and loop.recorder.ended
 
     def snapshot(self, answer: Answer, wake: Callable[[], None]) -> str:
-        """Begin to write what is in memory; as `RunSnapshots.begin`."""
+        """Begin to write the memory to a bag; as `RunSnapshots.begin`."""
         if self.snapshots is None:
             return (
                 'nothing is kept in memory; write record.snapshot_seconds in the scene, or call '
@@ -173,7 +173,7 @@ class RunRecording:
         return self.snapshots.begin(answer, wake)
 
     def collect(self) -> None:
-        """Account and answer for a snapshot that has been written, if there is one."""
+        """Finish a snapshot that has been written, if any: log it and send the answer."""
         outcome = self.snapshots.collect() if self.snapshots is not None else None
         if outcome is None:
             return
@@ -186,7 +186,7 @@ class RunRecording:
             self._logger.info(outcome.line)
 
     def look(self, loop: TickLoop) -> bool:
-        """Say that the recording has failed, or goes on again; return whether there was news."""
+        """Log that the recording has failed, or goes on again; return whether it logged."""
         recorder = loop.recorder
         if recorder is None or recorder.failure is None:
             return False
@@ -205,7 +205,7 @@ class RunRecording:
         return True
 
     def stop(self, loop: TickLoop) -> tuple[bool, str]:
-        """Close the bag or end the memory; return whether all went well, and a line."""
+        """Close the bag or end the memory; return whether it is complete, and one line of text."""
         if loop.recorder is None:
             return False, 'not recording'
         recorder, loop.recorder = loop.recorder, None
@@ -232,7 +232,7 @@ class RunRecording:
     ) -> str:
         memory = SnapshotMemory(topics, storage.snapshot_seconds, storage.snapshot_bytes)
         self.snapshots = RunSnapshots(memory, new_bag)
-        # To a tick it is a recorder: it offers, and looks at nothing else.
+        # The tick sees a recorder: it only uses `offer`.
         loop.recorder = cast('Recorder', memory)
         line = str(self.snapshots)
         self._logger.info(line)
@@ -262,7 +262,7 @@ def _attachments(
         'extra_topics': [topic.name for key, topic in topics if key == EXTRA],
         BEGUN: begun,
         SEED: scene.seed,
-        # A replay must not choose again.
+        # A replay must use the same solver.
         **({CHOSEN: chosen} if (chosen := _chosen(lines)) else {}),
         **({OWN_EFFECTS: own} if (own := own_effects_here(scene)) else {}),
         'linkage_ros': __version__,
@@ -276,7 +276,7 @@ def _attachments(
 
 
 def _chosen(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str, float]]]:
-    """Return by the name of each linkage the solver that was chosen, where one was."""
+    """Return the chosen solver of each linkage that has one, by name of the linkage."""
     return {
         line.member.name: {line.choice.solver: line.choice.parameters}
         for line in lines
@@ -285,7 +285,7 @@ def _chosen(lines: Sequence[LinkagePipeline]) -> dict[str, dict[str, Mapping[str
 
 
 def _folder(directory: Path, name: str, scene: str) -> Path:
-    """Return where a bag goes: one that exists keeps its name, and this one gets a number."""
+    """Return a folder for a bag that does not exist yet, by adding a number if needed."""
     name = name or f'{scene}_{datetime.now().astimezone():%Y-%m-%d_%H-%M-%S}'
     folder, number = directory / name, 1
     while lexists(folder):

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The last seconds of a run in memory, the bags that are made of them, and what came of it all."""
+"""The memory of the last seconds of a run, the snapshots taken of it, and their outcome."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.errors import RecordingError
 
 Answer = Callable[[bool, str], None]
-"""Takes whether something went well, and what came of it, as one line."""
+"""Takes whether the call succeeded, and the outcome as one line."""
 
 
 @dataclass(frozen=True, slots=True)
 class SnapshotOutcome:
     """
-    What came of a snapshot.
+    The outcome of a snapshot.
 
     Attributes
     ----------
     bag
-        What was written; None where no bag could be made.
+        Summary of the written bag; None where no bag could be made.
     failure
-        Why it is not whole; '' where it is.
+        Reason why it is incomplete; '' if it is complete.
     line
-        All of it, as one line.
+        The outcome as one line.
 
     """
 
@@ -54,16 +54,16 @@ class SnapshotOutcome:
 @dataclass(frozen=True, slots=True)
 class MemorySummary:
     """
-    What a run came to of which the last seconds were kept in memory.
+    Summary of a run whose last seconds were kept in memory.
 
     Attributes
     ----------
     topics
-        Counts for each topic; what was kept to the end is gone now.
+        Counts for each topic; messages that were kept to the end are gone now.
     snapshots
-        How many there are, in words.
+        Number of snapshots, as text.
     failure
-        Why the memory has ended early, or lacks messages; '' if it is whole.
+        Reason why the memory has ended early, or lacks messages; '' if it is complete.
 
     """
 
@@ -83,31 +83,31 @@ class MemorySummary:
 
 class RunSnapshots:
     """
-    A memory, and the snapshots of it.
+    A memory and its snapshots.
 
     Parameters
     ----------
     memory
-        To which the tick offers.
+        The memory that the tick offers to.
     new_bag
-        Makes a bag, given whether the memory reaches back to its beginning.
+        Makes a bag, given whether the memory reaches back to the start of the run.
 
     """
 
     def __init__(self, memory: SnapshotMemory, new_bag: Callable[[bool], BagWriter]) -> None:
         self.memory = memory
         self.written = self.failed = 0
-        """How many there are; one that was written in part has failed."""
+        """Number of written snapshots; a partly written one counts as failed."""
         self.last = ''
-        """The folder of the last one that was written."""
+        """Folder of the last written snapshot."""
         self.failure = ''
-        """Why the last one failed; '' if it did not."""
+        """Reason why the last snapshot failed; '' if it did not."""
         self._new_bag = new_bag
         self._writing: SnapshotWriting | None = None
         self._answer: Answer
 
     def __str__(self) -> str:
-        """Return what is being done, in words."""
+        """Return the state of the memory as text."""
         seconds = self.memory.seconds
         return f'keeping the last {seconds:g} s in memory; ~/snapshot writes them'
 
@@ -118,7 +118,7 @@ class RunSnapshots:
 
     @property
     def count(self) -> str:
-        """Return how many snapshots there are, in words."""
+        """Return the number of snapshots as text."""
         if not self.written and not self.failed:
             return 'no snapshot was asked for: nothing was written'
         written = f'{self.written} snapshot{"s" * (self.written != 1)} written'
@@ -126,19 +126,19 @@ class RunSnapshots:
 
     def begin(self, answer: Answer, wake: Callable[[], None]) -> str:
         """
-        Begin to write what is in memory into a new bag, on a thread of its own.
+        Begin to write the memory to a new bag, on another thread.
 
         Parameters
         ----------
         answer
-            Will be called by `collect` with what came of it.
+            Called by `collect` with the outcome.
         wake
-            Called on that thread when there is something to collect.
+            Called on the writing thread when the outcome is ready.
 
         Returns
         -------
         str
-            Why it is not begun, as one line; '' if it is.
+            Reason why it is not begun, as one line; '' if it is begun.
 
         """
         if self._writing is not None:
@@ -154,7 +154,7 @@ class RunSnapshots:
         return ''
 
     def collect(self) -> SnapshotOutcome | None:
-        """Answer for the snapshot that has been written; if there is none, return None."""
+        """Send the answer for a written snapshot, and return its outcome, or None."""
         writing = self._writing
         if writing is None or writing.outcome is None:
             return None
@@ -170,12 +170,12 @@ class RunSnapshots:
         return outcome
 
     def wait(self) -> None:
-        """Wait for the snapshot that is being written, if there is one, so that it is there."""
+        """Wait until the current snapshot, if any, is written."""
         if self._writing is not None:
             self._writing.outcome = self._writing.wait()
 
     def end(self) -> MemorySummary:
-        """Forget what is in memory, and say what became of it all."""
+        """End the memory, and return its summary."""
         topics, failure = self.memory.stop(), self.memory.failure
         where = 'the memory of the last seconds'
         failure_text = str(failure) if failure else losses_text(where, topics)
@@ -183,7 +183,7 @@ class RunSnapshots:
 
 
 def counts_text(summary: RecordingSummary) -> str:
-    """Return what became of a recording's messages, in words."""
+    """Return the counts of a recording's messages as text."""
     return ', '.join(
         f'{t.name} {t.recorded} recorded {t.dropped} dropped'
         + (f' {t.let_go} let go' if t.let_go else '')
@@ -192,7 +192,7 @@ def counts_text(summary: RecordingSummary) -> str:
 
 
 def losses_text(where: object, topics: Sequence[TopicCounts] | Sequence[KeptCounts]) -> str:
-    """Return in a line how many messages were dropped there; '' for none."""
+    """Return the number of dropped messages as one line; '' for none."""
     dropped = sum(topic.dropped for topic in topics)
     if not dropped:
         return ''
@@ -203,12 +203,12 @@ def losses_text(where: object, topics: Sequence[TopicCounts] | Sequence[KeptCoun
     )
 
 
-def _outcome(found: RecordingSummary | RecordingError, seconds: float) -> SnapshotOutcome:
-    if isinstance(found, RecordingError):
-        return SnapshotOutcome(None, str(found), f'no snapshot: {found}; the memory goes on')
-    counts = counts_text(found)
-    if found.failure:
-        line = f'snapshot incomplete: {found.failure}: {counts}; the memory goes on'
-        return SnapshotOutcome(found, found.failure, line)
-    line = f'the last {seconds:.3f} s recorded to {found.folder}: {counts}'
-    return SnapshotOutcome(found, '', line)
+def _outcome(result: RecordingSummary | RecordingError, seconds: float) -> SnapshotOutcome:
+    if isinstance(result, RecordingError):
+        return SnapshotOutcome(None, str(result), f'no snapshot: {result}; the memory goes on')
+    counts = counts_text(result)
+    if result.failure:
+        line = f'snapshot incomplete: {result.failure}: {counts}; the memory goes on'
+        return SnapshotOutcome(result, result.failure, line)
+    line = f'the last {seconds:.3f} s recorded to {result.folder}: {counts}'
+    return SnapshotOutcome(result, '', line)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a scene has on the graph beside its joint states: the topics and services it calls for."""
+"""Topics and services that a scene asks for, in addition to the joint states."""
 
 from __future__ import annotations
 
@@ -43,30 +43,30 @@ if TYPE_CHECKING:
     from linkage_ros.faults.injection import Change
 
 CRANK_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Sensor data, but deeper: at a slow tick every sample still gets into the bag."""
+"""Sensor data QoS with a deeper queue: even at a slow tick every sample gets into the bag."""
 
 OUTPUT_QOS = QoSProfile(depth=10)
-"""Reliable, volatile, as robot_state_publisher and RViz take it."""
+"""Reliable and volatile, as robot_state_publisher and RViz expect."""
 
 _DESCRIPTION_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""As robot_state_publisher and RViz take a robot model, at whatever time they start."""
+"""As robot_state_publisher and RViz expect of a robot model, whenever they start."""
 
 _CHANGES_QOS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""One who joins later has to know which faults are on."""
+"""A late subscriber has to know which faults are on."""
 
 Inject = Callable[[str, SetBool.Request, SetBool.Response], SetBool.Response]
 
 
 class SceneTopics:
     """
-    Made when a scene is configured, and gone when it is cleaned up.
+    The topics and services of a scene, from its configuration to its clean-up.
 
     Parameters
     ----------
     node
-        Whose they are.
+        Node that owns them.
     on_inject
-        Serves a fault's service, given its name.
+        Serves the service of a fault, given the fault's name.
 
     """
 
@@ -77,22 +77,22 @@ class SceneTopics:
         self._changes: Publisher | None = None
         self._description: Publisher | None = None
         self.description = b''
-        """The message with the robot model, serialized; empty where the scene asks for none."""
+        """Serialized message with the robot model; empty if the scene asks for none."""
         self._injectors: list[Any] = []
         self.extras: list[Publisher] = []
-        """Publishers of the pipeline's extras."""
+        """Publishers of the pipeline's auxiliary topics."""
         self._crank_name = ''
         self.crank: Subscription | None = None
-        """To the topic that the drives listen to; nothing where they listen to none."""
+        """Subscription to the drives' topic; None without one."""
 
     def connect(self, pipeline: Pipeline) -> None:
         """
-        Have what a scene calls for, and nothing else.
+        Create what the scene asks for, and nothing else.
 
         Raises
         ------
         LinkageError
-            Where the package of a message is not installed.
+            The package of a message is not installed.
 
         """
         self.disconnect()
@@ -127,15 +127,15 @@ class SceneTopics:
 
     def describe(self, scene: Scene, pipeline: Pipeline) -> None:
         """
-        Publish the linkages as a robot model, once and for whoever comes later.
+        Publish the linkages as a robot model, once, with transient-local durability.
 
         Raises
         ------
         LinkageError
-            Where the published joints do not tell where all links are.
+            The published joints do not determine the pose of every link.
 
         """
-        from linkage_ros.robot_models.urdf import urdf  # local import: few scenes ask for it
+        from linkage_ros.robot_models.urdf import urdf  # local import: few scenes need it
         from linkage_ros.scene.robot_model import scene_model  # local import: as above
 
         text_type = message_type('std_msgs/msg/String', 'robot_description')
@@ -147,7 +147,7 @@ class SceneTopics:
         self._description.publish(self.description)
 
     def disconnect(self) -> None:
-        """Have nothing."""
+        """Remove all topics and services."""
         for publisher in (*self.extras, self._changes, self._description):
             if publisher is not None:
                 self._node.destroy_publisher(publisher)
@@ -161,26 +161,26 @@ class SceneTopics:
 
     @property
     def crank_topic(self) -> str:
-        """Return the resolved name of the topic that the drives listen to; '' for none."""
+        """Return the resolved name of the drives' topic; '' for none."""
         return '' if self.crank is None else str(self.crank.topic_name)
 
     @property
     def crank_publishers(self) -> list[TopicEndpointInfo]:
-        """Return who publishes on that topic."""
-        # By the name before remapping: rclpy remaps what it is asked for, a second time too.
+        """Return the publishers on that topic."""
+        # With the name before remapping: rclpy remaps its argument again.
         if self.crank is None:
             return []
         return self._node.get_publishers_info_by_topic(self._crank_name)
 
     @property
     def take(self) -> Take | None:
-        """Return what takes the next message for the drives, if they listen to a topic."""
+        """Return a function that takes the next message for the drives; None without a topic."""
         if self.crank is None:
             return None
         return partial(self.crank.handle.take_message, JointState, True)
 
     def publish_change(self, change: Change) -> bytes:
-        """Publish that a fault has begun or ended; return the message, serialized."""
+        """Publish the begin or end of a fault; return the serialized message."""
         assert self._changes is not None
         message = text_message(change_text(change, self._kinds[change.name]))
         self._changes.handle.publish_raw(message)
@@ -196,7 +196,7 @@ class SceneTopics:
         if handles.faults is not None and (changes := self._changes) is not None:
             described = bag_topic(changes.topic_name, changes.msg_type, _CHANGES_QOS)
             topics[handles.faults] = 'faults_topic', described
-        # For the replay alone: on the graph there is nothing to say of these.
+        # Recorded for the replay only; not published on the graph.
         time_type = message_type('builtin_interfaces/msg/Time', 'record')
         withheld, resets = (
             bag_topic(f'{node.get_fully_qualified_name()}/{name}', time_type, OUTPUT_QOS)
@@ -215,7 +215,7 @@ class SceneTopics:
 
 
 class TakenByTick(CallbackGroup):
-    """A group whose entities no executor waits for: the tick takes from them itself."""
+    """A callback group that no executor serves: the tick takes the messages itself."""
 
     def can_execute(self, _: Any) -> bool:
         return False
@@ -228,4 +228,4 @@ class TakenByTick(CallbackGroup):
 
 
 def never_called(_: Any) -> None:
-    """Be the callback that a subscription must have."""
+    """Serve as the callback that rclpy requires of a subscription."""

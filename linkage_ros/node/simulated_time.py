@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The simulation's time from ``/clock``: what is no time is passed over, and silence is seen."""
+"""Simulated time from ``/clock``: ignores invalid times and detects silence."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 
 def nanoseconds_of(message: ClockMessage) -> int | None:
-    """Return the time of a ``/clock`` message, in [ns]; nothing where it holds none."""
+    """Return the time of a ``/clock`` message, in [ns]; None if it is invalid."""
     time = message.clock
     if time.sec < 0 or time.nanosec >= NANOSECONDS:
         return None
@@ -35,24 +35,24 @@ def nanoseconds_of(message: ClockMessage) -> int | None:
 
 class ClockGuard:
     """
-    Keeps from rclpy what is no time: it raises there, which would end the executor.
+    Keeps invalid times from rclpy, which raises on them and so would end the executor.
 
     Parameters
     ----------
     source
-        What sets the node's clock.
+        The source that sets the node's clock.
 
     """
 
     def __init__(self, source: TimeSource) -> None:
         self._pass_on: Callable[[ClockMessage], None] = source.clock_callback
         self.refused = 0
-        """How many messages held no time."""
+        """Number of messages without a valid time."""
         self.heard = 0
-        """When the last came that held one, by the steady clock, in [ns]; 0 before the first."""
-        # For a subscription that is still to be made, and for one that there is.
+        """Arrival of the last valid message, by the steady clock, in [ns]; 0 before the first."""
+        # For a subscription made later, and for an existing one.
         source.clock_callback = self._look  # type: ignore[method-assign, assignment]
-        if source._clock_sub is not None:  # noqa: SLF001 (rclpy has no other way)
+        if source._clock_sub is not None:  # noqa: SLF001 (rclpy offers no other way)
             source._clock_sub.callback = self._look  # noqa: SLF001
 
     def _look(self, message: ClockMessage) -> None:

@@ -14,13 +14,13 @@
 
 
 """
-One who turns the crank and uses the joint states that come of it.
+A probe that publishes the crank and measures how stale a joint state is when it is used.
 
-It knows where the crank is at every instant, and so where the joints are. At instants of its own,
-at random, it uses the newest joint state that has come: as it is, or carried forward by its rates
-from its stamp to now. How far that is from the truth is what an application gets of the node's
-rate. For each motion of the crank it prints a line of JSON when it begins and one with what it
-found. Its only argument is a JSON object, `TableRequest` as it is.
+It knows the exact crank at every instant, and so the exact joints. At random instants it uses the
+newest joint state: as it is, or extrapolated by its rates from its stamp to now. The error shows
+what an application gets at the node's rate. For each motion of the crank it prints a line of JSON
+when the motion begins, and a line with the results. Its only argument is a `TableRequest` as a
+JSON object.
 """
 
 from __future__ import annotations
@@ -49,21 +49,21 @@ from sensor_msgs.msg import JointState
 
 _MATCHING = 20.0  # [s]
 _LEAD = 300_000_000
-"""Before the first use the crank stands where the motion starts, in [ns]."""
+"""Time that the crank rests at the start of the motion before the first use, in [ns]."""
 
 
 class TableRequest(NamedTuple):
     """
-    What is to be done.
+    Settings of a measurement.
 
     Attributes
     ----------
     scene
-        The scene file that the node runs.
+        Scene file that the node runs.
     seconds
-        How long each motion takes.
+        Duration of each motion, in [s].
     crank_rate, use_rate
-        Crank samples and uses of a joint state, a second.
+        Rates of crank samples and of uses of a joint state, in [Hz].
 
     """
 
@@ -82,7 +82,7 @@ class StalenessProbe(DemoNode):
         (member,) = load_scene(task.scene).members
         self._closure = Closure(member.linkage)
         turning = self._closure.turning
-        # Angles where there are such: metres are not added to radians.
+        # Angles if there are any: metres and radians are not added.
         self._counted = [k for k, turns in enumerate(turning) if turns or not any(turning)]
         self._read = JointStateReader(member.joints).read
         self._write = JointStateWriter(member.inputs).write
@@ -90,7 +90,7 @@ class StalenessProbe(DemoNode):
         self._states = self.create_subscription(JointState, 'joint_states', _never, OUTPUT_QOS)
 
     def run(self, stop: Event) -> None:
-        """Do the task."""
+        """Run all motions."""
         until = monotonic_ns() + _MATCHING * NANOSECONDS
         while not (
             self._crank.get_subscription_count() and self._states.handle.get_publisher_count()
@@ -99,7 +99,7 @@ class StalenessProbe(DemoNode):
                 return
             sleep(0.02)
         motions = motions_of(self._closure, self._task.seconds).by_name
-        # The first state comes some time after the first crank; nobody uses what there is not.
+        # The first joint state comes some time after the first crank sample.
         (angle, rate), *_ = (crank(0) for crank in motions.values())
         while self._newest() is None:
             if monotonic_ns() > until or stop.is_set():
@@ -107,13 +107,13 @@ class StalenessProbe(DemoNode):
             self._crank.handle.publish_raw(self._write(time_ns(), (angle,), (rate,)))
             sleep(0.01)
         for name, crank in motions.items():
-            found = self._use(name, crank, stop)
+            errors = self._use(name, crank, stop)
             if stop.is_set():
                 return
-            print(json.dumps(found), flush=True)
+            print(json.dumps(errors), flush=True)
 
     def _use(self, name: str, crank: CrankAt, stop: Event) -> dict[str, Any]:
-        """Turn the crank through a motion and return how far the states were from the truth."""
+        """Turn the crank through a motion and return the errors of the joint states."""
         task, random = self._task, Random(name)
         begin = time_ns() + _LEAD
         end = begin + round(task.seconds * NANOSECONDS)
@@ -122,11 +122,11 @@ class StalenessProbe(DemoNode):
         ages: list[int] = []
         held: list[float] = []
         carried: list[float] = []
-        newest, unused, said = None, 0, False
+        newest, unused, announced = None, 0, False
         while (now := time_ns()) < end and not stop.is_set():
-            if not said and now >= begin:
+            if not announced and now >= begin:
                 print(json.dumps({'begun': name}), flush=True)
-                said = True
+                announced = True
             wait = min(next_crank, next_use) - now
             if wait > 0:
                 sleep(wait * 1e-9)
@@ -154,14 +154,14 @@ class StalenessProbe(DemoNode):
         return {'motion': name, 'ages': ages, 'held': held, 'carried': carried, 'unused': unused}
 
     def _error(self, joints: Sequence[float], truth: Sequence[float]) -> float:
-        """Return how far the worst joint is off; angles as directions, since the node's run on."""
+        """Return the error of the worst joint; angles as directions, the node unwraps them."""
         return max(
             abs(remainder(off, tau) if self._closure.turning[k] else off)
             for k, off in ((k, joints[k] - truth[k]) for k in self._counted)
         )
 
     def _newest(self) -> tuple[int, tuple[float, ...], tuple[float, ...]] | None:
-        """Take all states that have come; return stamp, joints and rates of the last."""
+        """Take all waiting states; return stamp, joints and rates of the last."""
         newest = None
         while (taken := self._states.handle.take_message(JointState, True)) is not None:
             sample = self._read(taken[0])
@@ -171,11 +171,11 @@ class StalenessProbe(DemoNode):
 
 
 def _never(_: Any) -> None:
-    """Stand for a callback: nobody spins."""
+    """Serve as a callback that is never called, since nothing spins."""
 
 
 def main() -> int:
-    """Run the consumer and return the exit code."""
+    """Run the probe and return the exit code."""
     stop = stop_on_signals()
     task = TableRequest(**json.loads(sys.argv[1]))
     try:

@@ -15,9 +15,9 @@
 """
 The tick, from the newest crank sample to the published bytes.
 
-One thread, no executor: it waits (for a time, a sample or the simulation's clock), takes what has
-come, solves, publishes, and hands the same bytes to the recorder. It never logs and never waits
-for another thread; what it has seen stands in its counts, for others to read.
+One thread without an executor: it waits (for a time, a sample or the simulation's clock), takes
+the messages that have arrived, solves, publishes, and passes the same bytes to the recorder. It
+never logs and never waits for another thread; it leaves its counts for others to read.
 """
 
 from __future__ import annotations
@@ -40,14 +40,12 @@ if TYPE_CHECKING:
     from linkage_ros.faults.injection import Change, Injection
 
 
-# A histogram of durations of constant size, fit for a hot loop and for days.
-
 _STEPS = 5
-"""Bits that are kept of a duration: a bin is at most 1/32 wide of its value."""
+"""Leading bits kept of a duration: the width of a bin is at most 1/32 of its value."""
 
 
 class DurationHistogram:
-    """Counts durations, in [ns], in bins that grow with the duration."""
+    """Histogram of durations, in [ns], of constant size; the bins widen with the duration."""
 
     __slots__ = ('_bins', 'count', 'longest')
 
@@ -67,7 +65,7 @@ class DurationHistogram:
         self.count += 1
 
     def percentile(self, percent: float) -> int:
-        """Return the duration, in [ns], that so many per cent do not exceed; 0 of nothing."""
+        """Return the duration, in [ns], that this percentage does not exceed; 0 without counts."""
         wanted = self.count * percent / 100.0
         seen = 0
         for index, count in enumerate(self._bins):
@@ -84,30 +82,27 @@ def _upper_edge(index: int) -> int:
     return ((index - (shift << _STEPS) + 1) << shift) - 1
 
 
-# The topics that a run records, each by its handle: its number in the bag.
-#
-# They are numbered here alone. The tick offers messages to the recorder by handle, and the bag's
-# topics are described by handle.
-
-
 class RecordedTopics(NamedTuple):
     """
-    The handles; None of a topic that a run does not have.
+    Handles of the topics that a run records: their numbers in the bag; None for absent topics.
+
+    Only this type numbers them. The tick offers messages to the recorder by handle, and the
+    topics of the bag are described by handle.
 
     Attributes
     ----------
     joint_states, diagnostics
-        What every run publishes.
+        Published by every run.
     crank
-        What the drives listen to.
+        The topic of the drives.
     faults
-        When faults begin and end.
+        Begin and end of faults.
     withheld
-        Ticks without a message of which a replay has to know.
+        Ticks without a message that a replay must know of.
     extras
-        The pipeline's further topics.
+        The auxiliary topics of the pipeline.
     resets
-        When the pipeline was built anew.
+        Resets, at which the pipeline is built again.
     description
         The robot model. No tick publishes it.
 
@@ -139,12 +134,12 @@ def recorded_topics(pipeline: Pipeline) -> RecordedTopics:
 
 
 _LONGEST_DRAIN = 20_000_000
-"""How long a tick takes messages at most, in [ns]: huge ones, each read for the first time."""
+"""Longest time that a tick takes messages, in [ns]; reached with huge, unparsed messages."""
 
 
 @dataclass(slots=True)
 class Counts:
-    """What the tick has seen since it began; written by its thread alone."""
+    """Counts of the tick since its start; only its thread writes them."""
 
     ticks: int = 0
     published: int = 0
@@ -155,26 +150,26 @@ class Counts:
     clock_jumps: int = 0
     resets: int = 0
     received: int = 0
-    """Messages on the drives' topic: used + superseded + ignored + those rejected."""
+    """Messages on the drives' topic: used + superseded + ignored + rejected."""
     used: int = 0
     superseded: int = 0
-    """Good ones of which the same tick took a newer."""
+    """Good messages followed by a newer one in the same tick."""
     ignored: int = 0
-    """Those that do not name the crank: others may share the topic."""
+    """Messages without the crank's joints: other publishers may share the topic."""
     missed: int = 0
-    """Numbers left out where one publisher counts its messages."""
+    """Gaps in the sequence numbers of a single publisher."""
     rejected: dict[Rejection, int] = field(default_factory=lambda: dict.fromkeys(Rejection, 0))
     lateness: DurationHistogram = field(default_factory=DurationHistogram)
     last: Tick | None = None
     unclosed: dict[Status, int] = field(default_factory=lambda: dict.fromkeys(Status, 0))
     last_unclosed: dict[Status, tuple[int, Position]] = field(default_factory=dict)
-    """Number of the linkage and its position, where one had the status last."""
+    """Index and position of the linkage that had each status last."""
 
 
 _Taken = tuple[bytes, dict[str, Any]]
 Take = Callable[[], _Taken | None]
 Pace = Callable[['TickLoop', Event], None]
-"""Runs a tick loop until the event: waits, and calls `tick_at` or `tick_samples`."""
+"""Runs a tick loop until the event is set: waits, and calls `tick_at` or `tick_samples`."""
 
 
 def _take_nothing() -> None:
@@ -183,25 +178,25 @@ def _take_nothing() -> None:
 
 class TickLoop:
     """
-    Drives a pipeline.
+    Runs a pipeline tick by tick.
 
     Parameters
     ----------
     build
-        Builds the pipeline; called again for a reset.
+        Builds the pipeline; a reset calls it again.
     take
-        Takes the next message for the drives, as bytes and message info; nothing where there is
-        none. Absent where they listen to no topic.
+        Takes the next message for the drives, as bytes and message info; returns None if there is
+        no message. None if the drives have no topic.
     publish
         Publishes a serialized JointState.
     own
-        Tells the node's own messages from others, where they come back on the crank's topic.
+        Recognises the node's own messages where they come back on the crank's topic.
     publish_extras
-        For each of the pipeline's extras what publishes it, serialized.
+        Publish the serialized messages of the auxiliary topics, one function each.
     publish_change
-        Publishes that a fault has begun or ended, and returns the message, serialized.
+        Publishes the begin or end of a fault, and returns the serialized message.
     depth
-        How many messages a tick takes at most: as many as the queue before it holds.
+        Most messages that one tick takes: the depth of the queue in front of it.
 
     """
 
@@ -226,7 +221,7 @@ class TickLoop:
         self.injection = self._pipeline.injection
         self._publish_change = publish_change
         self.topics = recorded_topics(self._pipeline)
-        """The handles by which it offers messages to the recorder."""
+        """Handles under which the tick offers messages to the recorder."""
         self._publish_extras = tuple(zip(self.topics.extras, publish_extras, strict=True))
         self._stopping = Event()
         self._thread: Thread | None = None
@@ -234,7 +229,7 @@ class TickLoop:
         self.recorder: Recorder | None = None
         self.reset_requested = False
         self.several_publishers = False
-        """Whether more than one was seen on the drives' topic: their numbers go apart."""
+        """Whether the drives' topic ever had several publishers, each with its own numbers."""
         self.failure = ''
         self._begun = 0
         self.seconds = 0.0
@@ -256,12 +251,12 @@ class TickLoop:
 
     @property
     def running(self) -> bool:
-        """Whether it has been started and not stopped."""
+        """Whether the loop is started and not stopped."""
         return self._thread is not None
 
     @property
     def samples(self) -> str:
-        """Return what became of the messages on the drives' topic, in words."""
+        """Return the counts of messages on the drives' topic, as text."""
         counts = self.counts
         return (
             f'{counts.received} received, {counts.used} used, {counts.superseded} superseded, '
@@ -273,10 +268,10 @@ class TickLoop:
     @property
     def missed(self) -> int | None:
         """
-        Return how many messages got lost between publisher and tick; None where none can tell.
+        Return the number of messages lost between publisher and tick; None if it is unknown.
 
-        The queue of the middleware lets the oldest go where it is full, and says nothing of it.
-        But a publisher numbers its messages.
+        A full queue of the middleware drops its oldest message without a report. But publishers
+        number their messages.
         """
         if self.several_publishers or (self.counts.received and not self._sequence):
             return None
@@ -289,20 +284,20 @@ class TickLoop:
 
     @property
     def pipeline(self) -> Pipeline:
-        """Return the pipeline, as it was built last."""
+        """Pipeline as it was last built."""
         return self._pipeline
 
     def _take_messages(self, clock: Callable[[], int] | None, tick_for_each: bool) -> None:
         """
-        Take the messages that have come: record, count and offer each to the pipeline.
+        Take the waiting messages: record, count and offer each to the pipeline.
 
         Parameters
         ----------
         clock
-            Returns the time when a message is taken, in [ns]; absent, that is `_last_time`, which
-            is set to it.
+            Returns the time when a message is taken, in [ns], and moves `_last_time` on; None to
+            use `_last_time`.
         tick_for_each
-            Whether to tick for each good one, at its stamp.
+            Whether to tick for each good message, at its stamp.
 
         """
         counts, pipeline = self.counts, self._pipeline
@@ -312,7 +307,7 @@ class TickLoop:
                 break
             if clock is not None:
                 time = clock()
-                # A message may be younger than the tick that takes it.
+                # A message may be newer than the tick that takes it.
                 if self.injection is not None:
                     time = self.injection.clock(time)
                 if time > self._last_time:
@@ -322,10 +317,15 @@ class TickLoop:
             if self._own is None or not self._own(message):
                 counts.received += 1
                 if number := info.get('publication_sequence_number'):
-                    if 0 < self._sequence < number:  # else the first, or of a publisher begun anew
+                    if (
+                        0 < self._sequence < number
+                    ):  # not the first message, nor a restarted publisher
                         counts.missed += number - self._sequence - 1
                     self._sequence = number
-                recorder, topic = self.recorder, self.topics.crank  # another thread takes it away
+                recorder, topic = (
+                    self.recorder,
+                    self.topics.crank,
+                )  # another thread may set it to None
                 if recorder is not None and topic is not None:
                     recorder.offer(topic, now, info['source_timestamp'], message)
                 rejection = pipeline.offer(message, now)
@@ -348,14 +348,14 @@ class TickLoop:
 
     def tick_at(self, now: int, clock: Callable[[], int] | None = None) -> None:
         """
-        Take the messages that have come, and tick.
+        Take the waiting messages, and tick.
 
         Parameters
         ----------
         now
             The time of the tick, in [ns].
         clock
-            Returns the time when a message is taken, in [ns]; absent, that is the tick's.
+            Returns the time when a message is taken, in [ns]; None for the time of the tick.
 
         """
         if self.injection is not None:
@@ -367,7 +367,7 @@ class TickLoop:
         self._tick(self._last_time, now)
 
     def tick_samples(self, now: int, clock: Callable[[], int] | None = None) -> None:
-        """Take the messages that have come, as `tick_at`, and tick for each, at its stamp."""
+        """Take the waiting messages, as in `tick_at`, and tick for each, at its stamp."""
         if self.injection is not None:
             now = self._inject(self.injection, now)
         if now < self._last_time or self.reset_requested:
@@ -376,20 +376,20 @@ class TickLoop:
         self._take_messages(clock, tick_for_each=True)
 
     def _rebuild(self, now: int) -> None:
-        """Build the pipeline anew, since time has jumped back or one has asked."""
+        """Build the pipeline again, after a reset request or a backward jump of time."""
         if now < self._last_time:
             self.counts.clock_jumps += 1
         if self.reset_requested:
             self.reset_requested = False
             self.counts.resets += 1
         if (recorder := self.recorder) is not None:
-            # Where the clock jumps back after ticks of which nothing is recorded, the times in the
-            # bag go on.
+            # Recorded, since the bag itself shows no jump back of the clock after ticks that
+            # recorded nothing.
             recorder.offer(self.topics.resets, now, now, time_message(now))
         self._pipeline = self._build()
 
     def _inject(self, injection: Injection, now: int) -> int:
-        """Let faults begin and end; return the time by which the tick goes, in [ns]."""
+        """Let faults begin and end; return the time of the tick, in [ns]."""
         changes = injection.advance(now)
         now = injection.clock(now)
         for change in changes:
@@ -401,7 +401,7 @@ class TickLoop:
         return now
 
     def _tick(self, now: int, at: int) -> None:
-        """Solve now for a time, both in [ns]; publish, record and count."""
+        """Solve at time ``now`` for time ``at``, in [ns]; publish, record and count."""
         counts = self.counts
         counts.last = tick = self._pipeline.tick(at)
         message, extras = tick.message, tick.extras
@@ -411,7 +411,8 @@ class TickLoop:
             if recorder is not None:
                 recorder.offer(self.topics.joint_states, now, at, message)
             counts.published += 1
-        # Of a linkage without a pose there may be an extra, which then tells of the tick.
+        # A linkage without a pose may still have an auxiliary message, which then records the
+        # tick.
         if extras:
             for (topic, publish), extra in zip(self._publish_extras, extras, strict=True):
                 if extra:
@@ -439,7 +440,7 @@ class TickLoop:
                 counts.withheld += 1
 
     def _guarded(self, pace: Pace) -> None:
-        # A defect here must neither vanish with its thread nor show a traceback.
+        # A defect here must be reported, and without a traceback.
         try:
             pace(self, self._stopping)
         except Exception as error:  # noqa: BLE001 (see above)

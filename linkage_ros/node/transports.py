@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-How Fast DDS carries messages: without shared memory, unless the user has said otherwise.
+Transports of Fast DDS: no shared memory, unless the user configures the transports.
 
-A publisher opens the shared-memory port of every subscriber that comes, on the thread that
-publishes, and checks it: that may wait a third of the ``healthy_check_timeout_ms`` of whoever made
-the port, 0.33 s by default (Fast-DDS issue 6535, `SharedMemGlobal.hpp` of 2.14.5). Ticks stand
-still for it. UDP within a machine costs as much, and clients on defaults hear it.
+For every new subscriber, a publisher opens and checks its shared-memory port, on the publishing
+thread. The check may wait a third of the ``healthy_check_timeout_ms`` of the port's creator, 0.33
+s by default (Fast-DDS issue 6535, `SharedMemGlobal.hpp` of 2.14.5). Ticks stand still meanwhile.
+UDP within a machine costs the same, and clients with default settings receive it.
 """
 
 from __future__ import annotations
@@ -36,19 +36,19 @@ _SAID = (
     'FASTDDS_DEFAULT_PROFILES_FILE',
     'RMW_FASTRTPS_PUBLICATION_MODE',
 )
-"""With one of these the user says how messages are carried."""
+"""Environment variables with which the user configures the transports."""
 
 _PROFILES = 'DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml'
-"""With one of these in the working folder, too."""
+"""Files in the working folder with the same purpose."""
 
 _SHARED = re.compile(r'/(?:fastrtps|fastdds)_port\d+$', re.MULTILINE)
 
 
 def leave_out_shared_memory() -> None:
     """
-    Have Fast DDS use UDP alone; nothing, where the user has said how messages are carried.
+    Make Fast DDS use UDP only, unless the user has configured the transports.
 
-    It has to be called before `rclpy.init`, and holds for this process and those that it starts.
+    Call it before `rclpy.init`; it holds for this process and its children.
     """
     if not (any(map(os.environ.get, _SAID)) or any(Path(name).is_file() for name in _PROFILES)):
         os.environ[_TRANSPORTS] = 'UDPv4'
@@ -56,10 +56,11 @@ def leave_out_shared_memory() -> None:
 
 def standstill() -> str:
     """
-    Return why ticks may stand still when a subscriber comes, and what helps; '' where they do not.
+    Return why ticks may stand still when a subscriber comes, and the remedy; '' if they do not.
 
-    What is mapped tells: with the discovery range LOCALHOST rmw_fastrtps brings shared memory
-    whatever the environment says, and where another has made the context it was chosen before.
+    The process's memory maps decide: with the discovery range LOCALHOST rmw_fastrtps uses shared
+    memory whatever the environment says, and a context made by other code has chosen its
+    transports already.
     """
     if not get_rmw_implementation_identifier().startswith('rmw_fastrtps'):
         return ''

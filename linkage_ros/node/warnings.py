@@ -14,9 +14,9 @@
 
 
 """
-Warnings in words, each kind at most once in a while.
+Rate-limited log warnings, each kind with its own limit.
 
-The gate is our own: a log line that rclpy's throttle suppresses costs 150 µs.
+The limit is not rclpy's throttle: there a suppressed log line costs 150 µs.
 """
 
 from __future__ import annotations
@@ -52,17 +52,17 @@ _REMEDIES = {
 
 
 _PATIENCE = 2.0
-"""How long nobody is told that the crank has not come yet, in [s]."""
+"""Time without a warning about a missing crank, in [s]."""
 
 
 class Warnings:
     """
-    What has been warned of, and when.
+    Warnings, with the time of the last one of each kind.
 
     Parameters
     ----------
     logger
-        Where warnings go.
+        Logger of the warnings.
 
     """
 
@@ -76,18 +76,18 @@ class Warnings:
 
     def wait(self, counts: Counts, crank_topic: str, inputs: Sequence[str], period: float) -> None:
         """
-        Warn where no message has come, or none with the crank.
+        Warn if no message has arrived, or none with the crank's joints.
 
         Parameters
         ----------
         counts
-            The tick's.
+            Counts of the tick.
         crank_topic
-            Where samples should come from.
+            Topic of the crank samples.
         inputs
-            Names of the joints that they should have.
+            Names of the joints that a sample must have.
         period
-            Least time between two such warnings, in [s].
+            Least time between two warnings of this kind, in [s].
 
         """
         names = listed(inputs)
@@ -108,16 +108,16 @@ class Warnings:
         self, counts: Counts, closures: Sequence[Closure], crank_topic: str, period: float
     ) -> None:
         """
-        Warn of what has happened since the last warning of its kind.
+        Warn of events since the last warning of their kind.
 
         Parameters
         ----------
         counts
-            The tick's.
+            Counts of the tick.
         closures
             The linkages.
         crank_topic
-            Where samples come from.
+            Topic of the crank samples.
         period
             Least time between two warnings of a kind, in [s].
 
@@ -150,7 +150,7 @@ class Warnings:
                     self._unclosed[status] = counts.unclosed[status]
 
     def say(self, kind: str, line: str, period: float) -> bool:
-        """Warn, unless that kind has been warned of within the period, in [s]."""
+        """Warn, unless this kind was already warned of within the period, in [s]."""
         now = monotonic()
         if now - self._said.get(kind, -inf) < period:
             return False

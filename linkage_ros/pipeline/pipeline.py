@@ -14,9 +14,9 @@
 
 
 """
-The tick of a scene, from top to bottom: crank, closure, mechanism, sensors, message.
+Compute the tick of a scene, top to bottom: crank, closure, mechanism, sensors, message.
 
-Building puts in only what the scene names; a tick asks no scene.
+Only the stages that the scene names are built; a tick never reads the scene.
 """
 
 from __future__ import annotations
@@ -65,33 +65,33 @@ if TYPE_CHECKING:
     from linkage_ros.solvers.solver import Choice
 
 _WITHHOLDING = {'rate_limit', 'dropout', 'delay', 'jitter'}
-"""Effects that may leave a tick without a message."""
+"""Effects that may suppress the message of a tick."""
 
 _GOING_ON = {'backlash'}
-"""Effects that go on where a linkage is open."""
+"""Effects that keep running while a loop is open."""
 
 _KINEMATIC = ('velocity', 'acceleration')
-"""Stages of the mechanism that a compiled linkage does itself, by its derivatives."""
+"""Stages of the mechanism that a compiled linkage computes itself, by its derivatives."""
 
 _OF_FORCES = {'pin_forces'}
-"""Effects whose messages are made of the forces in the joints alone."""
+"""Effects whose messages contain joint forces only."""
 
 
 class LinkageTick(NamedTuple):
     """
-    What a linkage comes to at a tick, step by step.
+    The state of one linkage at a tick, step by step.
 
     Attributes
     ----------
     crank
-        The crank; nothing where there is none.
+        State of the crank; None without a crank state.
     position
-        The loop; nothing where there is no crank.
+        Solution of the loops; None without a crank state.
     motion
-        What the mechanism does; nothing where the loop has no pose.
+        Motion of the mechanism; None where the loops do not close.
     reading
-        What is published of it; nothing where nothing is. A delay may have one where the linkage
-        has no pose.
+        Published values; None where nothing is published. A delay stage may publish a reading
+        although the linkage has no pose.
 
     """
 
@@ -103,19 +103,19 @@ class LinkageTick(NamedTuple):
 
 class Tick(NamedTuple):
     """
-    What a tick came to.
+    The result of a tick.
 
     Attributes
     ----------
     message
-        The JointState, serialized; empty where nothing is published.
+        The serialized JointState; empty where nothing is published.
     extras
-        For each of the pipeline's further topics its message, serialized; empty where nothing is
-        published on it. Empty as a whole where nothing is on any.
+        One serialized message for each auxiliary topic, b'' where that topic has none; an empty
+        tuple where no auxiliary topic has a message.
     seen
-        What each linkage came to, as far as it was worked out.
+        State of each linkage, as far as the message needed it.
     lines
-        The linkages.
+        The linkage pipelines.
 
     """
 
@@ -126,22 +126,22 @@ class Tick(NamedTuple):
 
     @property
     def looks(self) -> tuple[LinkageTick, ...]:
-        """All that each linkage came to; what no message needed is worked out here."""
+        """State of each linkage in full; computes here what the message did not need."""
         return tuple(line.looked(seen) for line, seen in zip(self.lines, self.seen, strict=True))
 
 
 class AuxiliaryOutput(NamedTuple):
     """
-    A message beside the joint states.
+    A message published beside the joint states.
 
     Attributes
     ----------
     effect
-        What calls for it.
+        The effect that asks for it.
     topic, message
-        Its topic and its type: package/msg/Type.
+        Name and type (package/msg/Type) of the topic.
     writer
-        Writes it.
+        Serializes the message.
 
     """
 
@@ -154,14 +154,14 @@ class AuxiliaryOutput(NamedTuple):
 @dataclass(frozen=True)
 class _Wanted:
     """
-    Picks out of a motion the numbers that a scene asks of a compiled linkage.
+    Picks the values that the scene publishes from the motion of a compiled linkage.
 
     Attributes
     ----------
     of
-        What it follows from: of two that are equal in it the numbers are the same.
+        Key of equality: two objects with equal keys pick the same values.
     pick
-        Picks them.
+        Picks the values.
 
     """
 
@@ -169,13 +169,13 @@ class _Wanted:
     pick: Callable[[CompiledMotion], Sequence[Sequence[float]]] = field(compare=False)
 
     def __call__(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
-        """Return the numbers, in groups."""
+        """Return the values, in groups."""
         return self.pick(motion)
 
 
 class LinkagePipeline:
     """
-    A linkage at work. To reset it, build it again.
+    The pipeline of one linkage. To reset it, build it again.
 
     Parameters
     ----------
@@ -184,14 +184,14 @@ class LinkagePipeline:
     member
         Its linkage, drive and effects.
     closure
-        The linkage, where it has been solved before: it remembers nothing, and serves every reset.
+        The closure of the linkage, if there is one already. It has no state, so resets reuse it.
     injection
-        The faults of the scene, if it has any.
+        The faults of the scene, if any.
 
     Raises
     ------
     FileError
-        Where something does not go together; where the linkage does not close.
+        Parts of the scene do not fit together, or the linkage does not close.
 
     """
 
@@ -222,7 +222,7 @@ class LinkagePipeline:
         computed = named | {need for effect in starting for need in needs(effect)}
         effects = [effect_of(name) for name in in_order(computed)]
         self.stages = tuple(effect.name for effect in effects)
-        """Names of the effects that are computed, in physical order."""
+        """Names of the computed effects, in physical order."""
         forced = drive == 'torque' or not computed.isdisjoint(FORCE_EFFECTS)
         _refuse_idle(member, forced)
         _refuse_solver(member, forced)
@@ -248,7 +248,7 @@ class LinkagePipeline:
 
         # Crank.
         self.topic: str = getattr(drive_module, 'TOPIC', '')
-        """Topic that the drive listens to; '' for none."""
+        """Topic of the drive; '' for none."""
         self.drive: Drive = drive_module.build(drive_parameters, context)
         self._read_message = drive_module.reader(context) if self.topic else None
         self._spoil = injection.build('message') if injection is not None else []
@@ -285,7 +285,7 @@ class LinkagePipeline:
         behind = [*sensors.values(), *broken]
         running = [angles] if behind or not scene.wrapped else []
         if behind and 'velocity' in computed - named:
-            # It serves between readings, and is not published.
+            # Only used between readings; not published.
             self._read_off |= {'velocity'}
             behind.append(_without_rates)
         if scene.wrapped:
@@ -309,14 +309,14 @@ class LinkagePipeline:
                 of += [self._read_off, context.loads, context.friction]
                 wanted = _Wanted(of, self._ideal)
             compiled = self.closure.compiled(len(moved.intersection(_KINEMATIC)), wanted)
-            # Where forces have no solution a path has less.
+            # Where the forces have no solution, a compiled path has fewer values.
             if len({tuple(map(len, path.outputs)) for path in compiled.paths}) == 1:
                 running_on = angles if running else None
                 self._straight = straight(self.drive, self._drive_stages, compiled, running_on)
 
     @property
     def whole(self) -> Straight | None:
-        """Return the usual tick up to what is published, if all of it is written as text."""
+        """Return the generated tick up to the reading; None if a stage is not generated."""
         of_seen = all(
             extra.writer.of_reading or extra.effect in _OF_FORCES for extra in self.extras
         )
@@ -324,13 +324,13 @@ class LinkagePipeline:
 
     @cached_property
     def see(self) -> Callable[[int], LinkageTick | Seen]:
-        """Return a function of the time, in [ns]: what the linkage comes to."""
+        """Return a function from the time, in [ns], to the state of the linkage."""
         if self._straight is None:
             return self._see
         return straight_look(self._straight, self._read_behind, self.look)
 
     def _see(self, now: int) -> LinkageTick:
-        """Return what the linkage comes to at a time, in [ns], step by step."""
+        """Return the state of the linkage at a time, in [ns], step by step."""
         crank = self.drive.state(now)
         if crank is not None:
             for stage in self._drive_stages:
@@ -338,7 +338,7 @@ class LinkagePipeline:
         return self.look(now, crank)
 
     def look(self, now: int, crank: CrankState | None) -> LinkageTick:
-        """Return what the linkage comes to, from the crank on."""
+        """Return the state of the linkage, given the crank state."""
         if crank is None:
             return LinkageTick(None, None, None, self._read_gap(now))
         position = self._close(*crank.angles)
@@ -350,7 +350,7 @@ class LinkagePipeline:
         return LinkageTick(crank, position, motion, self._read(now, self._observed(now, motion)))
 
     def _ideal(self, motion: CompiledMotion) -> Sequence[Sequence[float]]:
-        """Return what an ideal sensor reads of a motion on symbols, and the forces in joints."""
+        """Return the ideal reading of a symbolic motion, and the joint forces."""
         acceleration = motion.acceleration
         if acceleration is None or not all_finite(acceleration.joints):
             return []
@@ -362,18 +362,18 @@ class LinkagePipeline:
         return [*self._observed(0, moved)[1:], reactions]
 
     def _moved(self, crank: CrankState, position: Position) -> MechanismState:
-        """Return what the mechanism does in a pose."""
+        """Return the motion of the mechanism in a pose."""
         motion = MechanismState(crank, position, None, None, (), (), ())
         for stage in self._stages:
             motion = stage(motion)
         return motion
 
     def _observed(self, now: int, motion: MechanismState) -> SensorReading:
-        """Return what an ideal sensor reads of a motion: what is named, and no more."""
+        """Return the ideal reading of a motion, with the values that the scene asks for."""
         position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
         efforts: tuple[float, ...] = ()
         if 'effort' in self._read_off and motion.efforts:
-            # Of the inputs, which are published first; 0 for the others.
+            # Efforts of the inputs, which are published first; 0 for the other joints.
             efforts = (*motion.efforts, *(0.0,) * (len(position.joints) - len(motion.efforts)))
         return SensorReading(
             now,
@@ -384,7 +384,7 @@ class LinkagePipeline:
         )
 
     def _read(self, now: int, ideal: SensorReading, first: int = 0) -> SensorReading | None:
-        """Return what the sensors, from a number on, make of what an ideal one reads."""
+        """Apply the sensor stages, from index `first` on, to an ideal reading."""
         reading: SensorReading | None = ideal
         gap = False
         for sensor in self._sensors[first:]:
@@ -396,7 +396,7 @@ class LinkagePipeline:
         return reading
 
     def _read_gap(self, now: int) -> SensorReading | None:
-        """Return what the sensors read where the linkage has no pose."""
+        """Return the sensor reading where the linkage has no pose."""
         reading: SensorReading | None = None
         for sensor in self._sensors:
             if reading is not None:
@@ -406,7 +406,7 @@ class LinkagePipeline:
         return reading
 
     def looked(self, seen: LinkageTick | Seen | Numbers) -> LinkageTick:
-        """Return all that a linkage came to: of a straight tick it is worked out here."""
+        """Return the full state of a linkage; the generated tick leaves part of it out."""
         if isinstance(seen, LinkageTick):
             return seen
         crank_numbers, numbers, _ = seen
@@ -416,7 +416,7 @@ class LinkagePipeline:
         return LinkageTick(crank, position, self._moved(crank, position), reading)
 
     def write_extras(self, now: int, seen: LinkageTick | Seen) -> list[bytes]:
-        """Return the messages beside the joint states at a time, in [ns]; b'' for none."""
+        """Return the auxiliary messages at a time, in [ns]; b'' for none."""
         return [self._written(extra, now, seen) for extra in self.extras]
 
     def _written(self, extra: AuxiliaryOutput, now: int, seen: LinkageTick | Seen) -> bytes:
@@ -436,17 +436,17 @@ class LinkagePipeline:
 
     @property
     def gap_begins(self) -> bool:
-        """Return whether a gap began with the last tick, if that had no pose."""
+        """Return whether a gap in the readings began at the last tick, if that had no pose."""
         return any(sensor.gap_begins for sensor in self._sensors)
 
     @property
     def choice(self) -> Choice | None:
-        """Return what closes the loops and why, where an accuracy is asked for; else nothing."""
-        found: Choice | None = getattr(self.closure, 'choice', None)
-        return found
+        """Return the chosen solver and the reason if the scene asks for an accuracy, else None."""
+        choice: Choice | None = getattr(self.closure, 'choice', None)
+        return choice
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
-        """Take a message of the drive's topic, serialized, at a time in [ns], or say why not."""
+        """Take a serialized message of the drive's topic at a time, in [ns]; or return why not."""
         if self._read_message is None:
             return Rejection.MISSING
         for spoil in self._spoil:
@@ -459,13 +459,13 @@ class LinkagePipeline:
 
 
 def _between_readings(member: SceneLinkage, named: set[str], moves_by_rates: bool) -> set[str]:
-    """Return the effects that mix readings, where they do so without rates or not at all."""
-    found = {'jitter', 'delay'} & named
-    if moves_by_rates and 'delay' in found:
+    """Return 'jitter' and 'delay' where this scene lets them work without the crank's rates."""
+    mixing = {'jitter', 'delay'} & named
+    if moves_by_rates and 'delay' in mixing:
         delay = module_of('delay')
         parameters = member.effects.get('delay') or delay.PARAMETERS()
         return set() if delay.interpolates(parameters, named) else {'delay'}
-    return set() if moves_by_rates else found
+    return set() if moves_by_rates else mixing
 
 
 def _extra(effect: Effect, writer: Any, member: str) -> AuxiliaryOutput:
@@ -475,12 +475,12 @@ def _extra(effect: Effect, writer: Any, member: str) -> AuxiliaryOutput:
 
 
 def _without_rates(_now: int, reading: SensorReading) -> SensorReading:
-    """Let rates end that have served between readings."""
+    """Remove the rates, which were only used between readings."""
     return reading._replace(rates=())
 
 
 def _silent_beyond(close: Callable[..., Position], closure: Closure) -> Callable[..., Position]:
-    """Return what closes the loops, and has no joints to publish where one is beyond limits."""
+    """Wrap a closure function so that a pose beyond the joint limits publishes no joints."""
 
     def within(*inputs: float) -> Position:
         position = close(*inputs)
@@ -507,12 +507,12 @@ def _refuse_not_imported(member: SceneLinkage) -> None:
 
 
 def _refuse_idle(member: SceneLinkage, forced: bool) -> None:
-    """Refuse what acts on nothing."""
-    # Of several linkages those without forces may share what others need.
-    own = member.content
+    """Refuse an effect that has nothing to act on."""
+    # With several linkages, one without forces may share an effect that another one needs.
+    section = member.content
     for given, key in (
-        (member.loads and 'loads' in own, 'loads'),
-        ('friction' in member.effects and 'effects' in own, 'effects.friction'),
+        (member.loads and 'loads' in section, 'loads'),
+        ('friction' in member.effects and 'effects' in section, 'effects.friction'),
     ):
         if given and not forced:
             raise DefinitionError(
@@ -523,7 +523,7 @@ def _refuse_idle(member: SceneLinkage, forced: bool) -> None:
 
 
 def _refuse_solver(member: SceneLinkage, forced: bool) -> None:
-    """Refuse what has no poses of dyads where forces start from these."""
+    """Refuse a solver without dyad poses where the forces start from these."""
     if forced and member.solver is not None and member.solver[0] != 'closed_form':
         raise DefinitionError(
             'solver',
@@ -559,23 +559,23 @@ def _closure(
 
 class Pipeline:
     """
-    A scene at work. To reset it, build it again.
+    The pipeline of a scene. To reset it, build it again.
 
     Parameters
     ----------
     scene
         The scene.
     closures
-        Its linkages, where they are at hand: they remember nothing, and serve every reset.
+        Closures of its linkages, if there are any already. They have no state; resets reuse them.
     injection
-        Its faults, where they are at hand: they outlive a reset.
+        Its faults, if they exist already; they outlive a reset.
 
     Raises
     ------
     FileError
-        Where something in the scene does not go together.
+        Parts of the scene do not fit together.
     TypeError
-        Where it is not a scene.
+        The argument is not a scene.
 
     """
 
@@ -592,7 +592,7 @@ class Pipeline:
 
             injection = Injection(scene.faults)
         self.injection = injection
-        """The faults; nothing where the scene has none."""
+        """The faults; None if the scene has none."""
         self.lines = [
             LinkagePipeline(scene, member, closures[number] if closures else None, injection)
             for number, member in enumerate(scene.members)
@@ -606,8 +606,8 @@ class Pipeline:
             )
         _refuse_stamps(scene)
         self.topic = topics[0] if topics else ''
-        """The topic that the drives listen to; '' for none."""
-        # Of the drives only that from a topic remembers nothing of the ticks.
+        """The topic of the drives; '' for none."""
+        # Among the drives, only the topic drive keeps no state from earlier ticks.
         self._goes_on = any(
             line.member.drive[0] != 'topic' or not _GOING_ON.isdisjoint(line.stages)
             for line in self.lines
@@ -617,17 +617,17 @@ class Pipeline:
             or injection is not None
             or any(not _WITHHOLDING.isdisjoint(line.stages) for line in self.lines)
         )
-        """Whether there may be ticks without a message of which a replay has to know."""
+        """Whether ticks without a message may matter to a replay."""
         self._routes = SampleRouter({line: line.member.inputs for line in self.lines})
         self._offered = 0
         self._newest: dict[LinkagePipeline, int] = {}
         self._writers: dict[tuple[bool, ...], JointStateWriter] = {}
         self.tick = self._ticking()
-        """Ticks at a time, in [ns]."""
+        """Computes the tick at a time, in [ns]."""
 
     def offer(self, message: bytes, now: int) -> Rejection | None:
         """
-        Take a crank message, serialized, or say why not.
+        Take a serialized crank message, or return why it is rejected.
 
         Parameters
         ----------
@@ -639,7 +639,7 @@ class Pipeline:
         """
         if len(self.lines) == 1:
             return self.lines[0].offer(message, now)
-        # It may be for one linkage or for several: it is good if one of them takes it.
+        # A message may concern one linkage or several: it is good if one of them accepts it.
         self._offered += 1
         rejections = []
         for line in self._routes.find(message):
@@ -649,7 +649,7 @@ class Pipeline:
         return None if None in rejections else next(iter(rejections), Rejection.MISSING)
 
     def newly_used(self) -> int:
-        """Return of how many of the good messages since the last call no newer one came."""
+        """Return how many good messages since the last call are still the newest for a linkage."""
         if len(self.lines) == 1:
             return 1
         numbers = set(self._newest.values())
@@ -657,7 +657,7 @@ class Pipeline:
         return len(numbers)
 
     def _made(self, now: int, seen: Sequence[LinkageTick | Seen]) -> Tick:
-        """Return what a tick comes to; joints are left out that have no reading."""
+        """Return the result of a tick; joints without a reading are left out."""
         extras: tuple[bytes, ...] = ()
         if self.extras:
             pairs = zip(self.lines, seen, strict=True)
@@ -671,7 +671,7 @@ class Pipeline:
         return Tick(writer.write(stamp, *_joined(readings)), extras, seen, self.lines)
 
     def _ticking(self) -> Callable[[int], Tick]:
-        """Return a function of the time, in [ns]: the tick, as one text where it can be."""
+        """Return the tick as a function of the time, in [ns]; generated text if possible."""
         wholes = [whole for line in self.lines if (whole := line.whole) is not None]
         several = len(self.lines) > 1
         if len(wholes) < len(self.lines) or (several and self.extras):
@@ -690,7 +690,7 @@ class Pipeline:
         )
 
     def _together(self, wholes: Sequence[Straight]) -> Callable[[int], Tick]:
-        """Return the tick of several linkages that are all written as text."""
+        """Return the tick of several linkages that all have generated ticks."""
         lines = self.lines
         shares = [straight_share(one, line.look) for one, line in zip(wholes, lines, strict=True)]
         write = self._writer((True,) * len(lines)).write
@@ -709,7 +709,7 @@ class Pipeline:
         return tick
 
     def remembers(self, tick: Tick) -> bool:
-        """Return whether a tick without a message changes what comes after it."""
+        """Return whether a tick without a message changes the state of the pipeline."""
         return any(
             not isinstance(seen, LinkageTick)
             or line.gap_begins
@@ -729,7 +729,7 @@ class Pipeline:
 
     @property
     def closures(self) -> list[Closure]:
-        """Return the linkages."""
+        """Closures of the linkages."""
         return [line.closure for line in self.lines]
 
     @property
@@ -744,7 +744,7 @@ class Pipeline:
 
 
 def _refuse_stamps(scene: Scene) -> None:
-    """Refuse stamps of measurement that one message of several linkages could not bear."""
+    """Refuse measurement stamps that cannot share one message of several linkages."""
     delays = [member.effects.get('delay') for member in scene.members]
     for member, delay in zip(scene.members, delays, strict=True):
         if delay is not None and delay.stamp == 'measured' and set(delays) != {delay}:
@@ -761,8 +761,8 @@ def _joined(
     """
     Return positions, rates and efforts of all readings.
 
-    The arrays of a JointState are of one length or empty. Where some readings have rates and
-    others, at a toggle or without the effect, have none, none are published; so with efforts.
+    The arrays of a JointState have equal length or are empty. Where one reading has no rates (at
+    a singularity, or without the effect), no rates are published. The same holds for efforts.
     """
     positions = [value for reading in readings for value in reading.joints]
     rates = [value for reading in readings for value in reading.rates]
@@ -772,12 +772,12 @@ def _joined(
 
 
 def _of_all(values: list[float], count: int) -> list[float]:
-    """Return values if there is one for each joint, else none."""
+    """Return the values if there is one for each joint, else an empty list."""
     return values if len(values) == count else []
 
 
 def _named(seen: LinkageTick | Numbers) -> LinkageTick | Seen:
-    """Return what a linkage comes to with the names of its parts."""
+    """Return the state of a linkage as a named tuple."""
     if isinstance(seen, LinkageTick):
         return seen
     crank, reading, reactions = seen

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Which of several receivers a message is for, by the joints that it names."""
+"""Route a message to the linkages whose joints it names."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from linkage_ros.messages.joint_state import head_of
 from linkage_ros.messages.layout import STAMP_END
 
 _MOST = 1000
-"""How many kinds of messages are remembered; a bound against one who sends ever new names."""
+"""Most kinds of messages in the cache; a limit against ever new names."""
 
 _LONGEST = 100_000
-"""Where names may end at most that are remembered, in bytes; a bound against huge messages."""
+"""Greatest end of the names for the cache [bytes]; a limit against huge messages."""
 
 Receiver = TypeVar('Receiver')
 
 
 class SampleRouter(Generic[Receiver]):
     """
-    Finds the receivers of messages; a message with the same names as one before is not parsed.
+    Finds the receivers of a message; parses a message only if its joint names are new.
 
     Parameters
     ----------
     wanted
-        For each receiver the joints of which it needs all.
+        The joints that each receiver needs; a message must name all of them.
 
     """
 
@@ -49,11 +49,11 @@ class SampleRouter(Generic[Receiver]):
         self._all = tuple(wanted)
         self._wanted = {to: {joint.encode() for joint in joints} for to, joints in wanted.items()}
         self._ends: dict[int, list[int]] = {}
-        """For each length of a message where the names may end in it."""
+        """Possible ends of the names, by length of the message."""
         self._found: dict[bytes, tuple[Receiver, ...]] = {}
 
     def find(self, message: bytes) -> tuple[Receiver, ...]:
-        """Return the receivers of a JointState, serialized; of a malformed one all."""
+        """Return the receivers of a serialized JointState; of a malformed one, all receivers."""
         for end in self._ends.get(len(message), ()):
             known = self._found.get(message[STAMP_END:end])
             if known is not None:
@@ -62,14 +62,14 @@ class SampleRouter(Generic[Receiver]):
         if head is None:
             return self._all
         names, end = head
-        found = tuple(to for to, joints in self._wanted.items() if joints <= names)
+        receivers = tuple(to for to, joints in self._wanted.items() if joints <= names)
         if end > _LONGEST:
-            return found
+            return receivers
         if len(self._found) >= _MOST:
             self._ends.clear()
             self._found.clear()
         ends = self._ends.setdefault(len(message), [])
         if end not in ends:
             ends.append(end)
-        self._found[message[STAMP_END:end]] = found
-        return found
+        self._found[message[STAMP_END:end]] = receivers
+        return receivers

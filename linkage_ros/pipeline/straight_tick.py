@@ -14,15 +14,15 @@
 
 
 """
-The usual tick of a linkage as one function, written as text: nothing between its formulas.
+Generate the usual tick of a linkage as one straight function of Python text.
 
-In the usual tick there is a crank, every loop closes, the linkage and its forces are on the path
-that was compiled, and no published angle jumps. All else, the first tick among it, is left to the
-plain tick. Both have the same bits.
+In the usual tick there is a crank state, every loop closes, the linkage and its forces follow the
+compiled path, and no published angle wraps. Every other tick, the first among them, is left to the
+plain tick. Both give the same bits.
 
-A tick comes once a millisecond, to a processor that has done other things since. What it costs
-then is the memory that it touches: frames, objects, functions. A straight function of local
-variables touches least.
+A tick comes once a millisecond, to a processor whose caches hold other data. Its cost is then the
+memory that it touches: frames, objects, functions. A straight function of local variables touches
+least.
 """
 
 from __future__ import annotations
@@ -46,21 +46,21 @@ if TYPE_CHECKING:
 _CRANK = ', '.join(CrankState._fields)
 
 Plain = Callable[[int, CrankState | None], Any]
-"""Does a tick at a time, in [ns], from the crank on, step by step."""
+"""Computes a tick at a time, in [ns], step by step from the given crank state on."""
 
 
 class Seen(NamedTuple):
     """
-    What a compiled linkage comes to at a tick: what is published, and what the rest follows from.
+    The state of a compiled linkage at a tick: the reading, and what the full state derives from.
 
     Attributes
     ----------
     crank
-        The crank.
+        State of the crank.
     reading
-        What is published; None where nothing is.
+        Published values; None where nothing is published.
     reactions
-        In pins and sliders, each as a `Reaction` has them; empty where no message has them.
+        Forces in pins and sliders, each as in `Reaction`; empty where no message holds them.
 
     """
 
@@ -75,17 +75,17 @@ Numbers: TypeAlias = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
 
 class Straight(NamedTuple):
     """
-    A usual tick up to its reading, in lines of Python.
+    The usual tick up to its reading, as lines of Python.
 
     Attributes
     ----------
     lines, bound
-        They make what follows of ``now``, the fields of a `CrankState` by their names among it, or
-        leave by ``plain``.
+        Lines that compute from ``now``, and the objects that they use. They define the fields of
+        `CrankState` by name, or return through ``plain``.
     joints, rates, accelerations, efforts
-        Of the reading, as expressions; none where they are not called for.
+        Values of the reading, as expressions; empty where the scene does not ask for them.
     reactions
-        The numbers of all, one after the other, as expressions; likewise.
+        All reaction values in sequence, as expressions; likewise.
 
     """
 
@@ -110,14 +110,14 @@ def straight(
     Parameters
     ----------
     drive
-        Where the crank comes from.
+        Source of the crank state.
     drive_stages
-        What is between the drive and the crank.
+        Stages between the drive and the crank.
     compiled
-        The linkage; it is closed somewhere. It returns, as far as they are called for, what a
-        `Straight` has.
+        The compiled linkage, which closes for at least one input. It returns the values of a
+        `Straight`, as far as the scene asks for them.
     angles
-        Lets the published angles run on; None where they need not.
+        Unwraps the published angles; None if that is not needed.
 
     """
     crank = drive.straight(compiled.driven, 'return plain(now, None)')
@@ -157,7 +157,7 @@ def straight(
         lines += [f'{name} = {output}' for name, output in zip(numbers, outputs, strict=True)]
     joints, rates, accelerations, efforts, reactions = groups + [[]] * (5 - len(groups))
     if efforts and drive_stages:
-        # A motor that moves alone, within its play, bears itself.
+        # Within its play, the motor moves alone and carries only itself.
         leave_unless("{*getattr(crank, 'free_motors', ())} <= {None}")
     if angles is not None:
         bound['running'] = angles
@@ -181,16 +181,16 @@ def straight_look(
     plain: Plain,
 ) -> Callable[[int], Any]:
     """
-    Return what a linkage comes to, as a function of the time, in [ns].
+    Return the state of a linkage as a function of the time, in [ns].
 
     Parameters
     ----------
     usual
         Its usual tick.
     read
-        What further sensors read; None where there are none.
+        Applies further sensor stages; None where there are none.
     plain
-        What does the other ticks.
+        Computes all other ticks.
 
     """
     lines = [f'crank = new(CrankState, ({_CRANK}))', f'reading = new(Reading, {_reading(usual)})']
@@ -202,21 +202,21 @@ def straight_look(
 
 def straight_share(usual: Straight, plain: Plain) -> Callable[..., Any]:
     """
-    Return what adds a linkage's part to a message of several.
+    Return a function that adds one linkage to a message of several.
 
     Parameters
     ----------
     usual
         Its usual tick; its reading is what is published.
     plain
-        What does the other ticks.
+        Computes all other ticks.
 
     Returns
     -------
     share
-        A function of the time, in [ns], and of the lists of positions, rates and efforts, to which
-        it adds. It returns what the linkage comes to. In a tick that ``plain`` does it adds
-        nothing.
+        A function of the time, in [ns], and of the lists of positions, rates and efforts, which
+        it extends. It returns the state of the linkage. A tick computed by ``plain`` extends none
+        of the lists.
 
     """
     groups = {'positions': usual.joints, 'rates': usual.rates, 'efforts': usual.efforts}
@@ -244,13 +244,13 @@ def straight_tick(
     usual
         The linkage's usual tick; its reading is what is published.
     writer
-        Of the joint states.
+        Serializes the joint states.
     extras
-        What writes the other messages, of the reading alone or of a `Seen`.
+        Serialize the other messages, from the reading alone or from a `Seen`.
     tick, linkages
-        The type of what a tick comes to, and the linkages that it names.
+        The type of the result, and the linkages that it refers to.
     plain
-        What does the other ticks.
+        Computes all other ticks.
 
     """
     bound: dict[str, Any] = {'Tick': tick, 'linkages': linkages, 'plain': plain}
@@ -279,7 +279,8 @@ def _function(
     bound: dict[str, Any],
     parameters: Sequence[str] = ('now',),
 ) -> Callable[..., Any]:
-    # The constructor of a named tuple is a function of Python's; this is one of C's.
+    # The constructor of a named tuple is a Python function; `tuple.__new__` is a C function.
+
     new = tuple.__new__
     types = {'new': new, 'CrankState': CrankState, 'Reading': SensorReading, 'Seen': Seen}
     source = '\n    '.join([f'def tick({", ".join(parameters)}):', *usual.lines, *lines])

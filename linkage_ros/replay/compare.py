@@ -14,11 +14,10 @@
 
 
 """
-A recorded run against another one of the same ticks, message by message and number by number.
+Compare a recorded run with a second run of the same ticks, message by message.
 
-Two messages are the same where their bytes are. Else their numbers are compared one by one: how
-far they are apart, in their unit and in units in the last place, which are counted as the doubles
-between the two.
+Two messages are equal if their bytes are. Otherwise their numbers are compared one by one: the
+difference is given in their unit and in ulps, counted as the doubles between the two.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ _DOUBLE, _BITS = Struct('<d'), Struct('<q')
 
 
 class At(NamedTuple):
-    """A tick of the bag: its number, counted from 1, and the time that it solved for, in [ns]."""
+    """A tick of the bag: its number, counted from 1, and the time it is solved for, in [ns]."""
 
     tick: int
     time: int
@@ -42,20 +41,20 @@ class At(NamedTuple):
 
 class First(NamedTuple):
     """
-    A difference.
+    A difference between the two runs.
 
     Attributes
     ----------
     at
-        Where.
+        The tick.
     topic
-        On which topic.
+        The topic.
     what
-        In words, or the quantity of a joint.
+        Description, or the quantity of a joint.
     joint
-        '' where it is not one joint's.
+        Name of the joint; '' if the difference does not concern one joint.
     recorded, now
-        The numbers; nothing where it is not about numbers.
+        The two numbers; None if the difference does not concern numbers.
 
     """
 
@@ -68,7 +67,7 @@ class First(NamedTuple):
 
 
 class Deviation:
-    """How far a number of a joint is from what was recorded, over all ticks."""
+    """Deviation of one number of a joint from the recorded one, over all ticks."""
 
     __slots__ = ('_squares', 'at', 'compared', 'differing', 'greatest', 'ulps', 'ulps_at')
 
@@ -81,7 +80,7 @@ class Deviation:
 
     @property
     def rms(self) -> float:
-        """Return the root of the mean of the squares of the differences."""
+        """Return the root mean square of the differences."""
         return sqrt(self._squares / self.compared) if self.compared else 0.0
 
     def add(self, recorded: float, now: float, at: At) -> None:
@@ -100,43 +99,43 @@ class Deviation:
 
 class TopicComparison:
     """
-    What was recorded on a topic against what is published on it now.
+    Comparison of the recorded messages of a topic with the reproduced ones.
 
     Parameters
     ----------
     name, message_type
-        Of the topic.
+        Name and message type of the topic.
 
     """
 
     def __init__(self, name: str, message_type: str) -> None:
         self.name = name
         self.recorded = self.same = self.but_turns = self.different = 0
-        """Messages in the bag; of these the same, the same but for whole turns, and others."""
+        """Messages in the bag: the same, the same up to whole turns, and different."""
         self.gone = self.not_recorded = 0
-        """Messages in the bag of which there is none now, and the other way round."""
+        """Messages in the bag that were not reproduced, and the reverse."""
         self.deviations: dict[Key, Deviation] = {}
         self.only_recorded: dict[str, None] = {}
         self.only_now: dict[str, None] = {}
-        """Joints that only one of the two has."""
+        """Joints that only one of the two runs has."""
         self._then, self._now = MessageValues(message_type), MessageValues(message_type)
         self._last: tuple[Key, ...] = ()
         self._in_last = 0
 
     def add_same(self, message: bytes) -> None:
-        """Add a message that came again."""
+        """Add a message that was reproduced."""
         self.same += 1
         values = self._then.read(message)
         if isinstance(values, str):
             return
-        # Deviations are looked up where the layout changes only, which is seldom.
+        # Look deviations up only when the layout changes, which is rare.
         if values.keys is not self._last:
             self.settle()
             self._last = values.keys
         self._in_last += 1
 
     def settle(self) -> None:
-        """Count what came again into the deviations."""
+        """Include the reproduced messages in the deviations."""
         for key in self._last if self._in_last else ():
             self.deviations.setdefault(key, Deviation()).compared += self._in_last
         self._in_last = 0
@@ -145,17 +144,17 @@ class TopicComparison:
         self, recorded: bytes, now: bytes, at: At, turning: Mapping[str, bool]
     ) -> First | None:
         """
-        Add two messages that are not the same; return their first difference.
+        Add two different messages; return their first difference.
 
         Parameters
         ----------
         recorded, now
-            The messages.
+            The two messages.
         at
-            Where.
+            The tick.
         turning
-            Joints whose positions may differ by whole turns; where they differ by nothing else,
-            nothing is returned.
+            Joints whose positions may differ by whole turns. If the messages differ by nothing
+            else, the result is None.
 
         """
         then, again = self._then.read(recorded), self._now.read(now)
@@ -189,12 +188,12 @@ class TopicComparison:
 
 class Comparison:
     """
-    A recorded run against another one.
+    Comparison of a recorded run with a second one.
 
     Parameters
     ----------
     topics
-        What is compared: names and types.
+        Names and types of the compared topics.
     turning
         As for `TopicComparison.add_different`.
 
@@ -205,18 +204,18 @@ class Comparison:
     ) -> None:
         self.topics = [TopicComparison(name, kind) for name, kind in topics]
         self.ticks = self.differing = 0
-        """How many ticks were compared, and how many of them differ."""
+        """Numbers of compared and of different ticks."""
         self.withheld = 0
-        """How many ticks are without a message, then and now."""
+        """Numbers of ticks without a message, recorded and now."""
         self.first: First | None = None
         self.last: At | None = None
-        """The last tick that differs."""
+        """Last tick that differs."""
         self._turning = turning or {}
 
     def add(self, at: At, recorded: Sequence[bytes], now: Sequence[bytes]) -> None:
-        """Add a tick: for each topic a message, empty where there is none."""
+        """Add a tick: a message for each topic, empty if there is none."""
         self.ticks += 1
-        found: First | None = None
+        first_difference: First | None = None
         silent = not any(recorded)
         if silent and not any(now):
             self.withheld += 1
@@ -226,7 +225,7 @@ class Comparison:
             if not then:
                 if again:
                     topic.not_recorded += 1
-                    # Beside other messages of the tick: the recorder had to drop it.
+                    # If other messages of the tick are there, the recorder had to drop this one.
                     if silent:
                         difference = First(at, topic.name, 'withheld then, published now')
             else:
@@ -238,20 +237,20 @@ class Comparison:
                 else:
                     topic.gone += 1
                     difference = First(at, topic.name, 'published then, nothing now')
-            found = found or difference
-        if found:
+            first_difference = first_difference or difference
+        if first_difference:
             self.differing += 1
-            self.first = self.first or found
+            self.first = self.first or first_difference
             self.last = at
 
     def settle(self) -> None:
-        """Count what is not in the deviations yet; to be called before they are read."""
+        """Bring the deviations up to date; call this before reading them."""
         for topic in self.topics:
             topic.settle()
 
 
 def ulps(a: float, b: float) -> int:
-    """Return how many steps from double to double lie between two; 0 between -0 and 0."""
+    """Return the number of steps from one double to another; 0 between -0 and 0."""
     return abs(_rank(a) - _rank(b))
 
 
@@ -261,28 +260,28 @@ def _rank(value: float) -> int:
 
 
 def _equal(a: float, b: float) -> bool:
-    """Return whether two numbers are the same, to the sign of a zero."""
+    """Return whether two numbers are the same, including the sign of zero."""
     return (a == b and copysign(1.0, a) == copysign(1.0, b)) or (isnan(a) and isnan(b))
 
 
 def _unturned(
     then: Values, numbers: Mapping[Key, float], turning: Mapping[str, bool]
 ) -> dict[Key, float]:
-    """Return the positions that differ by whole turns alone, as they were recorded."""
-    found = {}
+    """Return the positions, with whole-turn differences replaced by the recorded values."""
+    unturned = {}
     for key, recorded in zip(then.keys, then.numbers, strict=True):
         if key[1] == POSITION and turning.get(key[0]) and key in numbers:
             apart = recorded - numbers[key]
             turns = round(apart / tau) if isfinite(apart) else 0
-            # Both are the same angle with turns added, each rounded once.
+            # Both are the same angle plus turns, each rounded once.
             rounding = 2.0 * ulp(max(abs(recorded), abs(numbers[key])))
             if turns and abs(apart - turns * tau) <= rounding:
-                found[key] = recorded
-    return found
+                unturned[key] = recorded
+    return unturned
 
 
 def _why(then: Values, again: Values) -> str:
-    """Return in words how two messages differ that have no numbers that do."""
+    """Return the difference of two messages whose numbers are equal, as text."""
     if then.names != again.names:
         return f'joints: {", ".join(then.names)} then, {", ".join(again.names)} now'
     if then.keys != again.keys:

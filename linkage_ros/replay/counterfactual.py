@@ -13,16 +13,16 @@
 # limitations under the License.
 
 """
-What would have been: another scene over the crank samples of a bag.
+Run another scene on the crank samples of a bag.
 
-Where both scenes have the same rate, its ticks are those of the bag, and where the bag has none,
-because the linkage was open or had no crank, a period apart. At another rate they are a period
-apart from the first on, each moved onto a tick of the bag where one is within half a period; so
-what was recorded then can be compared. A scene with a rate of 0 ticks for every good sample.
+If both scenes have the same rate, the ticks are those of the bag. Where the bag has none, because
+the linkage was open or had no crank state, ticks are one period apart. At another rate ticks are
+one period apart from the first one on, and each moves to a tick of the bag that is within half a
+period, so that both can be compared. A scene with a rate of 0 ticks for every good sample.
 
-A fault that both scenes have alike begins and ends when it did in the run; others do as the other
-scene says. What is yielded is what a recorder would have been given, so that a replay of it comes
-to the same again: time jumps back where what is written does.
+A fault that is the same in both scenes begins and ends as in the run; others follow the other
+scene. The events that are yielded are those that a recorder would have been given, so that a
+replay of them gives the same result: time jumps back where the written times do.
 """
 
 from __future__ import annotations
@@ -46,21 +46,21 @@ if TYPE_CHECKING:
 
 
 _LARGEST_LEAD = 2 * 3600 * 1_000_000_000
-"""No sample that was taken was as far ahead of its tick, in [ns]."""
+"""Bound on the lead of a sample's stamp over its tick, in [ns]."""
 
 
 class Remade(NamedTuple):
     """
-    A tick as it would have been.
+    A tick of the other scene.
 
     Attributes
     ----------
     log_time, time
-        When it is, and for when it is solved, in [ns].
+        Time of the tick, and the time it is solved for, in [ns].
     recorded
-        What the bag has of it; nothing where it has none.
+        Recorded messages of the tick; empty if the bag has none.
     tick
-        What the scene comes to; nothing where it does not tick then.
+        Result of the scene; None if it does not tick then.
 
     """
 
@@ -74,7 +74,7 @@ Done = SampleEvent | FaultEvent | Reset | Remade
 
 
 def check_drives(scene: Scene, where: str) -> None:
-    """Raise LinkageError where a scene does not take its crank from a topic."""
+    """Raise LinkageError if a scene does not read its crank from a topic."""
     for member in scene.members:
         drive, _ = member.drive
         if drive != 'topic':
@@ -88,14 +88,14 @@ def check_drives(scene: Scene, where: str) -> None:
 
 class Counterfactual:
     """
-    A scene over the samples of a bag.
+    A scene that runs on the samples of a bag.
 
     Parameters
     ----------
     scene
-        The scene; its drives are topics.
+        The scene; all its drives read topics.
     recorded
-        That which was run; nothing where it is not known.
+        The recorded scene; None if unknown.
 
     """
 
@@ -110,9 +110,9 @@ class Counterfactual:
         self._pipeline = Pipeline(scene, None, self._injection)
         self._closures = self._pipeline.closures
         self.extras = self._pipeline.extras
-        """Its topics beside the joint states."""
+        """Auxiliary topics of the scene."""
         self.withholds = self._pipeline.withholds
-        """Whether there may be ticks of which a replay has to know, and without a message."""
+        """Whether ticks without a message may matter to a replay."""
         self._seen = self._last = 0  # the log times of the last event, and of what was written
         self._period = round(1e9 / scene.rate) if scene.rate else 0
         theirs = recorded.rate if recorded is not None else 0.0
@@ -136,16 +136,16 @@ class Counterfactual:
         )
 
     def run(self, events: Iterable[Event]) -> Iterator[Done]:
-        """Yield, in their order, what is written: samples, faults, resets and ticks."""
+        """Yield the events of the run, in order: samples, faults, resets and ticks."""
         return self._on_clock(events) if self._period else self._on_samples(events)
 
     def withheld(self, tick: Tick) -> bool:
-        """Return whether a tick without a message is one of which a replay has to know."""
-        said = tick.message or tick.extras
-        return self.withholds and not said and self._pipeline.remembers(tick)
+        """Return whether a tick without a message is one that a replay has to know of."""
+        published = tick.message or tick.extras
+        return self.withholds and not published and self._pipeline.remembers(tick)
 
     def _on_samples(self, events: Iterable[Event]) -> Iterator[Done]:
-        made: Remade | None = None  # what the bag has of it may follow
+        made: Remade | None = None  # its recorded messages may follow
         for event in events:
             if isinstance(event, TickEvent):
                 if made is not None and made.time == event.time:
@@ -168,7 +168,7 @@ class Counterfactual:
             yield made
 
     def _on_clock(self, events: Iterable[Event]) -> Iterator[Done]:
-        taken: int | None = None  # when a tick took samples that may have published nothing
+        taken: int | None = None  # time of a tick that took samples and perhaps published nothing
         for event in events:
             at = event.log_time
             if taken is not None and taken != at:
@@ -202,7 +202,7 @@ class Counterfactual:
     def _known(
         self, log_time: int, at: int, recorded: tuple[bytes, ...]
     ) -> Iterator[FaultEvent | Remade]:
-        """Tick where the run has ticked, if it is time; times in [ns]."""
+        """Tick at a tick of the run, if it is due; times in [ns]."""
         yield from self._catch_up(at)
         due = self._due
         if due is not None and at < due - self._slack and not self._same_rate:
@@ -214,11 +214,11 @@ class Counterfactual:
         self._due = (at if due is None or self._same_rate else due) + self._period
 
     def _catch_up(self, to: int) -> Iterator[FaultEvent | Remade]:
-        """Make the ticks that were due before a time, in [ns]."""
+        """Compute the ticks that were due before a time, in [ns]."""
         while (due := self._due) is not None and due + self._slack < to:
             age = self._clock(due) - self._pipeline.newest_stamp
-            # Without a crank nothing comes of a tick, however many there are; and a bag whose
-            # times are nonsense may ask for years of them.
+            # Without a crank state, ticks have no result, however many there are; and the times of
+            # a damaged bag may span years.
             if not -_LARGEST_LEAD <= age <= self._pipeline.max_age:
                 self._due = due + -(-(to - self._slack - due) // self._period) * self._period
                 return
@@ -231,7 +231,7 @@ class Counterfactual:
     def _tick_unless_back(
         self, now: int, at: int, recorded: tuple[bytes, ...]
     ) -> Iterator[Remade]:
-        """Tick; where time has jumped back, there is no crank until the next sample."""
+        """Tick; after a backward jump of time there is no crank state until the next sample."""
         if now >= self._last:
             yield self._tick(now, at, recorded)
         elif recorded:
@@ -255,20 +255,20 @@ class Counterfactual:
         return good
 
     def _reset(self, event: Reset) -> Reset:
-        """Begin anew where the run did."""
+        """Reset where the run did."""
         self._last = now = self._clock(event.log_time)
         self._pipeline = Pipeline(self._scene, self._closures, self._injection)
         return Reset(now, now, event.data)
 
     def _follow(self, event: FaultEvent) -> Iterator[FaultEvent]:
-        """Let a fault begin or end as it did in the run."""
+        """Let a fault begin or end as in the run."""
         try:
             name, on = read_change(event.data)
         except ValueError:
             return
         if self._injection is None or name not in self._followed:
             return
-        # What a jump did to the clock is in the times of the bag already.
+        # The times of the bag already contain the effect of a time jump.
         if self._scene.faults[name].kind != 'time_jump':
             self._injection.turn(name, on)
         now = self._clock(event.log_time)
@@ -276,7 +276,7 @@ class Counterfactual:
         yield FaultEvent(now, now, event.data)
 
     def _change(self, now: int) -> Iterator[FaultEvent]:
-        """Let faults begin and end that are this scene's own, at a time in [ns]."""
+        """Let faults of this scene begin and end at a time, in [ns]."""
         if self._injection is None:
             return
         for change in self._injection.advance(now):
@@ -289,13 +289,11 @@ class Counterfactual:
         return time if self._injection is None else self._injection.clock(time)
 
     def _write_at(self, now: int) -> None:
-        """Begin anew where what is written jumps back in time; a replay does so there too."""
+        """Reset where the written time jumps back; a replay resets there too."""
         if now < self._last:
             self._pipeline = Pipeline(self._scene, self._closures, self._injection)
         self._last = now
 
-
-# On which topic of a bag the samples are that a scene needs.
 
 DEFAULT = '/crank_states'
 
@@ -309,26 +307,26 @@ def find_crank_topic(
     typed: str | None,
 ) -> str:
     """
-    Return the topic of the samples that all linkages of a scene can be driven with.
+    Return the topic whose samples drive all linkages of a scene.
 
     Parameters
     ----------
     bag
         The bag.
     messages
-        Its messages; they are looked at as far as needed.
+        Its messages, read only as far as needed.
     scene
         The scene.
     run, recorded
-        What the bag says of its run, and its scene; blank and nothing where it does not.
+        The run's account in the bag, and its scene; blank and None if the bag has none.
     typed
-        The topic that was asked for. Absent, it is that of the run, `DEFAULT`, or the only one
-        that has such samples, whichever the bag has first.
+        The topic that the user asked for. If None, the topic of the run, `DEFAULT`, or the only
+        topic with such samples, whichever of these the bag has first.
 
     Raises
     ------
     BagError
-        Where there is none, or more than one.
+        There is no such topic, or more than one.
 
     """
     readers = {
@@ -340,12 +338,12 @@ def find_crank_topic(
     for topic, _, _, data in messages if readers else ():
         if not wanting.get(topic):
             continue
-        found = [
+        candidates = [
             number for number in wanting[topic]
             if not isinstance(readers[topic][number].read(data), Rejection)
         ]  # fmt: skip
-        wanting[topic].difference_update(found)
-        if not found:
+        wanting[topic].difference_update(candidates)
+        if not candidates:
             head = head_of(data)
             names |= dict.fromkeys(
                 name.decode('utf-8', 'backslashreplace')
@@ -391,7 +389,7 @@ def _candidates(
 def _none(
     bag: Bag, inputs: Sequence[str], topics: Sequence[str], names: Sequence[str]
 ) -> BagError:
-    """Return what is missing, and what is there."""
+    """Return an error message with the missing joints and the existing topics."""
     missing = [name for name in inputs if name not in names] or inputs
     where = f' on {listed(topics)}' if topics else f'; it has no topic of {JOINT_STATE}'
     there = f', which has {listed(names)}' if names else ''

@@ -14,13 +14,13 @@
 
 
 """
-A run once more, from its bag: the same pipeline over the same samples in the same order.
+Replay a run from its bag: the same pipeline on the same samples in the same order.
 
-The bag holds the messages in the order in which the tick took and published them. The log time is
-that by which the tick judged a sample, the publish time of what it published that for which it
-solved. So the pipeline, built from the scene in the bag, comes to the same states. Faults begin
-and end where the bag says so, not by the scene's timeline: somebody may have asked for one. So
-with a reset.
+The bag holds the messages in the order in which the tick took and published them. The log time of
+a sample is the time against which the tick checked it; the publish time of a published message is
+the time that the tick solved for. So the pipeline, built from the scene in the bag, reproduces the
+same states. Faults and resets follow the bag, not the timeline of the scene, since a service call
+may have caused them.
 """
 
 from __future__ import annotations
@@ -53,18 +53,18 @@ if TYPE_CHECKING:
 
 class ReplayedTick(NamedTuple):
     """
-    What a bag holds of a tick and what the same tick comes to now.
+    A tick of a bag and the result of the same tick now.
 
     Attributes
     ----------
     time
         Time of the tick, in [ns].
     recorded
-        Its joint state in the bag; empty where there is none.
+        Recorded joint state; empty if there is none.
     recorded_extras
-        For each of the pipeline's extras its message in the bag; empty where there is none.
+        Recorded message of each auxiliary topic of the pipeline; empty if there is none.
     tick
-        What the pipeline makes of the bag's samples.
+        Result of the pipeline for the samples of the bag.
 
     """
 
@@ -76,21 +76,21 @@ class ReplayedTick(NamedTuple):
 
 def recorded_scene(bag: Bag, *, trust_effects: bool = False) -> Scene:
     """
-    Return the scene that a bag carries.
+    Return the scene stored in a bag.
 
     Parameters
     ----------
     bag
         The bag.
     trust_effects
-        As for `parse_scene`: a bag may come from anybody.
+        As for `parse_scene`: the bag may come from an untrusted source.
 
     Raises
     ------
     BagError
-        Where it carries none.
+        The bag has no scene.
     FileError
-        Where this version cannot read it.
+        This version cannot read the scene.
 
     """
     missing = {RUN_FILE, SCENE_FILE} - set(bag.attachments)
@@ -118,7 +118,7 @@ def recorded_scene(bag: Bag, *, trust_effects: bool = False) -> Scene:
 
 
 def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
-    """Run a scene over a bag's samples; yield every tick of which the bag holds a message."""
+    """Run a scene on a bag's samples; yield every tick with a message in the bag."""
     for tick in replay_all(bag, scene, bag.messages()):
         if tick.recorded or any(tick.recorded_extras):
             yield tick
@@ -126,16 +126,16 @@ def replay(bag: Bag, scene: Scene) -> Iterator[ReplayedTick]:
 
 def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterator[ReplayedTick]:
     """
-    Run a scene over a bag's samples; yield the ticks that withheld their messages, too.
+    Run a scene on a bag's samples; yield the ticks with suppressed messages too.
 
     Parameters
     ----------
     bag
         The bag.
     scene
-        The scene that it carries.
+        The scene in the bag.
     messages
-        The bag's.
+        Messages of the bag.
 
     """
     pipeline = Pipeline(scene)
@@ -164,37 +164,39 @@ def replay_all(bag: Bag, scene: Scene, messages: Iterable[BagMessage]) -> Iterat
 
 
 def own_joint_states(scene: Scene) -> OwnJointStates:
-    """Return what tells the joint states of a scene from others on their topic."""
+    """Return a predicate for the joint states of a scene among others on their topic."""
     return OwnJointStates(member.joints for member in scene.members)
 
 
 def change_text(change: Change, kind: str) -> str:
-    """Return that a fault has begun or ended, as the text that is published and recorded."""
+    """Return the begin or end of a fault as the text that is published and recorded."""
     return json.dumps({'fault': change.name, 'kind': kind, 'injected': change.on})
 
 
 def read_change(message: bytes) -> tuple[str, bool]:
     """
-    Return what a message of the faults' topic says: of which fault, and whether it began.
+    Return the fault that a message of the faults' topic names, and whether it begins.
 
     Raises
     ------
     ValueError
-        Where it does not say that.
+        The message has another content.
 
     """
     try:
-        said = json.loads(text_of(message))
+        content = json.loads(text_of(message))
     except RecursionError:
         raise ValueError('too deep') from None
-    name, on = (said.get('fault'), said.get('injected')) if isinstance(said, dict) else (0, 0)
+    name, on = (
+        (content.get('fault'), content.get('injected')) if isinstance(content, dict) else (0, 0)
+    )
     if not isinstance(name, str) or not isinstance(on, bool):
         raise ValueError('not a change')
     return name, on
 
 
 def turn(bag: Bag, injection: Injection, message: bytes) -> None:
-    """Turn a fault on or off, as a message of a bag says; raise `BagError` where it cannot be."""
+    """Turn a fault on or off by a message of a bag; raise `BagError` if that is impossible."""
     try:
         injection.turn(*read_change(message))
     except (ValueError, KeyError):
@@ -204,13 +206,13 @@ def turn(bag: Bag, injection: Injection, message: bytes) -> None:
 
 
 def versions_here() -> dict[str, str]:
-    """Return the versions of what runs here, as a run's account has them."""
-    found = (__version__, platform.python_version(), platform.machine())
-    return dict(zip(VERSIONS, found, strict=True))
+    """Return the versions of the installed software, in the form of a run's account."""
+    here = (__version__, platform.python_version(), platform.machine())
+    return dict(zip(VERSIONS, here, strict=True))
 
 
 def own_effects_here(scene: Scene) -> dict[str, str]:
-    """Return which modules the effects of a scene are that are not of this package."""
+    """Return the modules of the user-defined effects of a scene."""
     names = {name for member in scene.members for name in member.effects if '.' in name}
     if not names:
         return {}

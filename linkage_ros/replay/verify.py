@@ -14,12 +14,12 @@
 
 
 """
-The proof of a bag: its scene run once more over its samples, and compared with what is recorded.
+Verify a bag: run its scene again on its samples, and compare with the recorded messages.
 
-A bag that does not hold its run from the beginning (begun in mid-run, or its first files have made
-way for newer ones) lacks what the node remembered then: the newest sample, whole turns, delay
-lines, random generators. Its first ticks, until one comes again, say nothing; and whole turns are
-no difference there.
+A bag may lack the start of its run (recording began later, or its first files made way for newer
+ones). Then the state of the node at that time is missing: the newest sample, whole turns, delay
+lines, random generators. The ticks before the first one that is reproduced do not count, and whole
+turns are no difference.
 """
 
 from __future__ import annotations
@@ -40,28 +40,28 @@ IDENTICAL, DIFFERENT, UNTOLD = 'identical', 'different', 'cannot be told'
 
 _NEVER_FOUND_AGAIN = ('rate_limit', 'noise', 'jitter', 'dropout')
 """
-Effects whose memory does not come back: generators, and the time of the first tick. So with an
-incremental encoder, which counts from where it was switched on, and with markers that leave a
-trace.
+Effects whose state is not recovered: random generators, and the time of the first tick. So for an
+incremental encoder, which counts from power-on, and for markers with a trail.
 """
 
 
 class ReplayVerification(NamedTuple):
     """
-    What came of running a bag's scene once more.
+    Result of running the scene of a bag again.
 
     Attributes
     ----------
     comparison
-        The ticks that could be compared.
+        Comparison of the ticks that could be compared.
     untold
-        How many ticks at the start could not be told, since the run's beginning is not in the bag.
+        Number of ticks at the start that cannot be judged, since the bag lacks the start of the
+        run.
     first_untold
-        What the first of these differs in.
+        First difference of the first such tick.
     beginning
-        Why it is not; '' where it is.
+        Reason why the start of the run is missing; '' if it is there.
     lost
-        Drives and effects that then never come to the same again.
+        Drives and effects that then never reproduce the run.
 
     """
 
@@ -73,16 +73,16 @@ class ReplayVerification(NamedTuple):
 
     @property
     def ticks(self) -> int:
-        """Return how many ticks the bag holds."""
+        """Return the number of ticks in the bag."""
         return self.comparison.ticks + self.untold
 
     @property
     def verdict(self) -> str:
         """Return `IDENTICAL`, `DIFFERENT` or `UNTOLD`."""
-        found = self.comparison
-        if self.untold and not found.ticks:
+        comparison = self.comparison
+        if self.untold and not comparison.ticks:
             return UNTOLD
-        if found.differing:
+        if comparison.differing:
             return UNTOLD if self.lost else DIFFERENT
         return IDENTICAL
 
@@ -101,17 +101,17 @@ def verify_replay(
     bag, scene, messages
         As for `replay_all`.
     look
-        Is shown every tick.
+        Callback that receives every tick.
 
     Raises
     ------
     LinkageError
-        Where the scene cannot be run.
+        The scene cannot be run.
 
     """
     run = run_account(bag)
     types = [extra.message for extra in Pipeline(scene).extras]
-    types += [JOINT_STATE] * len(run.extras)  # for those of which the scene knows nothing
+    types += [JOINT_STATE] * len(run.extras)  # for topics that the scene does not know
     topics = [(run.joint_states_topic, JOINT_STATE), *zip(run.extras, types, strict=False)]
     silent = (b'',) * len(topics)
     beginning = lost_beginning(bag, run)
@@ -137,7 +137,7 @@ def verify_replay(
 
 
 def beginning_text(proof: ReplayVerification) -> str:
-    """Return in words what could not be told of a bag without the beginning of its run."""
+    """Return text on the ticks that cannot be judged in a bag without the start of its run."""
     text = f'{proof.beginning}: what the node remembered then is not in it, so {proof.untold} '
     text += f'of {proof.ticks} ticks, at the start, could not be told'
     if proof.verdict == UNTOLD and proof.lost:
@@ -146,14 +146,14 @@ def beginning_text(proof: ReplayVerification) -> str:
 
 
 def turning_joints(scene: Scene) -> dict[str, bool]:
-    """Return of each joint of a scene, published or driven, whether it turns, or slides."""
-    found: dict[str, bool] = {}
+    """Return for each joint of a scene, published or driven, whether it is a revolute joint."""
+    revolute: dict[str, bool] = {}
     for member in scene.members:
         driven = [not given.slider for given in member.linkage.inputs]
-        found |= dict(zip(member.inputs, driven, strict=True))
+        revolute |= dict(zip(member.inputs, driven, strict=True))
         kinds = [isinstance(joint, RevoluteJoint) for joint in member.linkage.joints.values()]
-        found |= dict(zip(member.joints, kinds, strict=True))
-    return found
+        revolute |= dict(zip(member.joints, kinds, strict=True))
+    return revolute
 
 
 def _lost(scene: Scene) -> tuple[str, ...]:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The worst states of a recorded run: where its loops close worst, and come nearest a toggle."""
+"""Worst states of a recorded run: largest closure residual and nearest singularity."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ _TOLD_EVERY = 1024
 
 class Place(NamedTuple):
     """
-    When something was, and where.
+    A state of a run.
 
     Attributes
     ----------
     time
-        The time that was solved for, in [ns].
+        Time that was solved for, in [ns].
     inputs
-        Of the linkage, in [rad] or [m].
+        Inputs of the linkage, in [rad] or [m].
 
     """
 
@@ -57,15 +57,15 @@ class WorstResiduals(NamedTuple):
     Attributes
     ----------
     member, closure
-        The linkage, in its scene and as it is solved.
+        The linkage in its scene, and its closure.
     states
-        How many states closed, and so were looked at.
+        Number of states that closed, and so were examined.
     toggles, limited
-        How many of them stood at a toggle, and how many beyond limits.
+        Number of these at a toggle, and number of these beyond joint limits.
     residual
-        The worst of `Closure.residual`, in [m], and where it was; nothing without states.
+        Greatest `Closure.residual`, in [m], and its place; None without states.
     nearest
-        The nearness to trouble where the conditioning was least, and where that was.
+        The singularity measures at the least conditioning, and the place.
 
     """
 
@@ -80,20 +80,20 @@ class WorstResiduals(NamedTuple):
 
 class Examined(NamedTuple):
     """
-    What came of running a scene once more over its bag.
+    Result of running a scene again on its bag.
 
     Attributes
     ----------
     linkages
         The worst states of each linkage.
     joint_states
-        How many joint states the bag holds.
+        Number of joint states in the bag.
     same
-        How many of them came out again to the same bytes.
+        Number of these that were reproduced byte for byte.
     damage
-        What is damaged, on one line, where it ended there.
+        Damage at which reading ended, on one line.
     stopped
-        Whether it was stopped before the end.
+        Whether the examination was stopped early.
 
     """
 
@@ -108,24 +108,24 @@ def examine(
     bag: Bag, scene: Scene, told: Callable[[int], None], stopped: Callable[[], bool]
 ) -> Examined:
     """
-    Run a scene once more over its bag and look at every state; memory does not grow with them.
+    Run a scene again on its bag and examine every state; memory does not grow with them.
 
     Parameters
     ----------
     bag, scene
         As for `replay`.
     told
-        Takes how many ticks have been looked at, now and then.
+        Progress callback; receives the number of examined ticks, now and then.
     stopped
-        Whether to stop.
+        Returns whether to stop.
 
     Raises
     ------
     LinkageError
-        Where the scene cannot be run.
+        The scene cannot be run.
 
     """
-    # The closures are those that the replay builds once more: they follow from the scene alone.
+    # The replay builds equal closures itself: they follow from the scene alone.
     watched = [_Watch(line.member, line.closure) for line in Pipeline(scene).lines]
     joint_states = same = number = 0
     damage, halted = '', False
@@ -149,7 +149,7 @@ def examine(
 
 
 class _Watch:
-    """Remembers the worst of what it has been shown of a linkage."""
+    """Keeps the worst of the states of a linkage."""
 
     __slots__ = (
         '_least',

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a scene file says, and how it is read."""
+"""Scene files: their content, and how they are read."""

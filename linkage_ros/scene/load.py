@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A scene file, read into a `Scene`."""
+"""Read a scene file into a `Scene`."""
 
 from __future__ import annotations
 
@@ -52,19 +52,19 @@ from linkage_ros.scene.scene import (
 from linkage_ros.solvers.registry import SOLVERS
 
 SCENE_FILE, LINKAGE_FILE = 'scene.yaml', 'linkage.yaml'
-"""Names of the files of a scene where a bag carries them; further linkages are numbered."""
+"""Names of a scene's files in a bag; further linkage files are numbered."""
 
 LOWEST_RATE, HIGHEST_RATE = 0.01, 20_000.0
-"""Ticks a second, in [Hz]: of these the higher is what a core was measured to hold."""
+"""Bounds of the tick rate, in [Hz]; the higher was measured as what one core sustains."""
 
 _MOST_LINKAGES = 400
-"""A hundred take a core at 1 kHz."""
+"""A hundred linkages at 1 kHz fill a core."""
 
 FINEST_ACCURACY, COARSEST_ACCURACY = 1e-12, 1e-2
 """Bounds of `accuracy`, in [rad] or [m]."""
 
 STRONGEST_SPRING, STIFFEST = 1e9, 1e12
-"""No machine has larger loads, in [N], [m], [kg·m²], or larger stiffness, in [N/m] or [N·s/m]."""
+"""Bounds on loads, in [N], [m], [kg·m²], and on stiffness, in [N/m] or [N·s/m]."""
 
 _WHEN = ('at', 'seconds')
 
@@ -74,7 +74,7 @@ Open = Callable[[Section], tuple[Section, bytes]]
 
 def load_scene(file: str | PathLike[str]) -> Scene:
     """
-    Read a scene and the linkages that it names; a linkage file stands for one that moves it.
+    Read a scene and the linkages that it names; for a linkage file, a default scene.
 
     Parameters
     ----------
@@ -85,9 +85,9 @@ def load_scene(file: str | PathLike[str]) -> Scene:
     Raises
     ------
     FileError
-        With file, line, key, value and remedy.
+        The file is wrong; the error has file, line, key, value and remedy.
     TypeError
-        Where it is neither a path nor a name.
+        The argument is neither a path nor a name.
 
     """
     file = named_file(file, 'scenes')
@@ -111,12 +111,12 @@ def load_scene(file: str | PathLike[str]) -> Scene:
 
 def kind_of(content: Section) -> Literal['scene', 'linkage']:
     """
-    Return what a file holds that may be a scene or a linkage.
+    Return whether a file holds a scene or a linkage.
 
     Raises
     ------
     FileError
-        Where it is neither, or where keys of both are mixed.
+        It holds neither, or keys of both are mixed.
 
     """
     if not ('linkage' in content or 'linkages' in content):
@@ -139,7 +139,7 @@ def kind_of(content: Section) -> Literal['scene', 'linkage']:
 
 
 def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
-    """Return the scene that a linkage file stands for."""
+    """Return the default scene of a linkage file."""
     from linkage_ros.files.linkage_text import scene_text_for  # local import: not for scenes
 
     try:
@@ -153,7 +153,7 @@ def _stand_in(name: str, content: Section, data: bytes, folder: str) -> Scene:
         return content, data
 
     scene = parse_yaml(text, f'{content.file}, as a scene')
-    # A drive moves one input, which is published then; several come from a topic.
+    # A drive moves one input, which is then published; several inputs come from a topic.
     closed = closure if len(closure.linkage.inputs) == 1 else None
     return _scene(name, scene, open_linkage, text, folder, closed=closed)
 
@@ -169,24 +169,24 @@ def parse_scene(
     trust_effects: bool = False,
 ) -> Scene:
     """
-    Read a scene out of the files that a bag carries.
+    Read a scene from the files in a bag.
 
     Parameters
     ----------
     name
         Name of the scene.
     where
-        Where the files come from, for messages.
+        Origin of the files, for error messages.
     files, folder
         As in `Scene`.
     solvers
-        By the name of each linkage whose scene asks for an accuracy what was chosen: a solver, as
-        the scene could have said it.
+        Chosen solver of each linkage whose scene asks for an accuracy, by name of the linkage, in
+        the form of a scene file.
     seed
-        The seed where the scene names none; None for one that follows from its name.
+        Seed if the scene names none; None to derive it from the name.
     trust_effects
-        Whether the effects of one's own that the scene names are imported, which runs them. Where
-        they are not, `SceneLinkage.not_imported` names them.
+        Whether to import user-defined effects, which executes them. If not, their names are in
+        `SceneLinkage.not_imported`.
 
     Raises
     ------
@@ -213,7 +213,7 @@ def parse_scene(
 
 
 def _as_chosen(member: SceneLinkage, solvers: Mapping[str, Any]) -> SceneLinkage:
-    """Return a linkage with the solver that was chosen for it, where one was."""
+    """Return a linkage with its chosen solver, if there is one."""
     if member.accuracy is None or member.name not in solvers:
         return member
     where = Section(member.content.file, '', {'solver': solvers[member.name]})
@@ -221,7 +221,7 @@ def _as_chosen(member: SceneLinkage, solvers: Mapping[str, Any]) -> SceneLinkage
 
 
 def seed_of(name: str) -> int:
-    """Return the seed of a scene that names none: two scenes do not share their noise."""
+    """Return the seed of a scene that names none: different scenes get different noise."""
     return crc32(name.encode())
 
 
@@ -249,10 +249,12 @@ def _scene(
         for entry in entries:
             linkage_content, data = open_linkage(entry)
             files[f'linkage_{len(files)}.yaml'] = data
-            own = entry.ros_name(entry.text('name'))
-            if own in [member.name for member in members]:
-                raise entry.error('name', f'{quoted(own)} is taken', 'give each its own')
-            members.append(_member(own, linkage_content, entry, content, folder, trust_effects))
+            member_name = entry.ros_name(entry.text('name'))
+            if member_name in [member.name for member in members]:
+                raise entry.error('name', f'{quoted(member_name)} is taken', 'give each its own')
+            members.append(
+                _member(member_name, linkage_content, entry, content, folder, trust_effects)
+            )
             entry.finish(_OF_A_MEMBER)
     else:
         linkage_content, files[LINKAGE_FILE] = open_linkage(content)
@@ -295,10 +297,10 @@ _OF_A_MEMBER = (
     'accuracy',
     'beyond_limits',
 )
-"""What an entry of ``linkages`` may say for itself, and the scene for all that do not."""
+"""Keys of an entry of ``linkages``; the scene has them for the entries without."""
 
 _OF_A_SCENE = ('rate', 'angles', 'seed', 'faults', 'record', 'robot_description', *_OF_A_MEMBER)
-"""What a scene may say beside the linkages that it names."""
+"""Keys of a scene beside the linkages."""
 
 
 def _member(
@@ -370,7 +372,7 @@ def _member(
 
 
 def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
-    """Return the types of parameters of the effects that are named, in the order of physics."""
+    """Return the parameter types of the named effects, in physical order."""
     known = [name for name in effects if name in EFFECTS or '.' in name]
     try:
         named = in_order([name for name in known if name not in left_out])
@@ -380,8 +382,8 @@ def _effects(effects: Section, left_out: Collection[str]) -> dict[str, Any]:
 
 
 def _silent(content: Section, linkage: Linkage) -> bool:
-    """Return whether nothing is published beyond the limits of a linkage."""
-    said = content.choice('beyond_limits', ('publish', 'silent'), 'publish')
+    """Return whether nothing is published while a joint is beyond its limits."""
+    policy = content.choice('beyond_limits', ('publish', 'silent'), 'publish')
     if (
         'beyond_limits' in content
         and 'linkages' not in content
@@ -392,7 +394,7 @@ def _silent(content: Section, linkage: Linkage) -> bool:
             'no joint of the linkage has limits',
             'leave it out, or write limits: [low, high] into the linkage file',
         )
-    return said == 'silent'
+    return policy == 'silent'
 
 
 def _rate(content: Section) -> float:
@@ -422,15 +424,15 @@ def _record(content: Section) -> RecordParameters:
 
 def read_solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
     """
-    Return what closes the loops, or how well that is to be done, as a `SceneLinkage` holds it.
+    Return the solver, or the required accuracy, as fields of `SceneLinkage`.
 
     Raises
     ------
     FileError
-        Where neither can be understood, or where both are named.
+        Either is invalid, or both are given.
 
     """
-    # What a linkage says for itself stands for both of the scene's.
+    # An entry of the linkage replaces both entries of the scene.
     where = own if 'solver' in own or 'accuracy' in own else scene
     if 'accuracy' not in where:
         return {'solver': read_solver(where, parts) if 'solver' in where else None}
@@ -442,12 +444,12 @@ def read_solving(own: Section, scene: Section, parts: Parts) -> dict[str, Any]:
 
 def read_solver(where: Section, parts: Parts) -> tuple[str, Any]:
     """
-    Return a solver's name and parameters; a name may stand alone.
+    Return a solver's name and parameters; the file may give the name alone.
 
     Raises
     ------
     FileError
-        Where there is no such solver, or its parameters cannot be read.
+        There is no such solver, or its parameters cannot be read.
 
     """
     if isinstance(where.mapping['solver'], str):
@@ -489,7 +491,7 @@ def read_loads(content: Section) -> Loads:
     Raises
     ------
     FileError
-        With line and key of what is wrong.
+        An entry is wrong; the error has its line and key.
 
     """
     springs = content.section('springs', required=False)
@@ -518,7 +520,7 @@ def _spring(name: str, content: Section) -> Spring:
 
 
 def _end(content: Section, key: str) -> tuple[str, str]:
-    """Return link and point of one end of a spring."""
+    """Return link and point of a spring's end."""
     link, dot, point = content.text(key).rpartition('.')
     if not dot or not link or not point:
         raise content.error(key, f'{content.text(key)!r} is no point', 'write LINK.POINT')
@@ -527,12 +529,12 @@ def _end(content: Section, key: str) -> tuple[str, str]:
 
 def read_faults(content: Section, members: Sequence[SceneLinkage]) -> dict[str, Fault]:
     """
-    Return the faults that a scene names, by their names.
+    Return the faults of a scene, by name.
 
     Raises
     ------
     FileError
-        Where one cannot be understood.
+        A fault is invalid.
 
     """
     section = content.section('faults', required=False)
@@ -563,7 +565,7 @@ def _fault(content: Section, parts: Mapping[str, tuple[str, ...]]) -> Fault:
 
 
 def read_storage(content: Section) -> StorageParameters:
-    """Read how a bag is stored out of the section that says how a run is recorded."""
+    """Read the storage of a bag from the ``record`` section."""
     storage: StorageParameters = read_parameters(content, StorageParameters, {})
     for key, least in LEASTS.items():
         value = getattr(storage, key)
@@ -583,7 +585,7 @@ def read_storage(content: Section) -> StorageParameters:
 
 
 def _refuse_what_is_for_a_run(content: Section) -> None:
-    """Raise FileError for a key that a snapshot has no use for; one that is 0 says nothing."""
+    """Raise FileError for a key that has no effect on a snapshot, unless its value is 0."""
     for key in AS_THE_RUN_GOES:
         if content.mapping.get(key, 0) != 0:
             raise content.error(

@@ -24,26 +24,26 @@ from linkage_ros.robot_models.part import Part, PartError
 from linkage_ros.scene.scene import Scene
 
 Write = Callable[[str, Sequence[Part]], bytes]
-"""Writes a model of a name and its linkages."""
+"""Writes the robot model of some linkages, with a name."""
 
 
 def scene_model(scene: Scene, closures: Sequence[Closure], write: Write) -> bytes:
     """
-    Return the model of a scene, with its joints named as in its messages.
+    Return the robot model of a scene, with joint names as in its messages.
 
     Parameters
     ----------
     scene
         The scene.
     closures
-        Its linkages as they are solved, deviations of their parts included.
+        Closures of its linkages, with the deviations of their parts.
     write
         `urdf` or `mjcf`.
 
     Raises
     ------
     FileError
-        Where a linkage does not make a model, with what would help.
+        A linkage cannot be a robot model; the error has the remedy.
 
     """
     parts = [

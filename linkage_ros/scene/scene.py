@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The content of a scene, as frozen types."""
+"""Content of a scene, as frozen types."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ Each file begins with the scene, the linkages and the types, and costs the disk 
 """
 
 LEASTS: Mapping[str, float] = {**SPLITS, 'snapshot_seconds': 0.1}
-"""What may be 0, for never, and else has to be so much at least."""
+"""Least value of a setting that may also be 0, for never."""
 
 AS_THE_RUN_GOES = ('queue', 'flush_period', *SPLITS, 'keep_files')
-"""What has no meaning where a run is kept in memory, and written in one go."""
+"""Settings without effect if the run is kept in memory and written at once."""
 
 _DEFAULT = Storage()
 
@@ -110,15 +110,15 @@ class RecordParameters:
     Attributes
     ----------
     directory
-        Folder in which the bags' own folders are made, relative to where the node was started.
+        Parent folder of the bags, relative to the working directory of the node.
     name
-        Name of the bag's folder; '' for the scene's name and the time. Where it exists already, a
-        number is added: NAME_2.
+        Name of the bag's folder; '' for the scene's name and the time. If it exists, a number is
+        added: NAME_2.
     queue
-        How many messages of up to 16 KiB wait for the disk before further ones are dropped; a
-        larger message counts as so many more.
+        Messages of up to 16 KiB that may wait for the disk before more are dropped; a larger
+        message counts as several.
     storage
-        In which files, packed how, how soon on the disk.
+        Files of the bag: size, compression, flush period.
 
     """
 
@@ -136,28 +136,27 @@ class SceneLinkage:
     Attributes
     ----------
     name
-        Its name, which its joints have before their own with an underscore between; '' where the
-        scene has one linkage only.
+        Name of the linkage, which with an underscore prefixes its joint names; '' if it is the
+        only linkage of the scene.
     linkage, closure
-        The linkage, as it is and as it closes. Where its input joints are published, they are the
-        first of its joints.
+        The linkage, and its closure. Published input joints come first among its joints.
     drive
-        The drive's name, and its parameters.
+        Name and parameters of the drive.
     effects
-        Parameters of each effect that is called for, by its name, in physical order.
+        Parameters of each effect in the scene, by name, in physical order.
     solver
-        What closes its loops: the name and its parameters; nothing for the closed form.
+        Name and parameters of the solver; None for the closed form.
     accuracy
-        Of its positions, in [rad] or [m], where the cheapest solver is to be found; else nothing.
+        Required accuracy of positions, in [rad] or [m], for the cheapest solver; None without one.
     loads
-        What acts on it; nothing where the scene does not say.
+        Loads on it; None if the scene has none.
     silent_beyond_limits
         Whether nothing is published while a joint is beyond its limits.
     not_imported
-        Effects of one's own that it names too, where these were not to be imported. It cannot be
-        run then.
+        User-defined effects that the scene names but that were not imported, so that the linkage
+        cannot run.
     content, linkage_content
-        Where all this stands, for messages: in the scene, and in the linkage file.
+        Sections for error messages: in the scene, and in the linkage file.
 
     """
 
@@ -176,45 +175,45 @@ class SceneLinkage:
 
     @property
     def prefix(self) -> str:
-        """Return what its joints' names have before their own."""
+        """Return the prefix of its joint names."""
         return f'{self.name}_' if self.name else ''
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Return the names under which its joints are published."""
+        """Return the published names of its joints."""
         return tuple(self.prefix + joint for joint in self.linkage.joints)
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Return the names of its driven joints in messages."""
+        """Return the names of its driven joints, as in messages."""
         return tuple(self.prefix + given.joint for given in self.linkage.inputs)
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
     """
-    Linkages, their drives and effects, what goes wrong with them, and a recording.
+    Linkages with their drives and effects, faults, and recording.
 
     Attributes
     ----------
     name
-        The scene file's name without its ending.
+        Name of the scene file without its suffix.
     members
         The linkages; most scenes have one.
     rate
-        Ticks a second, in [Hz]; 0 for one tick for every crank sample.
+        Tick rate, in [Hz]; 0 for one tick per crank sample.
     wrapped
-        Whether published angles are wrapped to (−π, π], or run on beyond a turn.
+        Whether published angles are wrapped to (−π, π]; else they continue beyond a turn.
     seed
-        From which everything random comes.
+        Seed of all random numbers.
     faults
-        What can be injected, by name.
+        Faults that can be injected, by name.
     record
-        How the run is recorded; absent for no bag.
+        Settings of the recording; None for no bag.
     files
-        The scene and linkage files as they stand, by a name for each.
+        Content of the scene and linkage files, by name.
     folder
-        To which the paths in it are relative.
+        Folder for the relative paths in the scene.
     robot_description
         Whether the node publishes the linkages as URDF.
 
@@ -237,25 +236,25 @@ class Scene:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Return the names of all published joints, in their order."""
+        """Return the names of all published joints, in order."""
         return tuple(joint for member in self.members for joint in member.joints)
 
     @property
     def dependent_joints(self) -> frozenset[str]:
-        """Return the names of the published joints that follow from others."""
+        """Return the names of the published joints that depend on others."""
         return frozenset(self.joints).difference(*(member.inputs for member in self.members))
 
     @property
     def not_imported(self) -> tuple[str, ...]:
-        """Return the effects of one's own that it names and that were not imported."""
+        """Return the names of the user-defined effects that were not imported."""
         named = (effect for member in self.members for effect in member.not_imported)
         return tuple(dict.fromkeys(named))
 
 
 def parts_of(linkage: Linkage) -> Parts:
-    """Return the parts of a linkage that parameters can name, by their kind."""
+    """Return the parts of a linkage that parameters can name, by kind."""
     points = [point for carried in linkage.links.values() for point in carried]
-    # A point in a slot is a pin of its link and the block that the slot stands for.
+    # A point in a slot is a pin between its link and the block of the slot.
     points += [slider.point for slider in linkage.sliders.values() if not slider.block]
     pins = {point: None for point in points if points.count(point) > 1}
     return {

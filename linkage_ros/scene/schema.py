@@ -14,11 +14,11 @@
 
 
 """
-The JSON Schemas of scene and linkage files, as `load` and `linkage_file` read them.
+JSON Schemas of scene and linkage files, as `load` and `linkage_file` read them.
 
-A schema says what the reader takes, as far as it can know: names of joints, pins and links pass as
-they come. Its words are those of draft 7 and ``$defs``, which editors know, and conditions rather
-than alternatives, so that a violation names one place.
+A schema accepts what the reader accepts, as far as it can know: it does not check names of joints,
+pins and links. It uses draft 7 and ``$defs``, which editors support, and conditions rather than
+alternatives, so that a violation has one location.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def _point(description: str, most: float) -> Schema:
 
 
 def parameter_types(registry: Mapping[str, str]) -> dict[str, Any]:
-    """Return the type of parameters of each drive, effect or fault of a registry."""
+    """Return the parameter types of all drives, effects or faults in a registry."""
     return {name: import_module(module).PARAMETERS for name, module in registry.items()}
 
 
@@ -180,7 +180,7 @@ def _linkages(own: Mapping[str, Schema]) -> Schema:
 
 
 def _of_a_linkage() -> dict[str, Schema]:
-    """Return what the scene says for all linkages, and each may say for itself."""
+    """Return the entries that a scene may have for all linkages, and each linkage for itself."""
     drives, effects = (
         {name: parameters_schema(of) for name, of in parameter_types(registry).items()}
         for registry in (DRIVES, EFFECTS)
@@ -344,7 +344,7 @@ def _record() -> Schema:
 
 
 def _wanted(key: str) -> Schema:
-    """Return the schema of a mapping in which a number is given that is not 0."""
+    """Return the schema of a mapping in which a number is given and not 0."""
     return {'required': [key], 'properties': {key: {'exclusiveMinimum': 0}}}
 
 
@@ -457,7 +457,7 @@ def _joint() -> Schema:
 
 
 def _limits() -> dict[str, Schema]:
-    """Return the schemas of what a joint of the machine can do."""
+    """Return the schemas of a joint's limits."""
     return {
         'limits': {
             'description': 'between which the joint stays: [low, high] [rad or m]; '
@@ -465,7 +465,7 @@ def _limits() -> dict[str, Schema]:
             'type': 'array',
             'minItems': 2,
             'maxItems': 2,
-            # The lower one may be -.inf, the upper one .inf: JSON Schema knows them as numbers.
+            # The bounds may be -.inf and .inf: JSON Schema accepts these as numbers.
             'items': {'type': 'number'},
         },
         'velocity': _number('its greatest rate [rad/s or m/s]', above=0.0, most=FARTHEST),
@@ -474,7 +474,7 @@ def _limits() -> dict[str, Schema]:
 
 
 def _limits_of(*joints: str) -> dict[str, Schema]:
-    """Return the schemas by which a shorthand gives its joints limits."""
+    """Return the schemas of the limits that a shorthand gives to its joints."""
     return {
         'input': mapping('What the driven joint can do.', _limits()),
         'joints': mapping(

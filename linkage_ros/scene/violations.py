@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""All that is wrong with a file by its schema, one line each; by the library jsonschema."""
+"""Violations of a file's JSON Schema, one line each, found by the library jsonschema."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _Said = tuple[_Path, str, str]
 
 def violations(content: Section, schema: Schema) -> list[FileError]:
     """
-    Return what is wrong with a file, in the order of its lines.
+    Return the violations in a file, in the order of its lines.
 
     Parameters
     ----------
@@ -61,19 +61,19 @@ def violations(content: Section, schema: Schema) -> list[FileError]:
     """
     whole = content.mapping
     broken = list(Draft202012Validator(schema).iter_errors(whole))
-    # What is of the wrong type breaks further rules, of which nobody needs to hear.
+    # A value of the wrong type breaks further rules, which are not worth reporting.
     mistyped = {tuple(error.absolute_path) for error in broken if error.validator == 'type'}
-    found = [
+    errors = [
         FileError(content.file, _dotted(path), reason, remedy, _line(whole, path))
         for error in broken
         if error.validator == 'type' or tuple(error.absolute_path) not in mistyped
         for path, reason, remedy in _said(error, schema)
     ]
-    return sorted(found, key=lambda error: (error.line, error.key))
+    return sorted(errors, key=lambda error: (error.line, error.key))
 
 
 def _said(error: ValidationError, whole: Schema) -> Iterator[_Said]:
-    """Yield path, reason and remedy of what one broken rule comes to."""
+    """Yield path, reason and remedy for one broken rule."""
     path = tuple(error.absolute_path)
     value: Any = error.instance
     wanted: Any = error.validator_value
@@ -87,7 +87,7 @@ def _said(error: ValidationError, whole: Schema) -> Iterator[_Said]:
                 if key not in known and not search(others, key):
                     yield (*path, key), 'unknown key', _near(key, known)
         case 'required':
-            # Each missing key is an error of its own, which names it in its message only.
+            # Each missing key is a separate error, which names the key in its message only.
             missing = next(key for key in wanted if error.message.startswith(repr(key)))
             meaning = _meaning(schema.get('properties', {}).get(missing, {}), whole)
             yield path, f'the key {missing!r} is missing', f'add {missing}: {meaning or "…"}'
@@ -127,7 +127,7 @@ def _fault(error: ValidationError) -> str:
 
 
 def _expected(error: ValidationError) -> str:
-    """Return what the broken rule, and those beside it, want of the value."""
+    """Return the values that the broken rule, and those beside it, allow."""
     rule: Any = error.validator
     wanted: Any = error.validator_value
     schema: Any = error.schema
@@ -146,10 +146,10 @@ def _expected(error: ValidationError) -> str:
 
 
 def _bounds(schema: Mapping[str, Any]) -> str:
-    said = ' and '.join(
+    bounds = ' and '.join(
         f'{word} {schema[key]:g}' for key, word in _BOUNDS.items() if key in schema
     )
-    return f', {said}' if said else ''
+    return f', {bounds}' if bounds else ''
 
 
 def _meaning(schema: Schema, whole: Schema) -> str:
@@ -164,14 +164,14 @@ def _near(key: str, known: Sequence[str]) -> str:
 
 
 def _dotted(path: _Path) -> str:
-    """Return a path as messages show it, with the items of lists counted from 1."""
+    """Return a path as in messages; list items count from 1."""
     return ''.join(
         f'[{part + 1}]' if isinstance(part, int) else f'.{part}' for part in path
     ).removeprefix('.')
 
 
 def _line(content: Any, path: _Path) -> int:
-    """Return the line of a key, or that of the last key on the way to it."""
+    """Return the line of a key, or that of the last existing key on its path."""
     line = 0
     for part in path:
         if isinstance(content, LinedDict) and isinstance(part, str):
