@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-The defects that make a solution on paper useless, and what a user needs of a design.
+The defects that make a design useless in practice, and the requirements on a design.
 
-Every design is searched for the defects. Their names are those of the textbooks (R. L. Norton,
+Every design is checked for the defects. Their names are those of the textbooks (R. L. Norton,
 Design of Machinery, ch. 5; J. M. McCarthy and G. S. Soh, Geometric Design of Linkages, ch. 4):
 branch, circuit and order.
 """
@@ -48,11 +47,11 @@ import numpy as np
 
 _IN_LINE = 1e-5
 """Below this transmission angle coupler and rocker are in line, in [rad]; near a toggle the angle
-is as the root of the rounding of the lengths."""
+is the root of the rounding error of the lengths."""
 
 
 class Defect(NamedTuple):
-    """Why a linkage does not do on the bench what it does on paper: a name, and a sentence."""
+    """A reason why a linkage cannot move as designed: a name, and a sentence."""
 
     name: str
     text: str
@@ -60,28 +59,29 @@ class Defect(NamedTuple):
 
 class Assessment(NamedTuple):
     """
-    What a design is worth.
+    The analysis of a design.
 
     Attributes
     ----------
     met
-        How each position is met.
+        The result of each position.
     kind
-        After Grashof.
+        Type after Grashof.
     turns
         Whether the crank turns fully.
     defects
-        What is wrong, the worst first; empty where nothing is.
+        The defects, the worst first.
     travel
         Crank angles at the first and the last position, with the turns between them, in [rad];
+        None if the crank cannot move from one to the other.
         None where the crank does not get from one to the other.
     transmission, at
-        The least angle between coupler and rocker over the travel, acute, and the crank angle
-        where it is, in [rad]; where there is no travel, over the positions.
+        The least acute angle between coupler and rocker over the travel, and its crank angle, in
+        [rad]; without a travel, over the positions.
     full_transmission
-        The least over a full turn, in [rad]; None where the crank does not turn fully.
+        The least over a full turn, in [rad]; None if the crank does not turn fully.
     link_ratio
-        Longest link to shortest.
+        Ratio of the longest link to the shortest.
 
     """
 
@@ -97,14 +97,14 @@ class Assessment(NamedTuple):
 
 
 def assess(design: Design) -> Assessment:
-    """Assess a design; its positions are analysed again, by `proof.prove`."""
+    """Assess a design; its positions are solved again, by `proof.prove`."""
     four_bar = design.four_bar
     o2, o4 = four_bar.pivots
-    # From the angle of the crank's frame to the direction of the vector O2→A off the ground line.
+    # From the angle of the crank's frame to the direction of O2→A relative to the ground line.
     zero = phase(four_bar.crank) - phase(o4 - o2)
     lengths = np.array(four_bar.lengths)
     directions = np.array([wanted.crank for wanted in design.wanted]) + zero
-    # With a single change point two turns are not the same: what is proved is the way it goes.
+    # With a single change point two turns may differ: the actual turns are proven.
     turns = tau * np.round((lifted(lengths, directions) - directions) / tau)
     moved = [
         one._replace(crank=one.crank + float(by))
@@ -115,7 +115,7 @@ def assess(design: Design) -> Assessment:
     defects = _defects(design, met, found)
     if defects:
         travel = None
-        # At one position after the other; there is no way between them.
+        # Only at the positions; there is no way between them.
         ends = found.directions, found.directions
     else:
         travel = moved[0].crank, moved[-1].crank
@@ -139,7 +139,7 @@ def assess(design: Design) -> Assessment:
 
 
 def _defects(design: Design, met: tuple[Met, ...], found: Course) -> tuple[Defect, ...]:
-    """Name what keeps the linkage from its positions; one that cannot be assembled hides all."""
+    """Return the defects of a linkage; one that cannot be assembled hides all others."""
     missed = [(number, one.gap) for number, one in enumerate(met, 1) if not one.closed]
     if missed:
         worst = max(gap for _, gap in missed)
@@ -219,7 +219,7 @@ def _degrees(angle: float) -> str:
     return f'{degrees(angle):.6g}°'
 
 
-# For each word the ends of Barker's codes that it stands for.
+# For each word the ends of Barker's codes that match it.
 _KINDS = {
     'crank-rocker': ('CRR',),
     'rocker-crank': ('RRC',),
@@ -231,8 +231,8 @@ _KINDS = {
 _TURNING = ('crank-rocker', 'double-crank', 'drag-link', 'turning')
 _WORDS = (*_KINDS, 'grashof', 'non-grashof', 'turning')
 
-# Barker's codes by the shortest link where some link turns fully, by the longest where none does,
-# by the shortest at a change point. Of equal links, as in a parallelogram, none is asked for.
+# Barker's codes by the shortest link if some link turns fully, by the longest if none does, by the
+# shortest at a change point. No word selects equal links, as in a parallelogram.
 _CODES = (
     ('GCRR', 'GRCR', 'GRRC', 'GCCC'),
     ('RRR2', 'RRR3', 'RRR4', 'RRR1'),
@@ -240,25 +240,25 @@ _CODES = (
 )
 
 _FAR = 10.0
-"""What a defect counts for beside a miss of a number by a part of it."""
+"""Weight of a defect, relative to a number that misses its requirement by its own size."""
 
 
 class Needs(NamedTuple):
     """
-    What a design must have.
+    The requirements on a design.
 
     Attributes
     ----------
     kind
-        A word for what links turn, one of crank-rocker, rocker-crank, double-crank or drag-link,
+        A word for the links that turn: crank-rocker, rocker-crank, double-crank or drag-link,
         double-rocker, triple-rocker, grashof, non-grashof, turning (the crank turns fully); '' for
         any.
     transmission
-        The transmission angle over the travel is nowhere below this, in [rad].
+        Lower bound of the transmission angle over the travel, in [rad].
     link_ratio
-        Longest link to shortest, at most.
+        Upper bound of the ratio of the longest link to the shortest.
     usable
-        Whether it must be without defects.
+        Whether it must have no defects.
 
     """
 
@@ -274,12 +274,12 @@ class Needs(NamedTuple):
 
     def check(self) -> None:
         """
-        Refuse what cannot be needed.
+        Refuse requirements that no design can meet.
 
         Raises
         ------
         SynthesisError
-            With the nearest word.
+            With the most similar word.
 
         """
         if not 0.0 <= self.transmission <= 0.5 * pi:
@@ -301,12 +301,12 @@ class Needs(NamedTuple):
 
 
 def misses(assessment: Assessment, needs: Needs) -> tuple[str, ...]:
-    """Return in a few words each what a design lacks; nothing where it has all."""
+    """Return the unmet requirements of a design, in a few words each."""
     return tuple(text for text, _ in _missed(assessment, needs))
 
 
 def distance(assessment: Assessment, needs: Needs) -> float:
-    """Return by how much a design misses what is needed, to order them; 0 where it does not."""
+    """Return the weighted sum of unmet requirements, to sort designs; 0 if all are met."""
     return sum(much for _, much in _missed(assessment, needs))
 
 
@@ -332,16 +332,16 @@ def _missed(assessment: Assessment, needs: Needs) -> list[tuple[str, float]]:
 
 def distances(lengths: Array, transmission: Array, needs: Needs) -> Array:
     """
-    Return for many four-bars without defects what `distance` returns for one.
+    Return `distance` for many four-bars without defects.
 
     Parameters
     ----------
     lengths
-        Of crank, coupler, rocker and ground, above 0; (…, 4).
+        Lengths of crank, coupler, rocker and ground, above 0; (…, 4).
     transmission
         The least angle over the travel, in [rad]; (…).
     needs
-        What is needed.
+        The requirements.
 
     """
     total = np.zeros(transmission.shape)
