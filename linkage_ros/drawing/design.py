@@ -130,7 +130,7 @@ def paint_traces(axes: Any, ways: Sequence[Branch], drawn: Sequence[Pose]) -> No
 def paint_poses(axes: Any, drawn: Sequence[Pose], size: float) -> None:
     """Paint the first position as bodies and the others as lines."""
     first, *others = drawn
-    told: set[str] = set()
+    labelled: set[str] = set()
     for pose in others:
         label = 'other positions' if pose.own else 'met on the other assembly'
         for line in skeleton(pose.closure, pose.position):
@@ -139,9 +139,9 @@ def paint_poses(axes: Any, drawn: Sequence[Pose], size: float) -> None:
                 [line.start.imag, line.end.imag],
                 color=_ink(pose), linewidth=1.0 if pose.own else 1.3, marker='o', markersize=2.4,
                 zorder=LAYERS['ghost'] + (0.0 if pose.own else 0.5),
-                label='' if label in told else label,
+                label='' if label in labelled else label,
             )  # fmt: skip
-            told.add(label)
+            labelled.add(label)
     paint(axes, shapes(first.closure, first.position, size, {}))
     if (COUPLER, 'P') in first.points:
         place = first.points[COUPLER, 'P']
@@ -239,8 +239,8 @@ def _zero(pin: complex, text: str) -> str:
 
 
 def _ends(pose: Pose, link: str) -> dict[str, complex]:
-    found = {name: place for (carrier, name), place in pose.points.items() if carrier == link}
-    return {name: place for name, place in found.items() if name != 'P'}
+    ends = {name: place for (carrier, name), place in pose.points.items() if carrier == link}
+    return {name: place for name, place in ends.items() if name != 'P'}
 
 
 def _length(pose: Pose, link: str) -> float:
@@ -326,8 +326,8 @@ def draw_design(
             magnify(panel, pose, link)
         above = _paint_beside(figure, right, ways, shown, error)
         if missing:
-            said = ', '.join(map(str, missing))
-            axes.plot([], [], ' ', label=f'position {said}: the loop does not close')
+            numbers = ', '.join(map(str, missing))
+            axes.plot([], [], ' ', label=f'position {numbers}: the loop does not close')
         _legend(axes, columns=2)
         figure.draw_without_rendering()  # only now a text has a size
         _fix_layout(figure)

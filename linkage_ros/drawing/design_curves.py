@@ -102,37 +102,37 @@ def poses(design: Design) -> tuple[list[Pose], list[int]]:
 
     """
     closures = {side: closure_of(design, side) for side in SIDES}
-    found, open_ = [], []
+    closed, open_ = [], []
     for number, (wanted, met) in enumerate(zip(design.wanted, prove(design), strict=True), 1):
         closure = closures[met.side]
         position = closed_position(closure, wanted.crank)
         if position.joints:
             own = met.side == design.four_bar.side
-            found.append(Pose(number, wanted, met, own, closure, position))
+            closed.append(Pose(number, wanted, met, own, closure, position))
         else:
             open_.append(number)
-    if not found:
+    if not closed:
         raise LinkageError(
             'the design', 'closes at none of its positions', 'there is nothing to draw'
         )
-    return found, open_
+    return closed, open_
 
 
 def branches(design: Design, shown: Sequence[Pose]) -> list[Branch]:
     """Return the assemblies of the positions, over the ranges of the crank around these."""
     cranks = [pose.wanted.crank for pose in shown]
-    found: list[Branch] = []
+    swept: list[Branch] = []
     for side in SIDES:
         if any(pose.met.side == side for pose in shown):
             way = InputSweep(closure_of(design, side))
             own = design.four_bar.side
-            found += [_branch(way, interval, side, own) for interval in _ranges(way, cranks)]
-    return found
+            swept += [_branch(way, interval, side, own) for interval in _ranges(way, cranks)]
+    return swept
 
 
 def _ranges(way: InputSweep, cranks: Sequence[float]) -> list[InputRange]:
     """Return the ranges of the positions; for a crank that turns fully, one turn around them."""
-    found: list[InputRange] = []
+    ranges: list[InputRange] = []
     for crank in cranks:
         interval = way.range_about(crank)
         if interval is None:
@@ -141,9 +141,9 @@ def _ranges(way: InputSweep, cranks: Sequence[float]) -> list[InputRange]:
             low, high = min(cranks), max(cranks)
             half = max(pi, 0.5 * (high - low))
             return [InputRange(0.5 * (low + high) - half, 0.5 * (low + high) + half, True, _TURNS)]
-        if not any(interval.lowest <= known.highest <= interval.highest for known in found):
-            found.append(interval)
-    return found
+        if not any(interval.lowest <= known.highest <= interval.highest for known in ranges):
+            ranges.append(interval)
+    return ranges
 
 
 def _branch(way: InputSweep, interval: InputRange, side: Assembly, own: Assembly) -> Branch:
@@ -189,12 +189,12 @@ def paint_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -
     coupler = _of_coupler(poses)
     link = 'coupler' if coupler else 'rocker'
     both = len({branch.own for branch in branches}) > 1
-    told: set[str] = set()
+    labelled: set[str] = set()
 
     def once(text: str) -> str:
-        said = '' if text in told else text
-        told.add(text)
-        return said
+        label = '' if text in labelled else text
+        labelled.add(text)
+        return label
 
     for branch in sorted(branches, key=lambda branch: not branch.own):
         angles, marks = _placed(branch, poses)
@@ -309,16 +309,16 @@ def _placed(branch: Branch, poses: Sequence[Pose]) -> tuple[Array, list[tuple[Po
     """
     coupler = _of_coupler(poses)
     angles = branch.coupler if coupler else branch.rocker
-    found = []
+    placed = []
     for pose in poses:
         x = _on(branch, pose.wanted.crank)
         if pose.own == branch.own and x is not None:
             y = float(np.interp(x, branch.crank, angles))
-            found.append((pose, x, y, _wanted(pose, coupler)))
-    behind = [((wanted or 0.0) - y) / tau for _, _, y, wanted in found]
+            placed.append((pose, x, y, _wanted(pose, coupler)))
+    behind = [((wanted or 0.0) - y) / tau for _, _, y, wanted in placed]
     shift = tau * round(float(np.median(behind))) if behind else 0.0
     marks = []
-    for pose, x, y, wanted in found:
+    for pose, x, y, wanted in placed:
         there = y + shift
         at = there if wanted is None else wanted + tau * round((there - wanted) / tau)
         marks.append((pose, complex(degrees(x), degrees(at))))

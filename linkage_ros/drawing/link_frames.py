@@ -49,14 +49,14 @@ def link_frames(closure: Closure, position: Position) -> dict[str, LinkFrame]:
     Such a block has its frame at the slider's point, with the angle of the link it slides along.
     """
     points, angles = closure.points(position), closure.link_angles(position)
-    found = {}
+    frames = {}
     for link, named in closure.linkage.links.items():
         point, (x, y) = next(iter(named.items()))
         angle = angles[link]
-        found[link] = LinkFrame(points[link, point] - complex(x, y) * rect(1.0, angle), angle)
+        frames[link] = LinkFrame(points[link, point] - complex(x, y) * rect(1.0, angle), angle)
     for block, along, point in blocks(closure):
-        found[block] = LinkFrame(points[block, point], angles[along])
-    return found
+        frames[block] = LinkFrame(points[block, point], angles[along])
+    return frames
 
 
 def blocks(closure: Closure) -> list[tuple[str, str, str]]:
@@ -107,12 +107,12 @@ def _shape(link: str, shape: Shape, frames: Mapping[str, LinkFrame]) -> dict[str
     def within(places: Sequence[complex]) -> list[float]:
         return _flat([(place - frame.place) * back for place in places])
 
-    found: dict[str, Any] = {'link': link, 'role': shape.role, 'name': shape.name}
+    data: dict[str, Any] = {'link': link, 'role': shape.role, 'name': shape.name}
     if isinstance(shape, Circle):
-        return {**found, 'points': within([shape.centre]), 'radius': _short(shape.radius)}
+        return {**data, 'points': within([shape.centre]), 'radius': _short(shape.radius)}
     if isinstance(shape, Segment):
-        return {**found, 'points': within([shape.start, shape.end])}
-    return {**found, 'points': within(shape.corners), 'closed': True}
+        return {**data, 'points': within([shape.start, shape.end])}
+    return {**data, 'points': within(shape.corners), 'closed': True}
 
 
 def _carriers(closure: Closure) -> dict[str, str]:

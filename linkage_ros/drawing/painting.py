@@ -300,8 +300,8 @@ class Names:
         )  # fmt: skip
         box = written.get_window_extent()
         self._texts.append(written)
-        found = tuple(map(self.pixel, anchors))
-        self._labels.append(Label(found, box.width + 2.0, box.height, clear))
+        pixels = tuple(map(self.pixel, anchors))
+        self._labels.append(Label(pixels, box.width + 2.0, box.height, clear))
 
     def place(self, lines: Iterable[Sequence[complex]]) -> None:
         """Place the texts where they hide little of some lines, in [m]."""
@@ -312,10 +312,10 @@ class Names:
         box = self._axes.get_window_extent()
         frame = complex(box.x0, box.y0), complex(box.x1, box.y1)
         back = self._axes.transData.inverted()
-        for written, label, found in zip(
+        for written, label, placed in zip(
             self._texts, self._labels, place_labels(self._labels, obstacles, frame), strict=True
         ):
-            centre, anchor = found
+            centre, anchor = placed
             written.set_position(back.transform((centre.real, centre.imag)))
             away = centre - anchor
             beside = max(abs(away.real) - 0.5 * label.width, abs(away.imag) - 0.5 * label.height)

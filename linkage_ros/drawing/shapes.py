@@ -129,7 +129,7 @@ def carried_shapes(
         if link != GROUND
     ]
     # Plates hide least below the bars, and driven links should be visible.
-    for link, parts in sorted(links, key=lambda found: _layer(found[1])):
+    for link, parts in sorted(links, key=lambda item: _layer(item[1])):
         drawn += [(link, part) for part in parts]
     for name, slider in linkage.sliders.items():
         if name not in cylinders:
@@ -162,15 +162,15 @@ def skeleton(closure: Closure, position: Position) -> list[Segment]:
 
 def driven_links(closure: Closure) -> set[str]:
     """Return the links that an input moves relative to their parent."""
-    found = set()
+    driven = set()
     for given in closure.linkage.inputs:
         if given.slider:
-            found.add(closure.structure.blocks[given.slider])
+            driven.add(closure.structure.blocks[given.slider])
         elif given.child != GROUND:
-            found.add(given.child)
+            driven.add(given.child)
         else:
-            found.add(given.parent)
-    return found
+            driven.add(given.parent)
+    return driven
 
 
 def hull(points: Iterable[complex]) -> list[complex]:

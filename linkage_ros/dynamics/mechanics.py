@@ -198,10 +198,10 @@ class Mechanics:
         fast, position, terms = compiled.fast, self.closure.position, self.terms
 
         def equation(value: float) -> Terms | None:
-            found = fast(value)
-            if found is None:
+            values = fast(value)
+            if values is None:
                 return terms(position(value))
-            (inertia, half_slope, potential_slope, viscous, coulomb), slips = found
+            (inertia, half_slope, potential_slope, viscous, coulomb), slips = values
             return Terms(inertia, half_slope, potential_slope, viscous, coulomb, slips)
 
         return equation

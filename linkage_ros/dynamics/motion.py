@@ -95,19 +95,19 @@ def last_before(
             guess = before + (after - before) * low / (low - high)
             # Keep a distance from both ends, so that the last steps close in from both sides.
             at = min(max(guess, before + 0.5 * narrow), after - 0.5 * narrow)
-        found = reach(at)
-        if found is None:
+        state = reach(at)
+        if state is None:
             after, known = at, False
             continue
-        now = margin(found)
+        now = margin(state)
         if now < 0.0:
             low *= 0.5 if stays > 0 else 1.0
             after, high, known, stays = at, now, True, 1
         else:
             high *= 0.5 if stays < 0 else 1.0
-            before, last, low, stays = at, found, now, -1
+            before, last, low, stays = at, state, now, -1
             if now == 0.0:
-                return at, found, True
+                return at, state, True
     return after, last, known
 
 
@@ -243,10 +243,10 @@ class OneFreedom:
                 reached = reach(length)
             event = None
             # Before the last state ahead of one event another may have happened already.
-            while (found := self._event(reached, sense, sticks, slips)) is not None:
-                margin = self._margin(found, sense, slips)
+            while (happened := self._event(reached, sense, sticks, slips)) is not None:
+                margin = self._margin(happened, sense, slips)
                 length, last, known = last_before(reach, margin, motion, length, reached)
-                reached, event = last, found if known else None
+                reached, event = last, happened if known else None
             motion = reached
             if event is _Event.KINK:
                 kinks += 1
@@ -289,16 +289,16 @@ class OneFreedom:
         def field(q: float, w: float) -> float | None:
             if not (-LARGEST <= q <= LARGEST and -LARGEST <= w <= LARGEST):
                 return None
-            found = terms(q)
-            if found is None or found.inertia < _LEAST:
+            there = terms(q)
+            if there is None or there.inertia < _LEAST:
                 return None
             return _acceleration(
-                found, w, force, braking, sense, _turned(found, slips) if slips else 0.0
+                there, w, force, braking, sense, _turned(there, slips) if slips else 0.0
             )
 
         def reach(seconds: float) -> Motion | None:
-            found = step(field, value, rate, start, seconds)
-            return None if found is None else reached(*found)
+            end = step(field, value, rate, start, seconds)
+            return None if end is None else reached(*end)
 
         return reach
 

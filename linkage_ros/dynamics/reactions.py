@@ -323,10 +323,10 @@ class Reactions:
             Results of the closure.
 
         """
-        found = self._balance(position, velocity, acceleration)
-        if found is None:
+        balance = self._balance(position, velocity, acceleration)
+        if balance is None:
             return None
-        forces, resistances = found
+        forces, resistances = balance
         x, lines = position.state.coordinates, self._matrix.lines
         reactions: tuple[Reaction, ...] = ()
         for number in range(len(self.joints)):
@@ -348,10 +348,10 @@ class Reactions:
 
         Return None at a toggle and where the linkage does not close.
         """
-        found = self._balance(position, velocity, acceleration)
-        if found is None:
+        balance = self._balance(position, velocity, acceleration)
+        if balance is None:
             return None
-        forces, _ = found
+        forces, _ = balance
         a, inertia = acceleration.state.coordinates, self._mechanics.loads.drive_inertia
         first = 2 * len(self.joints)
         drives = zip(forces[first:], a[1:], self._drives, strict=False)
@@ -432,7 +432,7 @@ class Reactions:
         gravity = complex(*loads.gravity)
         places = self._follower.places(position)
         pulls = self._follower.accelerations(position, velocity, acceleration, places)
-        x, v, a = (found.state.coordinates for found in (position, velocity, acceleration))
+        x, v, a = (part.state.coordinates for part in (position, velocity, acceleration))
         sides: list[float] = []
         for mass, inertia, center, turn in self._bodies:
             pull = mass * (pulls[center] - gravity)
@@ -483,10 +483,10 @@ class Reactions:
 def _solved(matrix: Array, *sides: float) -> list[float] | None:
     """Return the solution of a linear system, or None if it is singular."""
     try:
-        found: list[float] = np.linalg.solve(matrix, sides).tolist()
+        solution: list[float] = np.linalg.solve(matrix, sides).tolist()
     except np.linalg.LinAlgError:
         return None
-    return found if all(map(isfinite, found)) else None
+    return solution if all(map(isfinite, solution)) else None
 
 
 def _turned_solved(matrix: Array, *sides: float) -> list[float] | None:

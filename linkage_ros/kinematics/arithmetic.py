@@ -143,13 +143,13 @@ def is_found(result: Any) -> bool:
 
 def _real(symbol: Any, name: str, *arguments: Any) -> float:
     """Return the symbol of an operation, typed as the number that it stands for."""
-    found: float = symbol.apply(name, *(arguments or (symbol,)))
-    return found
+    result: float = symbol.apply(name, *(arguments or (symbol,)))
+    return result
 
 
 def _complex(symbol: Any, name: str, *arguments: Any) -> complex:
-    found: complex = symbol.apply(name, *(arguments or (symbol,)))
-    return found
+    result: complex = symbol.apply(name, *(arguments or (symbol,)))
+    return result
 
 
 def cross(one: complex, other: complex) -> float:

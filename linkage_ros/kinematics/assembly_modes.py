@@ -77,30 +77,30 @@ def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
         for step, owner in zip(closure.steps, closure.step_groups, strict=True)
         if owner == number and isinstance(step, Iteration)
     )
-    found = _search(step)
-    if not found:
+    solutions = _search(step)
+    if not solutions:
         return []
-    own, *others = found
+    first, *others = solutions
     return [
         Assembly(_places(closure, group, unknowns), _turns(closure, group, step, unknowns))
         for unknowns in others
-        if not _same(unknowns, own)
+        if not _same(unknowns, first)
     ]
 
 
 def _search(step: Iteration) -> list[Array]:
     """Return the solutions at the pose's inputs, that of the pose first."""
-    own = step.solution()
-    if own is None:
+    first = step.solution()
+    if first is None:
         return []
-    found = [own]
+    solutions = [first]
     rng = np.random.default_rng(_SEED)
     for _ in range(STARTS):
-        angles = rng.uniform(-np.pi, np.pi, len(own) // 3)
+        angles = rng.uniform(-np.pi, np.pi, len(first) // 3)
         solution = step.solution_from(angles)
-        if solution is not None and not any(_same(solution, one) for one in found):
-            found.append(solution)
-    return found
+        if solution is not None and not any(_same(solution, one) for one in solutions):
+            solutions.append(solution)
+    return solutions
 
 
 def _same(one: Array, other: Array) -> bool:
@@ -113,16 +113,16 @@ def _places(closure: Closure, group: Iterated, unknowns: Array) -> dict[str, com
     """Return the places of the points of the group that the pose names."""
     pose = closure.linkage.pose
     assert pose is not None
-    found = {}
+    places = {}
     for name in pose.points:
         for body, link in enumerate(group.links):
             points = closure.structure.links[link]
             if name in points:
                 angle, x, y = unknowns.reshape(-1, 3)[body].tolist()
                 arm = complex(*points[name]) - complex(*next(iter(points.values())))
-                found[name] = complex(x, y) * closure.scale + arm * rect(1.0, angle)
+                places[name] = complex(x, y) * closure.scale + arm * rect(1.0, angle)
                 break
-    return found
+    return places
 
 
 def _turns(closure: Closure, group: Iterated, step: Iteration, unknowns: Array) -> int:

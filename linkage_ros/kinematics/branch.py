@@ -269,10 +269,10 @@ class Continuation:
         middle = 0.125 * (control[0] + control[3]) + 0.375 * (control[1] + control[2])
         moved = np.abs(control - middle).max(axis=0)
         at = float(middle[-1])
-        found = self._rates_at(at)
-        if found is None:
+        known_rates = self._rates_at(at)
+        if known_rates is None:
             return inf
-        known, speeds = found
+        known, speeds = known_rates
         n = len(middle) - 1
         errors, slopes = self._slopes(middle, known, speeds)
         matrix = np.vstack([slopes, cell.begin.tangent])
@@ -371,8 +371,8 @@ class Continuation:
 
     def _system(self, place: Array) -> tuple[Array, Array] | None:
         """Return the residuals, and their derivatives by the unknowns and the input."""
-        found = self._rates_at(float(place[-1]))
-        return None if found is None else self._slopes(place, *found)
+        known_rates = self._rates_at(float(place[-1]))
+        return None if known_rates is None else self._slopes(place, *known_rates)
 
     def _jacobian(self, unknowns: Array, known: State) -> Array:
         _, jacobian = equations(self._constraints, unknowns.tolist(), known)

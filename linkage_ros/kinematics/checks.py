@@ -196,10 +196,10 @@ def _check_limits(key: str, limits: Limits, name: str) -> None:
             'write [low, high]; -.inf or .inf for none on a side',
         )
     if low >= high:
-        said = 'are the same number' if low == high else 'cross'
+        fault = 'are the same number' if low == high else 'cross'
         raise DefinitionError(
             f'{key}.limits',
-            f'{limits} of {quoted(name)} {said}',
+            f'{limits} of {quoted(name)} {fault}',
             'write [low, high], the lower one first',
         )
     for what in ('velocity', 'effort'):

@@ -371,8 +371,8 @@ class UnsignedDiagonal(CrankDiagonal):
 
     def at(self, known: State) -> Diagonal:
         """Return the diagonal."""
-        found = super().at(known)
-        return found._replace(fold=abs(found.fold), stretch=abs(found.stretch))
+        signed = super().at(known)
+        return signed._replace(fold=abs(signed.fold), stretch=abs(signed.stretch))
 
     def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
         """Return near/fold and far/stretch."""

@@ -193,30 +193,30 @@ def derivative(
 ) -> list[float]:
     """Return the first derivative of the constraints; the second if changes are given."""
     order = 1 if changes is None else 2
-    found: list[float] = []
+    derivatives: list[float] = []
     for constraint in constraints:
         if isinstance(constraint, Meeting):
             one, other = (
                 _point_motion(e, unknowns, known, speeds, rates, changes, accelerations)[order]
                 for e in constraint
             )
-            found += [one.real - other.real, one.imag - other.imag]
+            derivatives += [one.real - other.real, one.imag - other.imag]
         elif isinstance(constraint, Parallel):
             state = speeds if changes is None else changes
             values = rates if changes is None else accelerations
             one, other = (_turn(f, values, state) for f in (constraint.one, constraint.other))
             driven = state.coordinates[constraint.turn] if constraint.turn else 0.0
-            found.append(one - other - driven)
+            derivatives.append(one - other - driven)
         else:
             moved = line_motion(
                 constraint, unknowns, known, speeds, rates, changes, accelerations
             )[order]
             if constraint.slide:
                 state = speeds if changes is None else changes
-                found.append(moved.real - state.coordinates[constraint.slide])
+                derivatives.append(moved.real - state.coordinates[constraint.slide])
             else:
-                found.append(moved.imag)
-    return found
+                derivatives.append(moved.imag)
+    return derivatives
 
 
 def _angle(of: Facing, unknowns: Sequence[float], x: Sequence[float]) -> float:

@@ -141,9 +141,9 @@ def four_bars(structure: Structure) -> Iterator[FourBar]:
     known = [GROUND]
     for number, group in enumerate(structure.groups):
         if isinstance(group, Dyad):
-            found = _four_bar(structure, known, number, group)
-            if found is not None:
-                yield found
+            four_bar = _four_bar(structure, known, number, group)
+            if four_bar is not None:
+                yield four_bar
             known += [link for body in group.bodies for link in body]
         elif isinstance(group, Driven):
             known.append(group.joint.link)

@@ -117,14 +117,14 @@ def initial_guess(
                 there = given[apart[0]] - given[known[0]]
                 angles[link] = phase(there / (points[link][apart[0]] - points[link][known[0]]))
             else:
-                found = by_slider(link)
-                if found is None:
+                angle = by_slider(link)
+                if angle is None:
                     raise DefinitionError(
                         'pose.points',
                         f'does not say where {link!r} lies',
                         f'give two of its points: {listed(points[link])}',
                     )
-                angles[link] = found
+                angles[link] = angle
         return angles[link]
 
     places = []

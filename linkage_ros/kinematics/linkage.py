@@ -210,8 +210,8 @@ class Linkage:
     @property
     def limits(self) -> dict[str, Limits]:
         """Return the limits of the joints that have any, by name, inputs first."""
-        found = {name: joint.limits for name, joint in self.joints.items()}
+        published = {name: joint.limits for name, joint in self.joints.items()}
         # An input that is also published has its limits as an input.
         named = {given.joint: given.limits for given in self.inputs}
-        named |= {name: limits for name, limits in found.items() if name not in named}
+        named |= {name: limits for name, limits in published.items() if name not in named}
         return {name: limits for name, limits in named.items() if limits != NO_LIMITS}

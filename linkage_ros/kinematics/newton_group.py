@@ -185,10 +185,10 @@ class Iteration:
         start = self._start_at(inputs)
         if start is None or start.ends:
             return None
-        found = self._correct(known, start.unknowns, start.farthest)
-        if found is None:
+        corrected = self._correct(known, start.unknowns, start.farthest)
+        if corrected is None:
             return None
-        unknowns, jacobian = found
+        unknowns, jacobian = corrected
         if len(inputs) > 1 and _conditioning(jacobian) <= _SINGULAR:
             return None
         return (*unknowns.tolist(), *(unknowns + start.turned)[0::3].tolist(), jacobian)
@@ -203,10 +203,10 @@ class Iteration:
             # The Jacobian is singular here, so Newton's method would come no nearer.
             unknowns, jacobian = start.unknowns, self._system(known, start.unknowns)[1]
         else:
-            found = self._correct(known, start.unknowns, start.farthest)
-            if found is None:
+            corrected = self._correct(known, start.unknowns, start.farthest)
+            if corrected is None:
                 return self._open(known, inputs)
-            unknowns, jacobian = found
+            unknowns, jacobian = corrected
         values = unknowns.tolist()
         self._place(known, values, (unknowns + start.turned)[0::3].tolist())
         return IteratedPose(Status.TOGGLE, 0.0, values, jacobian)
@@ -239,8 +239,8 @@ class Iteration:
         """Return the unknowns at the pose's inputs; None if the pose leads to no solution."""
         if self._solution is None:
             known = self._known_at(self._inputs)
-            found = self._correct(known, self._start, inf) if known is not None else None
-            self._solution = found[0] if found is not None else None
+            corrected = self._correct(known, self._start, inf) if known is not None else None
+            self._solution = corrected[0] if corrected is not None else None
         return self._solution
 
     def rates(self, pose: IteratedPose, known: State, speeds: State) -> list[float]:
@@ -284,16 +284,16 @@ class Iteration:
         errors, jacobian = self._system(known, start)
         places = np.arange(len(start)) % 3 > 0
         start[places] = np.linalg.lstsq(jacobian[:, places], -errors, rcond=None)[0]
-        found = self._correct(known, start, _AROUND)
-        return None if found is None else found[0]
+        corrected = self._correct(known, start, _AROUND)
+        return None if corrected is None else corrected[0]
 
     def solution_at(self, x: float) -> Array | None:
         """Return the unknowns at a value of the single input; None outside the branch."""
         start, known = self._start_at((x,)), self._known(x)
         if start is None or known is None:
             return None
-        found = self._correct(known, start.unknowns, start.farthest)
-        return None if found is None else found[0]
+        corrected = self._correct(known, start.unknowns, start.farthest)
+        return None if corrected is None else corrected[0]
 
     def _place(self, known: State, unknowns: list[float], angles: list[float]) -> None:
         """Append a solution; its angles include the turns made before."""
@@ -468,10 +468,10 @@ class _StraightSystem:
     def at(self, numbers: Sequence[complex]) -> tuple[tuple[float, ...], Array]:
         """Return the residuals, all of which vary, and the Jacobian."""
         n = self._count
-        found = self._line.varying(*numbers)
+        varying = self._line.varying(*numbers)
         jacobian = self._constants.copy()
-        jacobian[self._places] = found[n:]
-        return found[:n], jacobian.reshape(n, n)
+        jacobian[self._places] = varying[n:]
+        return varying[:n], jacobian.reshape(n, n)
 
 
 def _greatest(values: Sequence[float]) -> float:
@@ -490,13 +490,13 @@ def _conditioning(jacobian: Array) -> float:
 
 def _solved(pose: IteratedPose, drift: Sequence[float]) -> list[float]:
     """Return the rates of the unknowns that cancel the drift of the constraints."""
-    found = called(_solve, pose.jacobian, *drift)
-    return [found[i] for i in range(len(drift))]
+    rates = called(_solve, pose.jacobian, *drift)
+    return [rates[i] for i in range(len(drift))]
 
 
 def _solve(jacobian: Array, *drift: float) -> list[float]:
-    found: list[float] = np.linalg.solve(jacobian, np.negative(drift)).tolist()
-    return found
+    rates: list[float] = np.linalg.solve(jacobian, np.negative(drift)).tolist()
+    return rates
 
 
 class Constraints:

@@ -69,7 +69,7 @@ class PointTracker:
 
     def __init__(self, known: KnownLinks, points: Sequence[tuple[str, complex]]) -> None:
         walk = _Walk(known)
-        found = [walk.to(link, point / known.scale) for link, point in points]
+        ends = [walk.to(link, point / known.scale) for link, point in points]
         self._scale = known.scale
         self._fixed = [place * known.scale for place in walk.fixed]
         self._still = [0j] * len(walk.fixed)
@@ -78,7 +78,7 @@ class PointTracker:
             _Node(walk.number(base), arm, way * known.scale, slide)
             for base, arm, way, slide in walk.nodes
         )
-        self.indices = tuple(walk.number(place) for place in found)
+        self.indices = tuple(walk.number(place) for place in ends)
 
     def places(self, position: Position) -> list[complex]:
         """Return the places of the points in the frame of the ground, in [m]."""

@@ -284,9 +284,9 @@ class UnsignedRail(CrankRail):
 
     def at(self, known: State) -> PinOnRail:
         """Return the pin in the frame of the rail."""
-        found = super().at(known)
-        lean = where((found.below < 0.0) != (found.above < 0.0), -found.lean, found.lean)
-        return found._replace(below=abs(found.below), above=abs(found.above), lean=lean)
+        signed = super().at(known)
+        lean = where((signed.below < 0.0) != (signed.above < 0.0), -signed.lean, signed.lean)
+        return signed._replace(below=abs(signed.below), above=abs(signed.above), lean=lean)
 
 
 class FreeRail:

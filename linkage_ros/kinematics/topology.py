@@ -126,20 +126,22 @@ class Structure:
         known = {GROUND}
         for before in self.groups[: self.groups.index(group)]:
             known |= links_of(before)
-        found: list[Joint] = []
+        joints: list[Joint] = []
         pins: set[str] = set()
         for joint in self.joints:
             if joint.kind == 'P':
                 ends = {joint.link, joint.to}
                 if ends & set(group.links) and ends <= known | set(group.links):
-                    found.append(joint)
+                    joints.append(joint)
             elif joint.name not in pins:
                 pins.add(joint.name)
                 carriers = [link for link, points in self.links.items() if joint.name in points]
-                own = [link for link in carriers if link in group.links]
-                base = [*(link for link in carriers if link in known), *own]
-                found += [Joint('R', joint.name, link, base[0]) for link in own if link != base[0]]
-        return tuple(found)
+                held = [link for link in carriers if link in group.links]
+                base = [*(link for link in carriers if link in known), *held]
+                joints += [
+                    Joint('R', joint.name, link, base[0]) for link in held if link != base[0]
+                ]
+        return tuple(joints)
 
 
 def links_of(group: Group) -> set[str]:
@@ -306,12 +308,12 @@ class _Search:
                 carriers = [k for k in self._rank if point in self._links[k]]
                 if carriers:
                     pins.setdefault(point, Joint('R', point, link, carriers[0]))
-        found = list(pins.values())
+        joints = list(pins.values())
         for joint in self._sliders.values():
             for one, other in ((joint.link, joint.to), (joint.to, joint.link)):
                 if one in body and other in self._rank:
-                    found.append(Joint('P', joint.name, one, other))
-        return found
+                    joints.append(Joint('P', joint.name, one, other))
+        return joints
 
     def _inner(self, one: tuple[str, ...], other: tuple[str, ...]) -> list[Joint]:
         """Return the joints between two bodies, without pins that are known already."""
@@ -322,13 +324,13 @@ class _Search:
                 for point in self._links[link]:
                     if point in self._links[to] and point not in known:
                         pins.setdefault(point, Joint('R', point, link, to))
-        found = list(pins.values())
+        joints = list(pins.values())
         for joint in self._sliders.values():
             if joint.link in one and joint.to in other:
-                found.append(Joint('P', joint.name, joint.link, joint.to))
+                joints.append(Joint('P', joint.name, joint.link, joint.to))
             if joint.link in other and joint.to in one:
-                found.append(Joint('P', joint.name, joint.to, joint.link))
-        return found
+                joints.append(Joint('P', joint.name, joint.to, joint.link))
+        return joints
 
     def _next_dyad(self, unknown: list[tuple[str, ...]]) -> Dyad | None:
         outer = {body: self._outer(body) for body in unknown}

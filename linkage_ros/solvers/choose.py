@@ -69,11 +69,11 @@ def choose(linkage: Linkage, accuracy: float) -> Closure:
     able: dict[str, Solver] = {'closed_form': closed}
     against = {}
     for name, build in (('table', TableClosure), ('newton', _newton)):
-        found = _attempt(build, linkage, accuracy)
-        if isinstance(found, Solver):
-            able[name] = found
+        attempt = _attempt(build, linkage, accuracy)
+        if isinstance(attempt, Solver):
+            able[name] = attempt
         else:
-            against[name] = found
+            against[name] = attempt
     times = _times(closed, able)
     fastest = min(times, key=lambda name: times[name])
     if times[fastest] > _FASTER * times['closed_form']:
@@ -108,8 +108,8 @@ def only_closed_form(linkage: Linkage, why: str) -> Closure:
 
 def _newton(linkage: Linkage, accuracy: float) -> NewtonClosure:
     """Return Newton's method with a tolerance that proves an accuracy, or refuse."""
-    found = NewtonClosure(linkage, accuracy)
-    groups = [g for g in found.structure.groups if isinstance(g, Dyad | Iterated)]
+    newton = NewtonClosure(linkage, accuracy)
+    groups = [g for g in newton.structure.groups if isinstance(g, Dyad | Iterated)]
     if len(groups) > 1 or not isinstance(groups[0], Dyad) or groups[0].kind != 'RRR':
         raise DefinitionError('accuracy', 'proven for one RRR dyad only', '')
     dyad = groups[0]
@@ -117,18 +117,18 @@ def _newton(linkage: Linkage, accuracy: float) -> NewtonClosure:
         raise DefinitionError('accuracy', 'not proven for links that change their length', '')
     lengths = []
     for link, outer in zip((dyad.inner.link, dyad.inner.to), dyad.outer, strict=True):
-        points = found.structure.links[link]
+        points = newton.structure.links[link]
         lengths.append(abs(complex(*points[dyad.inner.name]) - complex(*points[outer.name])))
     ratio = max(lengths) / min(lengths)
     if 2.0 * (1.0 + ratio) * accuracy > LEAST_SINE:
         raise DefinitionError('accuracy', 'not proven for so little of it', '')
-    return found
+    return newton
 
 
-def _proven(found: Solver) -> str:
-    if not isinstance(found, TableClosure):
+def _proven(solver: Solver) -> str:
+    if not isinstance(solver, TableClosure):
         return ''
-    return f' of {found.knots} knots, proven to {found.proven:.2g}'
+    return f' of {solver.knots} knots, proven to {solver.proven:.2g}'
 
 
 def _times(closed: Closure, able: dict[str, Solver]) -> dict[str, float]:
@@ -137,8 +137,8 @@ def _times(closed: Closure, able: dict[str, Solver]) -> dict[str, float]:
     spent: dict[str, list[float]] = {name: [] for name in able}
     # Call each solver as a tick does.
     ways = {
-        name: found.compiled(0).fast if found.by_steps else found.position
-        for name, found in able.items()
+        name: solver.compiled(0).fast if solver.by_steps else solver.position
+        for name, solver in able.items()
     }
     for way in ways.values():
         _time(way, states)  # work that is done only once is not timed

@@ -327,17 +327,17 @@ class NewtonDyad:
     def _slopes(self, x: list[float]) -> tuple[complex, complex]:
         """Return F_p and F_q."""
         first = self._first
-        found = [0j, 0j]
+        slopes = [0j, 0j]
         for factor, turns, slide, _ in self._new:
             unit = factor * rect(1.0, sum([sign * x[k] for k, sign in turns]))
             if slide >= first:
-                found[slide - first] += unit
+                slopes[slide - first] += unit
             if slide >= 0:
                 unit *= x[slide]
             for k, sign in turns:
                 if k >= first:
-                    found[k - first] += sign * 1j * unit
-        return found[0], found[1]
+                    slopes[k - first] += sign * 1j * unit
+        return slopes[0], slopes[1]
 
 
 def _value(vector: Vector, x: list[float], pins: list[complex]) -> complex:
@@ -512,13 +512,13 @@ class NewtonClosure(Solver):
         x, pins = state
         speeds = State(v, [])
         others = iter(poses)
-        found = []
+        part_rates = []
         for part in self._plan:
             if isinstance(part, NewtonDyad):
                 part.rates(x, pins, v, speeds.pins)
             else:
-                found.append(part.rates(next(others, PLACED), state, speeds))
-        return Velocity(self._joints(v), speeds, found, self)
+                part_rates.append(part.rates(next(others, PLACED), state, speeds))
+        return Velocity(self._joints(v), speeds, part_rates, self)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float

@@ -343,10 +343,10 @@ class TableClosure(Solver):
     def _table(self, low: float, high: float) -> NDArray[np.float64]:
         """Return the polynomials, of shape (cells, joints, degree + 1)."""
         x = np.linspace(low, high, self.knots + 1)
-        found = self.closed.solve(x, rates=1.0, derivatives=1)
-        assert found.velocities is not None
+        solved = self.closed.solve(x, rates=1.0, derivatives=1)
+        assert solved.velocities is not None
         h = (high - low) / self.knots
-        f, slopes = found.positions, h * found.velocities
+        f, slopes = solved.positions, h * solved.velocities
         step = np.diff(f, axis=1)
         turning = np.array(self.turning)[:, None]
         # The closed form gives angles modulo a turn.

@@ -201,8 +201,8 @@ class RangeProof:
         multiplied by the effect of the polynomials on them, and the rounding of the evaluation.
         """
         x = np.linspace(*self._ends, knots + 1)
-        found = self._request.closed.solve(x, rates=1.0, derivatives=1)
-        assert found.velocities is not None
+        solved = self._request.closed.solve(x, rates=1.0, derivatives=1)
+        assert solved.velocities is not None
         value = slope = 0.0
         for begin in range(0, knots + 1, _BLOCK):
             block = slice(begin, begin + _BLOCK)
@@ -210,12 +210,12 @@ class RangeProof:
             enclosed = self._linked(self._bounds, at)
             for k, (turns, factor, constant) in enumerate(self._request.joints):
                 joint = _joint(turns, factor, enclosed.jets, 0)
-                off = found.positions[k, block] - joint.center - constant
+                off = solved.positions[k, block] - joint.center - constant
                 if self._request.closed.turning[k]:
                     off = np.remainder(off + pi, 2.0 * pi) - pi
                 value = max(value, float((np.abs(off) + joint.radius).max()))
                 joint = times(_joint(turns, factor, enclosed.jets, 1), 1.0 / self._unit)
-                off = found.velocities[k, block] - joint.center
+                off = solved.velocities[k, block] - joint.center
                 slope = max(slope, float((np.abs(off) + joint.radius).max()))
         bounds = self._bounds
         h = self._span / knots
@@ -227,7 +227,7 @@ class RangeProof:
         else:
             rate += h * bound
         farthest = max(map(abs, self._ends)) / self._unit
-        sizes = pi + farthest * float(bounds.slope.max()) + float(np.abs(found.positions).max())
+        sizes = pi + farthest * float(bounds.slope.max()) + float(np.abs(solved.positions).max())
         rounding = _ROUNDING * sizes
         return position + rounding, (rate + rounding / h) / self._unit
 
@@ -273,7 +273,7 @@ class RangeProof:
 
     def _over(self, low: Array, high: Array) -> _Bounds:
         """Return the bounds over cells, given in the coordinate of the input."""
-        found = []
+        bounds = []
         for begin in range(0, len(low), _BLOCK):
             block = slice(begin, begin + _BLOCK)
             ends = low[block] * self._unit, high[block] * self._unit
@@ -286,7 +286,7 @@ class RangeProof:
                 for k in (self._power, 1)
             )
             count = len(low[block])
-            found.append(
+            bounds.append(
                 _Bounds(
                     low[block],
                     high[block],
@@ -298,7 +298,7 @@ class RangeProof:
                     np.concatenate([group.box for group in enclosed.groups], axis=1),
                 )
             )
-        return _joined(found)
+        return _joined(bounds)
 
     def _enclosed(self, low: Array, high: Array, order: int) -> Enclosure:
         """Enclose cells, given in [rad] or [m]."""
@@ -316,14 +316,14 @@ class RangeProof:
 
     def _linked(self, bounds: _Bounds, x: Array) -> Enclosure:
         """Enclose points; refuse if one is not the solution of the cells around it."""
-        found = self._enclosed(x, x, 1)
+        enclosure = self._enclosed(x, x, 1)
         middle, radius, turning = (
-            np.concatenate([getattr(group, name) for group in found.groups], axis=-1)
+            np.concatenate([getattr(group, name) for group in enclosure.groups], axis=-1)
             for name in ('middle', 'radius', 'turning')
         )
         at = x / self._unit
         last = np.searchsorted(bounds.low, at, 'right') - 1
-        linked = found.proven.copy()
+        linked = enclosure.proven.copy()
         for cell in (last, np.where(bounds.low[last] == at, np.maximum(last - 1, 0), last)):
             off = middle - bounds.unknowns[cell]
             off = np.where(turning, np.remainder(off + pi, 2.0 * pi) - pi, off)
@@ -331,7 +331,7 @@ class RangeProof:
             linked &= held.all(axis=1)
         if not linked.all():
             self._refuse(float(at[~linked][0]))
-        return found
+        return enclosure
 
     def _refuse(self, at: float) -> NoReturn:
         raise refusal(
@@ -341,14 +341,14 @@ class RangeProof:
 
 def _joint(turns: Turns, factor: float, jets: Mapping[int, Jet], order: int) -> Disc:
     """Return a Taylor coefficient of a published joint, without its constant."""
-    found = times(total([times(jets[k][order], sign) for k, sign in turns]), factor)
-    return Disc(np.real(found.center), found.radius)
+    coefficient = times(total([times(jets[k][order], sign) for k, sign in turns]), factor)
+    return Disc(np.real(coefficient.center), coefficient.radius)
 
 
 def _largest(values: Sequence[Any], count: int) -> Array:
     """Return the largest value of each cell."""
-    found: Array = np.max([np.broadcast_to(value, (count,)) for value in values], axis=0)
-    return found
+    largest: Array = np.max([np.broadcast_to(value, (count,)) for value in values], axis=0)
+    return largest
 
 
 class _ClosedForm:
@@ -362,8 +362,8 @@ class _ClosedForm:
 
     def at(self, x: Array) -> tuple[Array, NDArray[np.complex128]]:
         """Return coordinates and pins, a row for each, at values in [rad] or [m]."""
-        found = self._solver.solve([x], derivatives=0).positions
-        numbers, parts = np.split(found, [len(self._numbers)])
+        rows = self._solver.solve([x], derivatives=0).positions
+        numbers, parts = np.split(rows, [len(self._numbers)])
         coordinates = np.zeros((max(self._numbers) + 1, len(x)))
         coordinates[self._numbers] = numbers
         pins = np.zeros((max(self._pins, default=-1) + 1, len(x)), np.complex128)
@@ -416,12 +416,12 @@ def knots_for(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> P
 
     """
     refuse_trouble(request, ranges)
-    found = [RangeProof(request, low, high) for low, high in ranges]
-    knots = max(one.knots() for one in found)
+    proofs = [RangeProof(request, low, high) for low, high in ranges]
+    knots = max(one.knots() for one in proofs)
     while True:
         if knots > MOST_KNOTS:
             raise refusal(request, f'takes more than {MOST_KNOTS} knots', 'ask for less')
-        position, rate = map(max, zip(*(one.errors(knots) for one in found), strict=True))
+        position, rate = map(max, zip(*(one.errors(knots) for one in proofs), strict=True))
         if position <= request.tolerance:
             return Proven(knots, position, rate)
         if position > 2.0 * request.tolerance:

@@ -97,11 +97,11 @@ def facing(angle: Jet) -> Jet:
     An arc is no shorter than its chord, so the radius of an angle is also one of its direction.
     """
     center = np.exp(1j * np.asarray(angle[0].center))
-    found = [Disc(center, angle[0].radius * _UP + _ROUNDING)]
+    jet = [Disc(center, angle[0].radius * _UP + _ROUNDING)]
     for k in range(1, len(angle)):
-        parts = [times(product(angle[j], found[k - j]), 1j * j) for j in range(1, k + 1)]
-        found.append(times(total(parts), 1.0 / k))
-    return found
+        parts = [times(product(angle[j], jet[k - j]), 1j * j) for j in range(1, k + 1)]
+        jet.append(times(total(parts), 1.0 / k))
+    return jet
 
 
 def jet_product(one: Jet, other: Jet) -> Jet:
@@ -202,13 +202,13 @@ def enclose(groups: Sequence[Loops], cells: Cells, order: int) -> Enclosure:
     jets: dict[int, Jet] = {0: zero, 1: given}
     pins: dict[int, Jet] = {}
     proven: Mask = np.asarray(np.isfinite(cells.coordinates).all(axis=0))
-    found = []
+    solved = []
     for loops in groups:
         group = _Group(loops, cells, jets, pins)
         unknowns, held = group.find(order)
         proven &= held
-        found.append(unknowns)
-    return Enclosure(proven, jets, found)
+        solved.append(unknowns)
+    return Enclosure(proven, jets, solved)
 
 
 class _Group:
@@ -300,17 +300,17 @@ class _Group:
         """Return the values of the equations at an order: middles, radii, (cells, equations)."""
         middles, radii = [], []
         for equation in self._loops.equations:
-            found = total([self._jet(vector, order)[order] for vector in equation])
-            middles += [np.real(found.center), np.imag(found.center)]
-            radii += [found.radius, found.radius]
+            residual = total([self._jet(vector, order)[order] for vector in equation])
+            middles += [np.real(residual.center), np.imag(residual.center)]
+            radii += [residual.radius, residual.radius]
         for terms, constant, turning in self._loops.balances:
             parts = [times(self._jets[k][order], sign) for k, sign in terms]
-            found = total([*parts, Disc(constant if order == 0 else 0.0, 0.0)])
-            center = np.real(found.center)
+            residual = total([*parts, Disc(constant if order == 0 else 0.0, 0.0)])
+            center = np.real(residual.center)
             if turning and order == 0:
                 center = np.remainder(center + np.pi, 2.0 * np.pi) - np.pi
             middles.append(center)
-            radii.append(found.radius + 4.0 * _ROUNDING)
+            radii.append(residual.radius + 4.0 * _ROUNDING)
         shape = (self._count,)
         return (
             np.stack([np.broadcast_to(one, shape) for one in middles], axis=1),
@@ -360,21 +360,21 @@ class _Group:
         if pin in pins:
             column = len(coordinates) + 2 * pins.index(pin)
             return [(column, Disc(factor, 0.0)), (column + 1, Disc(1j * factor, 0.0))]
-        found: list[tuple[int, Disc]] = []
+        slopes: list[tuple[int, Disc]] = []
         whole = self._jet(vector, 0)[0]
         for k, sign in turns:
             if k in coordinates:
-                found.append((coordinates.index(k), times(whole, sign * 1j)))
+                slopes.append((coordinates.index(k), times(whole, sign * 1j)))
         if slide in coordinates:
             unit = self._jet(vector._replace(slide=-1), 0)[0]
-            found.append((coordinates.index(slide), unit))
-        return found
+            slopes.append((coordinates.index(slide), unit))
+        return slopes
 
 
 def _image(matrix: Array, vector: Array) -> Array:
     """Return the products of matrices and vectors, cell by cell."""
-    found: Array = np.einsum('cij,cj->ci', matrix, vector)
-    return found
+    image: Array = np.einsum('cij,cj->ci', matrix, vector)
+    return image
 
 
 def _inverse(matrices: Array) -> tuple[Array, Mask]:

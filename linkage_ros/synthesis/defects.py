@@ -111,15 +111,15 @@ def assess(design: Design) -> Assessment:
         for one, by in zip(design.wanted, turns, strict=True)
     ]
     met = prove(design._replace(wanted=tuple(moved)))
-    found = course(lengths, directions, np.array([one.side == 'left' for one in met]))
-    defects = _defects(design, met, found)
+    path = course(lengths, directions, np.array([one.side == 'left' for one in met]))
+    defects = _defects(design, met, path)
     if defects:
         travel = None
         # Only at the positions; there is no way between them.
-        ends = found.directions, found.directions
+        ends = path.directions, path.directions
     else:
         travel = moved[0].crank, moved[-1].crank
-        ends = found.directions[:1], found.directions[-1:]
+        ends = path.directions[:1], path.directions[-1:]
     angles, places = least_transmission(lengths, *ends)
     least, at = min(zip(angles.tolist(), (places - zero).tolist(), strict=True))
     if travel and least < _IN_LINE:
@@ -131,14 +131,14 @@ def assess(design: Design) -> Assessment:
             ),
         )
     full = None
-    if found.turns:
+    if path.turns:
         full = float(least_transmission(lengths, np.array(0.0), np.array(pi))[0])
     ratio = max(four_bar.lengths) / min(four_bar.lengths)
     kind = four_bar_type(*four_bar.lengths)
-    return Assessment(met, kind, bool(found.turns), defects, travel, least, at, full, ratio)
+    return Assessment(met, kind, bool(path.turns), defects, travel, least, at, full, ratio)
 
 
-def _defects(design: Design, met: tuple[Met, ...], found: Course) -> tuple[Defect, ...]:
+def _defects(design: Design, met: tuple[Met, ...], path: Course) -> tuple[Defect, ...]:
     """Return the defects of a linkage; one that cannot be assembled hides all others."""
     missed = [(number, one.gap) for number, one in enumerate(met, 1) if not one.closed]
     if missed:
@@ -150,13 +150,13 @@ def _defects(design: Design, met: tuple[Met, ...], found: Course) -> tuple[Defec
                 f'miss each other by up to {worst:.3g} m',
             ),
         )
-    if not found.one_circuit:
-        return (_circuit(met, found),)
+    if not path.one_circuit:
+        return (_circuit(met, path),)
     defects = []
-    if not found.one_branch:
+    if not path.one_branch:
         defects.append(_branch(design, met))
-    if not found.in_order:
-        defects.append(_order(design, found))
+    if not path.in_order:
+        defects.append(_order(design, path))
     return tuple(defects)
 
 
@@ -183,21 +183,21 @@ def _branch(design: Design, met: tuple[Met, ...]) -> Defect:
     )
 
 
-def _circuit(met: tuple[Met, ...], found: Course) -> Defect:
-    if found.turns:
+def _circuit(met: tuple[Met, ...], path: Course) -> Defect:
+    if path.turns:
         where = _sides(met)
     else:
-        upper = np.sin(found.directions) >= 0.0
+        upper = np.sin(path.directions) >= 0.0
         one, other = (_positions(np.flatnonzero(upper == end) + 1) for end in (True, False))
         where = f'the crank moves in two ranges, with {one} in one and {other} in the other'
     return Defect('circuit', f'{where}; only taking it apart leads from one to the other')
 
 
-def _order(design: Design, found: Course) -> Defect:
-    directions: Array = found.directions - found.directions[0]
-    visited = np.argsort(np.mod(directions, tau) if found.turns else directions)
-    said = ', '.join(f'{i + 1} ({_degrees(design.wanted[i].crank)})' for i in visited)
-    return Defect('order', f'a crank that goes one way comes by the positions as {said}')
+def _order(design: Design, path: Course) -> Defect:
+    directions: Array = path.directions - path.directions[0]
+    visited = np.argsort(np.mod(directions, tau) if path.turns else directions)
+    visits = ', '.join(f'{i + 1} ({_degrees(design.wanted[i].crank)})' for i in visited)
+    return Defect('order', f'a crank that goes one way comes by the positions as {visits}')
 
 
 def _sides(met: tuple[Met, ...]) -> str:
@@ -311,23 +311,23 @@ def distance(assessment: Assessment, needs: Needs) -> float:
 
 
 def _missed(assessment: Assessment, needs: Needs) -> list[tuple[str, float]]:
-    found: list[tuple[str, float]] = []
+    missed: list[tuple[str, float]] = []
     if needs.usable:
-        found += [(f'{defect.name} defect', _FAR) for defect in assessment.defects]
+        missed += [(f'{defect.name} defect', _FAR) for defect in assessment.defects]
     if needs.kind and not _is(assessment, needs.kind):
-        found.append((f'a {assessment.kind.name}, no {needs.kind}', 1.0))
+        missed.append((f'a {assessment.kind.name}, no {needs.kind}', 1.0))
     if assessment.transmission < needs.transmission:
         angle, wanted = degrees(assessment.transmission), degrees(needs.transmission)
         text = f'a transmission angle of {angle:.4g}°, not {wanted:.4g}°'
-        found.append((text, 1.0 - angle / wanted))
+        missed.append((text, 1.0 - angle / wanted))
     if assessment.link_ratio > needs.link_ratio:
-        found.append(
+        missed.append(
             (
                 f'a link ratio of {assessment.link_ratio:.4g}, not {needs.link_ratio:.4g}',
                 log(assessment.link_ratio / needs.link_ratio),
             )
         )
-    return found
+    return missed
 
 
 def distances(lengths: Array, transmission: Array, needs: Needs) -> Array:
@@ -366,8 +366,8 @@ def _are(lengths: Array, kind: str) -> Flags:
     row = np.where(excess > 0.0, 0, np.where(excess < 0.0, 1, 2))
     link = np.where(excess < 0.0, lengths.argmax(-1), lengths.argmin(-1))
     meant = np.array([[_stands_for(kind, code) for code in codes] for codes in _CODES])
-    found: Flags = meant[row, link]
-    return found
+    matches: Flags = meant[row, link]
+    return matches
 
 
 def _stands_for(kind: str, code: str) -> bool:

@@ -134,12 +134,12 @@ def _normal(high: Array, low: Array) -> Twofold:
 @cache
 def _part_of_a_turn() -> tuple[float, float, float]:
     """Return the 2048th part of a turn as a sum of three doubles, the first two of 33 bits."""
-    rest, found = 2 * _PI // _PARTS, []
+    rest, parts = 2 * _PI // _PARTS, []
     for _ in range(2):
         cut = rest.bit_length() - 33
-        found.append((rest >> cut << cut) / (1 << _BITS))
+        parts.append((rest >> cut << cut) / (1 << _BITS))
         rest &= (1 << cut) - 1
-    return found[0], found[1], rest / (1 << _BITS)
+    return parts[0], parts[1], rest / (1 << _BITS)
 
 
 @cache

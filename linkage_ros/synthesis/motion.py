@@ -192,9 +192,9 @@ def sensitivity(found: Circle, own: Complex, shared: Complex) -> Array:
 
 def number(place: Place) -> Complex:
     """Return a place as the nearest complex number."""
-    found = np.empty(place[0][0].shape, np.complex128)
-    found.real, found.imag = place[0][0], place[1][0]
-    return found
+    complex_place = np.empty(place[0][0].shape, np.complex128)
+    complex_place.real, complex_place.imag = place[0][0], place[1][0]
+    return complex_place
 
 
 def _at(places: Place, index: int) -> Place:
@@ -264,11 +264,11 @@ def fixed_pivots(places: Complex, angles: Array, moving: ArrayLike) -> Links:
     point = np.asarray(moving, np.complex128)[..., None]
     sine, cosine = sine_cosine(_twofold(angles))
     x, y = _turned(_twofold(point.real), _twofold(point.imag), cosine, sine)
-    found = circle((plus(_twofold(places.real), x), plus(_twofold(places.imag), y)))
+    circles = circle((plus(_twofold(places.real), x), plus(_twofold(places.imag), y)))
     turn = cosine[0] + 1j * sine[0]
     own = np.stack(_every(places.real, 1j * places.imag, 1j * angles * turn * point), -1)
     shared = np.stack(_every(turn * point.real, 1j * turn * point.imag), -1)
-    return Links(found.centre, found.spokes, sensitivity(found, own, shared), found.chords)
+    return Links(circles.centre, circles.spokes, sensitivity(circles, own, shared), circles.chords)
 
 
 def moving_pivots(places: Complex, angles: Array, fixed: ArrayLike) -> Links:
@@ -287,13 +287,13 @@ def moving_pivots(places: Complex, angles: Array, fixed: ArrayLike) -> Links:
     sine, cosine = sine_cosine(_twofold(-angles))
     x = minus(_twofold(point.real), _twofold(places.real))
     y = minus(_twofold(point.imag), _twofold(places.imag))
-    found = circle(_turned(x, y, cosine, sine))
+    circles = circle(_turned(x, y, cosine, sine))
     turn = cosine[0] + 1j * sine[0]
     about = -1j * angles * turn * (x[0] + 1j * y[0])
     own = np.stack(_every(-turn * places.real, -1j * turn * places.imag, about), -1)
     shared = np.stack(_every(turn * point.real, 1j * turn * point.imag), -1)
-    arms = -np.conj(turn) * found.spokes
-    return Links(found.centre, arms, sensitivity(found, own, shared), found.chords)
+    arms = -np.conj(turn) * circles.spokes
+    return Links(circles.centre, arms, sensitivity(circles, own, shared), circles.chords)
 
 
 def _turned(x: Twofold, y: Twofold, cosine: Twofold, sine: Twofold) -> tuple[Twofold, Twofold]:

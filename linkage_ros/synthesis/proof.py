@@ -285,12 +285,12 @@ def prove(design: Design) -> tuple[Met, ...]:
     The linkage is closed as in a node. If both assemblies meet a position equally well, that of
     the design is returned.
     """
-    own = design.four_bar.side
-    found = []
+    side = design.four_bar.side
+    results = []
     for left, right in zip(*proofs(design), strict=True):
-        better = _better(left, right, sum(design.four_bar.lengths)) or own
-        found.append(left if better == 'left' else right)
-    return tuple(found)
+        better = _better(left, right, sum(design.four_bar.lengths)) or side
+        results.append(left if better == 'left' else right)
+    return tuple(results)
 
 
 def assembled(design: Design) -> Design:

@@ -140,7 +140,7 @@ def _knock(address: str) -> None:
     try:
         # In a separate thread: the caller may have a running event loop.
         with ThreadPoolExecutor(1) as thread:
-            found = thread.submit(asyncio.run, identity()).result()
+            identified = thread.submit(asyncio.run, identity()).result()
     # An address without host or port, or of an unknown kind, raises one of these errors.
     except (OSError, asyncio.TimeoutError, ValueError, TypeError, AssertionError) as error:
         raise LinkageError(
@@ -148,9 +148,9 @@ def _knock(address: str) -> None:
             f'no Dask scheduler answers here ({str(error) or "it is silent"})',
             'start one by `dask scheduler`, and give the address that it prints',
         ) from error
-    if found['type'] != 'Scheduler':
+    if identified['type'] != 'Scheduler':
         raise LinkageError(
-            address, f'is a Dask {found["type"]}', 'give the address of the scheduler'
+            address, f'is a Dask {identified["type"]}', 'give the address of the scheduler'
         )
 
 
@@ -297,8 +297,8 @@ def search(
     )
     best, done = None, 0
     with closing(results):
-        for part, found in results:
-            best = found if best is None else _merged((best, found), keep)
+        for part, chunk_best in results:
+            best = chunk_best if best is None else _merged((best, chunk_best), keep)
             done += part.last - part.first
             if progress is not None:
                 progress(done, count)
@@ -328,14 +328,14 @@ def _best(problem: Problem, seed: int, keep: int, part: _Part) -> _Best:
         scores = np.asarray(problem.score(candidates), np.float64)
         possible = np.flatnonzero(scores < np.inf)
         chosen = possible[np.argsort(scores[possible], kind='stable')[:keep]]
-        found = _Best(scores[chosen], first + chosen, candidates[chosen])
-        best = found if best is None else _merged((best, found), keep)
+        chunk_best = _Best(scores[chosen], first + chosen, candidates[chosen])
+        best = chunk_best if best is None else _merged((best, chunk_best), keep)
     if best is None:
         raise ValueError(f'{part} is empty')
     return best
 
 
-def _merged(found: tuple[_Best, ...], keep: int) -> _Best:
-    scores, places, candidates = (np.concatenate(each) for each in zip(*found, strict=True))
+def _merged(parts: tuple[_Best, ...], keep: int) -> _Best:
+    scores, places, candidates = (np.concatenate(each) for each in zip(*parts, strict=True))
     order = np.lexsort((places, scores))[:keep]
     return _Best(scores[order], places[order], candidates[order])

@@ -67,26 +67,26 @@ def step(
     field: Field, value: float, rate: float, acceleration: float, length: float
 ) -> tuple[float, float] | None:
     """Advance a state by a length of time, as `Step` specifies."""
-    found = [acceleration, acceleration, acceleration]
+    stages = [acceleration, acceleration, acceleration]
     square = length * length
     before = 0.0
     for _ in range(_ITERATIONS):
         change = largest = 0.0
         for i, (c, (s1, s2, s3), (a1, a2, a3)) in enumerate(_STAGES):
             # Earlier stages already have this iteration's values, which converges faster.
-            f1, f2, f3 = found
+            f1, f2, f3 = stages
             at = value + (length * c * rate + square * (s1 * f1 + s2 * f2 + s3 * f3))
             new = field(at, rate + length * (a1 * f1 + a2 * f2 + a3 * f3))
             if new is None:
                 return None
-            change = max(change, abs(new - found[i]))
+            change = max(change, abs(new - stages[i]))
             largest = max(largest, abs(new))
-            found[i] = new
+            stages[i] = new
         grows = 0.0 < before <= change
         # Changes fall by one factor: the next would be change²/before.
         settled = change * change <= _ROUNDING * largest * before
         if settled or change == 0.0 or (grows and change <= _NOISE * largest):
-            f1, f2, f3 = found
+            f1, f2, f3 = stages
             b1, b2, b3 = WEIGHTS
             l1, l2, l3 = _LEVERS
             moved = length * rate + square * (l1 * f1 + l2 * f2 + l3 * f3)

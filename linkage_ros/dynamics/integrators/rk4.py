@@ -42,10 +42,10 @@ def step(
     for node, weight in zip(NODES, others, strict=True):
         ahead = node * length
         slope, at = rate + ahead * change, value + ahead * slope
-        found = field(at, slope)
-        if found is None:
+        stage = field(at, slope)
+        if stage is None:
             return None
-        change = found
+        change = stage
         mean_slope += weight * slope
         mean_change += weight * change
     return value + length * mean_slope, rate + length * mean_change

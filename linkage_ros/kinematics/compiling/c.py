@@ -142,8 +142,8 @@ class C(Language):
         else:
             declared = ['#ifdef __cplusplus', 'extern "C" {', '#endif', *listed, *signature[:-1]]
             declared += [f'{signature[-1]};', '#ifdef __cplusplus', '}', '#endif']
-            told = '/* What a caller declares: */'
-            lines = [*_CHECK, '', told, *declared, '', *definition]
+            heading = '/* What a caller declares: */'
+            lines = [*_CHECK, '', heading, *declared, '', *definition]
         return '\n'.join([*comment, '', *lines, ''])
 
 

@@ -169,9 +169,9 @@ class Compiled:
         given = list(zip(*[iter(numbers)] * self.driven, strict=True))
         motion = moved(self._closure, given, self._within_limits)
         status, gap = motion.position.status, motion.position.gap
-        found = tuple(tuple(group) for group in self.wanted(motion))
+        values = tuple(tuple(group) for group in self.wanted(motion))
         groups = len(self.paths[0].outputs) if self.paths else 1 + self.derivatives
-        return Answer(status, gap, (*found, *((),) * (groups - len(found))))
+        return Answer(status, gap, (*values, *((),) * (groups - len(values))))
 
 
 def _first_of(

@@ -70,8 +70,8 @@ def _tangent_is_close() -> bool:
     """
     angles = np.linspace(-1.5, 1.5, 1000)
     return all(
-        abs(found - exact) <= 2.5 * UNIT_ROUNDOFF * abs(exact)
-        for found, exact in zip(np.tan(angles).tolist(), map(tan, angles.tolist()), strict=True)
+        abs(tangent - exact) <= 2.5 * UNIT_ROUNDOFF * abs(exact)
+        for tangent, exact in zip(np.tan(angles).tolist(), map(tan, angles.tolist()), strict=True)
     )
 
 
@@ -315,13 +315,13 @@ class ArrayForm:
 
     def _new(self, name: str, *arguments: Number, bounds: Bounds = _ANY) -> Operation:
         key = (name, *(a.number if isinstance(a, Operation) else repr(a) for a in arguments))
-        found = self._known.get(key)
-        if found is None:
+        operation = self._known.get(key)
+        if operation is None:
             kind: Kind = 'truth' if name in _TRUTHS else 'real'
-            found = Operation(name, arguments, kind, len(self._known), None)
-            self._known[key] = found
-            self._bounds[found] = bounds
-        return found
+            operation = Operation(name, arguments, kind, len(self._known), None)
+            self._known[key] = operation
+            self._bounds[operation] = bounds
+        return operation
 
 
 def _constant(number: Number) -> bool:

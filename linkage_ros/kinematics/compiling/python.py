@@ -197,16 +197,16 @@ def straight(
     """
     tape = Tape()
     given = [tape.given(f'x{i}', value) for i, value in enumerate(values)]
-    found = [number_of(number) for number in function(*given)]
+    results = [number_of(number) for number in function(*given)]
     if tape.decisions:
         raise ValueError('the function decides by its arguments, and has no straight line')
-    places = tuple(i for i, number in enumerate(found) if isinstance(number, Operation))
+    places = tuple(i for i, number in enumerate(results) if isinstance(number, Operation))
     inputs = tuple(one.operation for one in given)
-    line = python_function(Path(inputs, (), (tuple(found[i] for i in places),), tape))
+    line = python_function(Path(inputs, (), (tuple(results[i] for i in places),), tape))
 
     def varying(*arguments: Any) -> tuple[float, ...]:
         (group,) = line(*arguments) or ((),)
         return group
 
-    constants = tuple(0.0 if isinstance(number, Operation) else number for number in found)
+    constants = tuple(0.0 if isinstance(number, Operation) else number for number in results)
     return StraightFunction(varying, places, constants)

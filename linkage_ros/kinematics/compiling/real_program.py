@@ -94,8 +94,8 @@ class Lowering:
 
     def operation(self, root: Number) -> Any:
         """Return a real number on the new tape, or the constant that it reduces to."""
-        found = self._number(root)
-        return found.operation if isinstance(found, Symbol) else found
+        number = self._number(root)
+        return number.operation if isinstance(number, Symbol) else number
 
     def fate(self, fate: Fate) -> Fate:
         """Return a fate with conditions on the new tape."""

@@ -245,10 +245,10 @@ class _Block(NamedTuple):
         # A rate that is not finite has no result, but the pose is valid.
         answer = one(*(number if isfinite(number) else 0.0 for number in numbers))
         self.status[k] = CODES[answer.status]
-        for order, (values, found) in enumerate(zip(self.values, answer.values, strict=True)):
-            if found:
+        for order, (values, solved) in enumerate(zip(self.values, answer.values, strict=True)):
+            if solved:
                 end = (1 + order) * driven
-                values[:, k] = found if all_finite(numbers[:end]) else np.nan
+                values[:, k] = solved if all_finite(numbers[:end]) else np.nan
 
     def _of(self, states: Any) -> list[Any]:
         return [n[states] if isinstance(n, np.ndarray) else n for n in self.given]
@@ -277,8 +277,8 @@ def _program(path: Lowered, kinds: Sequence[Any]) -> _Program:
     lost: list[Number] = [False] * len(_LOST)
     for (condition, held), fate in zip(decisions, ends, strict=True):
         if condition.name != 'finite':
-            found = form.number(condition)
-            falls = found if held else form.opposite(found)
+            truth = form.number(condition)
+            falls = truth if held else form.opposite(truth)
             leaves = form.both(holds, form.opposite(falls))
             holds = form.both(holds, falls)
             for k, status in enumerate(_LOST):

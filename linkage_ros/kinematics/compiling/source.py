@@ -202,8 +202,8 @@ def source(subject: Subject, language: Language) -> str:
         groups = [[part.joints[i] for i in asked] for part in motion if part is not None]
         return [*groups, [motion.position.joints[i] for i in bounded]]
 
-    found = program(closure, subject.derivatives, wanted)
-    body = _Body(subject, language, found)
+    compiled = program(closure, subject.derivatives, wanted)
+    body = _Body(subject, language, compiled)
     head = _head(subject, language.function(subject.derivatives))
     return language.whole(subject, list(head), body.lines())
 
@@ -337,15 +337,15 @@ def _constants(roots: Sequence[Any]) -> Iterator[float]:
 
 def _lengths(closure: Closure) -> dict[float, str]:
     """Return names of the lengths of links, by their values in the unit of the steps."""
-    found: dict[float, set[str]] = defaultdict(set)
+    named: dict[float, set[str]] = defaultdict(set)
     for link, points in closure.linkage.links.items():
         for (one, (x, y)), (other, (u, v)) in combinations(points.items(), 2):
-            found[hypot(u - x, v - y) / closure.scale].add(f'{link}_{one}_{other}')
+            named[hypot(u - x, v - y) / closure.scale].add(f'{link}_{one}_{other}')
         for point, place in points.items():
             for axis, value in zip('xy', place, strict=True):
-                found[value / closure.scale].add(f'{link}_{point}_{axis}')
+                named[value / closure.scale].add(f'{link}_{point}_{axis}')
     # A value that several lengths share gets the name of none.
-    names = {value: names.pop() for value, names in found.items() if len(names) == 1}
+    names = {value: names.pop() for value, names in named.items() if len(names) == 1}
     often = Counter(names.values())
     return {
         value: f'length_{name}'

@@ -143,14 +143,14 @@ class Tape:
 
     def decide(self, condition: Operation) -> bool:
         """Return whether a condition holds, and record the decision."""
-        found = self._decided.get(condition.number)
-        if found is None:
+        held = self._decided.get(condition.number)
+        if held is None:
             number = len(self.decisions)
-            said = self._ahead[number] if number < len(self._ahead) else None
-            found = bool(condition.value) if said is None else said
-            self._decided[condition.number] = found
-            self.decisions.append(Decision(condition, found))
-        return found
+            ahead = self._ahead[number] if number < len(self._ahead) else None
+            held = bool(condition.value) if ahead is None else ahead
+            self._decided[condition.number] = held
+            self.decisions.append(Decision(condition, held))
+        return held
 
     def write(self, name: str, *arguments: Any) -> Any:
         """Return the symbol of an operation on symbols and constants."""
@@ -171,13 +171,13 @@ class Tape:
 
     def _new(self, name: str, arguments: tuple[Any, ...], kind: Kind, value: Any) -> Operation:
         key = (name, *(_key(argument) for argument in arguments))
-        found = self._known.get(key)
-        if found is None:
+        operation = self._known.get(key)
+        if operation is None:
             if value is None:
                 value = _value(name, arguments)
-            found = Operation(name, arguments, kind, len(self._known), value)
-            self._known[key] = found
-        return found
+            operation = Operation(name, arguments, kind, len(self._known), value)
+            self._known[key] = operation
+        return operation
 
 
 class Symbol:

@@ -126,9 +126,9 @@ def moved(closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool 
     return Motion(position, velocity, acceleration)
 
 
-def number_of(found: Any) -> Number:
+def number_of(number: Any) -> Number:
     """Return the operation of a symbol, or a constant as it is."""
-    return found.operation if isinstance(found, Symbol) else found
+    return number.operation if isinstance(number, Symbol) else number
 
 
 # The fates of a path: the status of the linkage where it leaves the path.
@@ -161,15 +161,15 @@ def fates(closure: Closure, path: Path) -> tuple[Fate, ...]:
         The path, traced without limits.
 
     """
-    found: list[Fate] = []
+    result: list[Fate] = []
     held: list[bool] = []
     for decision in path.decisions:
         if decision.condition.name == 'finite':
-            found.append(Status.INDETERMINATE)
+            result.append(Status.INDETERMINATE)
         else:
-            found.append(_fate(closure, path, [*held, not decision.held]))
+            result.append(_fate(closure, path, [*held, not decision.held]))
             held.append(decision.held)
-    return tuple(found)
+    return tuple(result)
 
 
 def _fate(closure: Closure, path: Path, decided: Sequence[bool]) -> Fate:

@@ -31,19 +31,19 @@ _COMPARISONS = frozenset(('<', '<=', '>', '>=', '==', '!='))
 
 def uses(roots: Iterable[Any]) -> dict[Operation, int]:
     """Return how often each operation is used, by others that the roots need or as a root."""
-    found: dict[Operation, int] = {}
+    counts: dict[Operation, int] = {}
     waiting = [root for root in roots if isinstance(root, Operation)]
     for root in waiting:
-        found[root] = found.get(root, 0) + 1
+        counts[root] = counts.get(root, 0) + 1
     seen = set()
     while waiting:
         operation = waiting.pop()
         if operation not in seen:
             seen.add(operation)
             for operand in operation.operands():
-                found[operand] = found.get(operand, 0) + 1
+                counts[operand] = counts.get(operand, 0) + 1
                 waiting.append(operand)
-    return found
+    return counts
 
 
 class Text(NamedTuple):
@@ -148,13 +148,17 @@ class Writer:
         depth = 1 + max((part.depth for part in parts), default=0)
         name = operation.name
         if name in _PRECEDENCE and name not in ('negative', '**'):
-            own = _PRECEDENCE[name]
+            precedence = _PRECEDENCE[name]
             one, other = parts
             # Sums and products associate to the left: the right operand needs brackets.
-            return Text(f'{one.within(own)} {name} {other.within(own + 1)}', own, depth)
+            return Text(
+                f'{one.within(precedence)} {name} {other.within(precedence + 1)}',
+                precedence,
+                depth,
+            )
         if name == 'negative':
-            own = _PRECEDENCE[name]
-            return Text(f'-{parts[0].within(own + 1)}', own, depth)
+            precedence = _PRECEDENCE[name]
+            return Text(f'-{parts[0].within(precedence + 1)}', precedence, depth)
         if name in _COMPARISONS:
             one, other = parts
             return Text(f'{one.within(4)} {name} {other.within(4)}', 2, depth)

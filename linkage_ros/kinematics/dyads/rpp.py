@@ -73,8 +73,8 @@ class RPPDyad:
     inner, outer
         v̂ and û, not parallel.
     offsets
-        κ × û and κ × v̂, in the unit of the lengths: subtracting κ from z first would lose accuracy
-        where κ is long along a line.
+        κ × û and κ × v̂, in the unit of the lengths: subtracting κ from z first would lose
+        accuracy where κ is long along a line.
 
     """
 

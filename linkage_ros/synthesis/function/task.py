@@ -106,13 +106,13 @@ def _undefined(function: Expression, xs: Array, ys: Array) -> SynthesisError:
 
 def _runs(function: Expression, xs: Array, good: Array) -> list[tuple[float, float, bool]]:
     """Return the parts of a range in which a function is defined, and in which it is not."""
-    found = []
+    runs = []
     start = float(xs[0])
     for i in np.flatnonzero(np.diff(good)):
         edge = _edge(function, float(xs[i]), float(xs[i + 1]))
-        found.append((start, edge, bool(good[i])))
+        runs.append((start, edge, bool(good[i])))
         start = edge
-    return [*found, (start, float(xs[-1]), bool(good[-1]))]
+    return [*runs, (start, float(xs[-1]), bool(good[-1]))]
 
 
 def _edge(function: Expression, low: float, high: float) -> float:
@@ -475,7 +475,7 @@ def _greatest(errors: Callable[[Array], Array], crank: Array, error: Array) -> t
     beside = np.pad(heights, 1, constant_values=-1.0)
     summits = np.flatnonzero((heights >= beside[:-2]) & (heights >= beside[2:]) & (heights >= 0.0))
     summits = summits[np.argsort(-heights[summits], kind='stable')[:_SUMMITS]]
-    places, found = [crank[highest]], [error[highest]]
+    places, errors_at = [crank[highest]], [error[highest]]
     start = crank[np.maximum(summits - 1, 0)]
     end = crank[np.minimum(summits + 1, len(crank) - 1)]
     for _ in range(_ERROR_ZOOMS):
@@ -484,10 +484,10 @@ def _greatest(errors: Callable[[Array], Array], crank: Array, error: Array) -> t
         best = np.nan_to_num(np.abs(values), nan=-1.0).argmax(-1)
         row = np.arange(len(grid))
         places.extend(grid[row, best])
-        found.extend(values[row, best])
+        errors_at.extend(values[row, best])
         start, end = grid[row, np.maximum(best - 1, 0)], grid[row, np.minimum(best + 1, _GRID)]
-    i = int(np.nanargmax(np.abs(found)))
-    return float(places[i]), float(found[i])
+    i = int(np.nanargmax(np.abs(errors_at)))
+    return float(places[i]), float(errors_at[i])
 
 
 def _rms(crank: Array, error: Array) -> float:

@@ -97,11 +97,11 @@ def _through_triples(
     """Yield four-bars that meet three of the pairs exactly, on either assembly."""
     triples = list(combinations(range(len(crank)), 3))
     chosen = np.array(triples[:: -(-len(triples) // _TRIPLES)])
-    found = links(np.array(crank)[chosen], np.array(rocker)[chosen]).lengths
-    size = np.abs(found)
+    lengths = links(np.array(crank)[chosen], np.array(rocker)[chosen]).lengths
+    size = np.abs(lengths)
     usual = np.all((size < _LONGEST) & (size > 1.0 / _LONGEST), axis=-1)
     wanted = wanted_of(crank, rocker)
-    for a, b, c in (found[usual] * ground).tolist():
+    for a, b, c in (lengths[usual] * ground).tolist():
         for side in SIDES:
             yield Design(FourBar.of_lengths(a, b, c, ground, side=side), wanted)
 
@@ -137,7 +137,7 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
             'give more pairs, or synthesise exactly',
         )
     least_squares = scipy_optimize().least_squares
-    found = [(root_mean_square(design), design)]
+    candidates = [(root_mean_square(design), design)]
     for side in SIDES:
         start = replace(design.four_bar, side=side)
 
@@ -155,9 +155,9 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
             max_nfev=_TRIALS,
         )
         fitted = design._replace(four_bar=_changed(start, best.x))
-        found.append((root_mean_square(fitted), fitted))
+        candidates.append((root_mean_square(fitted), fitted))
     # A result that overflowed counts as the worst.
-    return min(found, key=lambda one: one[0] if isfinite(one[0]) else inf)[1]
+    return min(candidates, key=lambda one: one[0] if isfinite(one[0]) else inf)[1]
 
 
 def root_mean_square(design: Design) -> float:

@@ -341,10 +341,10 @@ class Count(NamedTuple):
 
     def __str__(self) -> str:
         """Return the text for a user, such as '3 solutions, 2 imaginary'."""
-        said = [f'{sum(self)} solution' + 's' * (sum(self) != 1)]
+        parts = [f'{sum(self)} solution' + 's' * (sum(self) != 1)]
         kinds = ('imaginary', 'with infinite links', 'whose links cannot be told')
-        said += [f'{n} {kind}' for n, kind in zip(self[1:], kinds, strict=True) if n]
-        return ', '.join(said)
+        parts += [f'{n} {kind}' for n, kind in zip(self[1:], kinds, strict=True) if n]
+        return ', '.join(parts)
 
 
 class FreeZeros(NamedTuple):
@@ -545,20 +545,20 @@ def _listed(
             candidates.append((moved, solution))
     # Of two equal ones, the less sensitive stays.
     candidates.sort(key=lambda one: float(np.sum(one[1].sensitivity)))
-    found: list[tuple[Moved, Solution]] = []
+    four_bars: list[tuple[Moved, Solution]] = []
     for moved, solution in candidates:
-        if not any(same(solution, other) for _, other in found):
-            found.append((moved, solution))
-    among = Count(len(found), *counts.values())
-    if not found:
+        if not any(same(solution, other) for _, other in four_bars):
+            four_bars.append((moved, solution))
+    among = Count(len(four_bars), *counts.values())
+    if not four_bars:
         free = 'a zero of rocker or crank' if len(rows.theta) == 4 else 'both zeros'
         raise SynthesisError(
             'pairs',
             f'no four-bar has all {len(rows.theta)} with {free} free: {among}',
             'move one of the angles, or leave the zeros as they are for the nearest four-bar',
         )
-    found.sort(key=lambda one: (one[0] == 'crank', one[1].condition))
-    return tuple(_result(rows, moved, solution, among, ground) for moved, solution in found)
+    four_bars.sort(key=lambda one: (one[0] == 'crank', one[1].condition))
+    return tuple(_result(rows, moved, solution, among, ground) for moved, solution in four_bars)
 
 
 def _result(

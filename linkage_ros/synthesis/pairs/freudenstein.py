@@ -524,11 +524,11 @@ def exact(
 
     """
     check_pairs(crank, rocker, ground)
-    found = three_pairs(crank, rocker)
-    if not _NOISE * found.doubt[0] < _SHAKEN:
+    solution = three_pairs(crank, rocker)
+    if not _NOISE * solution.doubt[0] < _SHAKEN:
         raise dependent(crank, rocker)
-    a, b, c = (float(length) for length in found.lengths)
-    parts = _NOISE * found.sensitivity / np.abs(found.lengths)
+    a, b, c = (float(length) for length in solution.lengths)
+    parts = _NOISE * solution.sensitivity / np.abs(solution.lengths)
     for link, length, part in (('crank', a, parts[0]), ('rocker', c, parts[2])):
         if not (part < 1.0 and abs(length) < LONGEST):
             raise SynthesisError(
@@ -536,7 +536,7 @@ def exact(
                 'would be infinitely long, and is a slider on a straight line then',
                 MOVE,
             )
-    if not found.digits.all():
+    if not solution.digits.all():
         raise SynthesisError(
             'the pairs',
             f'do not tell how long the links are: rounding their angles changes one by '
@@ -544,7 +544,7 @@ def exact(
             'move the pairs apart',
         )
     four_bar = FourBar.of_lengths(a * ground, b * ground, c * ground, ground)
-    return assembled(Design(four_bar, wanted_of(crank, rocker))), found
+    return assembled(Design(four_bar, wanted_of(crank, rocker))), solution
 
 
 def fit_equation(crank: Sequence[float], rocker: Sequence[float], ground: float) -> Design:

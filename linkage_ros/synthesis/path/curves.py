@@ -415,8 +415,8 @@ def _segment(
     wanted = np.broadcast_to(wanted, (rows, wanted.shape[-1]))
     # One search for all rows: each has its own range.
     offset = 2.0 * np.arange(rows)[:, None]
-    found = np.searchsorted((way + offset).ravel(), (wanted + offset).ravel(), side='right')
-    before = found.reshape(wanted.shape) - np.arange(rows)[:, None] * (last + 1) - 1
+    index = np.searchsorted((way + offset).ravel(), (wanted + offset).ravel(), side='right')
+    before = index.reshape(wanted.shape) - np.arange(rows)[:, None] * (last + 1) - 1
     before = np.clip(before, 0, last - 1)
     low = np.take_along_axis(way, before, axis=1)
     high = np.take_along_axis(way, before + 1, axis=1)

@@ -431,7 +431,7 @@ def generate_path(
             'times its size reaches the points',
             'allow longer links, or draw more',
         )
-    fitted = problem.starts(np.array([found.candidate for found in drawn]))
+    fitted = problem.starts(np.array([one.candidate for one in drawn]))
     for steps, guard, survivors in _STAGES:
         fitted, squares = improve(fitted, thin, steps, guard)
         fitted = fitted.some(_distinct(fitted, squares, max(survivors, 4 * keep)))
