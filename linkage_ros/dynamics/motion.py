@@ -242,7 +242,7 @@ class OneFreedom:
                     return self._bounced(motion)
                 reached = reach(length)
             event = None
-            # Before the last state ahead of one event another may have happened already.
+            # At the last state before one event, another event may have happened already.
             while (happened := self._event(reached, sense, sticks, slips)) is not None:
                 margin = self._margin(happened, sense, slips)
                 length, last, known = last_before(reach, margin, motion, length, reached)

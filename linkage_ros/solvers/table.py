@@ -121,7 +121,6 @@ class TableClosure(Solver):
         The interpolation between the knots.
     span
         The range that the table covers, in [rad] or [m]; by default all that the input can reach.
-        said.
 
     Attributes
     ----------

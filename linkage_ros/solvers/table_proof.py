@@ -400,19 +400,19 @@ class Proven(NamedTuple):
 
 def knots_for(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> Proven:
     """
-    Return how many cells each range of the input needs, and what is proven of the error then.
+    Return the number of cells that each range of the input needs, and the proven errors.
 
     Parameters
     ----------
     request
-        What is to be proven.
+        The table to be proven.
     ranges
-        Of the input, in [rad] or [m].
+        Ranges of the input, in [rad] or [m].
 
     Raises
     ------
     DefinitionError
-        Where a toggle or a change point is in the way, or it takes more than `MOST_KNOTS`.
+        If a range holds a toggle or a change point, or the proof takes more than `MOST_KNOTS`.
 
     """
     refuse_trouble(request, ranges)

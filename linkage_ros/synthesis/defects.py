@@ -74,7 +74,6 @@ class Assessment(NamedTuple):
     travel
         Crank angles at the first and the last position, with the turns between them, in [rad];
         None if the crank cannot move from one to the other.
-        None where the crank does not get from one to the other.
     transmission, at
         The least acute angle between coupler and rocker over the travel, and its crank angle, in
         [rad]; without a travel, over the positions.

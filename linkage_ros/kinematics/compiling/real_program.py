@@ -246,7 +246,6 @@ _BY_SQUARES: dict[str, Callable[..., Any]] = {
 # paths taken at closed states of the linkage, and the change points beside them. No state is known
 # to take one of the other paths: these end in None, and code generated from the tree gives no
 # numbers there.
-# end in None, and what is written from the tree gives no numbers there.
 
 _MOST_SOLVED = 32
 """Largest number of leaves with numbers: change points of several dyads multiply."""
