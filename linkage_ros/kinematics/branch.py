@@ -449,7 +449,7 @@ class Interval(NamedTuple):
 
     @property
     def period(self) -> int:
-        """Number of whole turns of the input that change nothing; 0 if each turn differs."""
+        """Return how many whole turns of the input change nothing; 0 if each turn differs."""
         return self.turns or int(self.high - self.low < tau)
 
 

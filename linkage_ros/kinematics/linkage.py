@@ -41,8 +41,8 @@ class Slider:
 
     Attributes
     ----------
-    Name of the point; not a point of ``along``.
-        Name of the point; no point of ``along``.
+    point
+        Name of the point; not a point of ``along``.
     along
         Name of the link that carries the line.
     through

@@ -150,7 +150,7 @@ class Iteration:
 
     @property
     def equation_count(self) -> int:
-        """Number of equations solved at once."""
+        """Return the number of equations solved at once."""
         return len(self._start)
 
     @property
