@@ -175,7 +175,7 @@ class Mass:
 @dataclass(frozen=True, slots=True)
 class Linkage:
     """
-    A planar linkage, as a linkage file defines it.
+    A planar linkage, as a linkage file says it.
 
     Attributes
     ----------
