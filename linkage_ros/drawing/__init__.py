@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A linkage as a drawing: shapes in metres, and what paints them."""
+"""Drawings of a linkage: shapes in metres, and the code that paints them."""

@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""What is drawn over the range of an input: joints, paths of points, travels of sliders."""
+"""Curves over the range of an input: joints, paths of points, travels of sliders."""
 
 from __future__ import annotations
 
@@ -25,14 +24,14 @@ from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.sweep_analysis import InputSweep, samples
 
 _SAME_PATH = 0.01
-"""How far a path may be from another, of its length, and be drawn as the same."""
+"""Largest distance of paths that are drawn as one, relative to their length."""
 
 
 class Curve(NamedTuple):
     """
     A joint over the input, in [rad] or [m].
 
-    Angles are in (−π, π]; where one begins a new turn, a NaN lifts the pen between its two ends.
+    Angles are in (−π, π]; at the begin of a new turn, a NaN interrupts the line.
     """
 
     name: str
@@ -43,7 +42,7 @@ class Curve(NamedTuple):
 
 class Sweep(NamedTuple):
     """
-    A linkage as its input goes through a range.
+    The motion of a linkage while its input goes through a range.
 
     Attributes
     ----------
@@ -98,9 +97,9 @@ def sweep(way: InputSweep, interval: InputRange) -> Sweep:
 
 def wrapped_curve(x: Sequence[float], y: Sequence[float]) -> tuple[list[float], list[float]]:
     """
-    Wrap an angle to (−π, π], and lift the pen where it begins a new turn.
+    Wrap an angle to (−π, π], and interrupt the line at the begin of a new turn.
 
-    The two ends at ±π are found along the straight line between the samples.
+    The two ends at ±π are interpolated linearly between the samples.
     """
     xs: list[float] = []
     ys: list[float] = []
@@ -119,7 +118,7 @@ def wrapped_curve(x: Sequence[float], y: Sequence[float]) -> tuple[list[float], 
 
 
 def drawn_once(path: Sequence[complex]) -> tuple[complex, ...]:
-    """Return a path, of one that comes back on itself only the way there: dashes would close."""
+    """Return a path; if it comes back on itself, only one way, so that dashes do not overlap."""
     if len(path) < 3:
         return tuple(path)
     one = max(range(len(path)), key=lambda i: abs(path[i] - path[0]))

@@ -12,7 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A design in its plane: its positions, what was wanted, and a short link once more, larger."""
+"""
+A picture of a designed four-bar: its positions, and beside it its rocker's angle.
+
+The first position is drawn as an engineer draws it, the others as lines behind it, each in the
+assembly that meets it. Wanted values are blue. A short link is drawn again, enlarged.
+"""
 
 from __future__ import annotations
 
@@ -59,14 +64,14 @@ _BEHIND = '#a3a3a3'
 _BEHIND_TEXT = '#5f5f5f'
 
 _EVERY = 6
-"""Of the places of a path, when room for a number is looked for."""
+"""Every so many places of a path are obstacles for a number."""
 
 
 def paint_wanted(axes: Any, design: Design, shown: Sequence[Pose], picture: float) -> None:
-    """Paint rays to where rocker pins were wanted, crosses at places, frames of poses."""
+    """Paint rays to wanted rocker pins, crosses at wanted places, frames at wanted poses."""
     four_bar = design.four_bar
     pivot = four_bar.pivots[1]
-    # Below all else, and wide: where a rocker is as wanted its line runs in the middle.
+    # Below all else, and wide: the line of an exact rocker runs in its middle.
     pale = {'color': WANTED, 'alpha': 0.3, 'linewidth': 3.5, 'zorder': 0.5}
     rays = 'wanted rocker angle φ' + _zero(four_bar.rocker, 'its pin at φ')
     places, frames = 'wanted place of P', 'wanted pose at P (long: x axis)'
@@ -99,7 +104,7 @@ def paint_wanted(axes: Any, design: Design, shown: Sequence[Pose], picture: floa
 
 
 def arrow_ends(design: Design, picture: float) -> list[complex]:
-    """Return how far the frames of wanted poses go."""
+    """Return the ends of the axes of wanted poses."""
     return [
         end
         for one in design.wanted
@@ -123,9 +128,9 @@ def paint_traces(axes: Any, ways: Sequence[Branch], drawn: Sequence[Pose]) -> No
 
 
 def paint_poses(axes: Any, drawn: Sequence[Pose], size: float) -> None:
-    """Paint the first as bodies and the others as lines."""
+    """Paint the first position as bodies and the others as lines."""
     first, *others = drawn
-    told: set[str] = set()
+    labelled: set[str] = set()
     for pose in others:
         label = 'other positions' if pose.own else 'met on the other assembly'
         for line in skeleton(pose.closure, pose.position):
@@ -134,9 +139,9 @@ def paint_poses(axes: Any, drawn: Sequence[Pose], size: float) -> None:
                 [line.start.imag, line.end.imag],
                 color=_ink(pose), linewidth=1.0 if pose.own else 1.3, marker='o', markersize=2.4,
                 zorder=LAYERS['ghost'] + (0.0 if pose.own else 0.5),
-                label='' if label in told else label,
+                label='' if label in labelled else label,
             )  # fmt: skip
-            told.add(label)
+            labelled.add(label)
     paint(axes, shapes(first.closure, first.position, size, {}))
     if (COUPLER, 'P') in first.points:
         place = first.points[COUPLER, 'P']
@@ -144,7 +149,7 @@ def paint_poses(axes: Any, drawn: Sequence[Pose], size: float) -> None:
 
 
 def magnify(panel: Any, pose: Pose, link: str) -> None:
-    """Paint a position once more, about a link too short to be seen."""
+    """Paint a position again, enlarged around a link that is too short to see."""
     middle, length = 0.5 * sum(_ends(pose, link).values()), _length(pose, link)
     panel.set_aspect('equal')
     panel.set_xlim(middle.real - 1.3 * length, middle.real + 1.3 * length)
@@ -164,7 +169,7 @@ def magnify(panel: Any, pose: Pose, link: str) -> None:
 
 
 def name_ends(panel: Any, pose: Pose, link: str) -> None:
-    """Name the pins of a link that was magnified."""
+    """Name the pins of an enlarged link."""
     names = Names(panel)
     for name, place in _ends(pose, link).items():
         radius = 0.13 * abs(names.pixel(1.0 + 0j) - names.pixel(0j)) * _length(pose, link)
@@ -220,13 +225,13 @@ def _axes_of(place: complex, angle: float, picture: float) -> tuple[complex, com
 
 
 def _ray(four_bar: FourBar, angle: float, picture: float) -> complex:
-    """Return the way from O4 through where the rocker's pin is wanted, and a little on."""
+    """Return the vector from O4 through the wanted pin of the rocker, and a little beyond."""
     reach = abs(four_bar.rocker)
     return rect(reach + 0.045 * picture, angle + phase(four_bar.rocker))
 
 
 def _zero(pin: complex, text: str) -> str:
-    """Return what is to be said of a link whose pin is not on its frame's x axis."""
+    """Return the legend text for a link whose pin is not on the x axis of its frame."""
     angle = degrees(phase(pin))
     if abs(remainder(angle, 360.0)) < 1e-9:
         return ''
@@ -234,8 +239,8 @@ def _zero(pin: complex, text: str) -> str:
 
 
 def _ends(pose: Pose, link: str) -> dict[str, complex]:
-    found = {name: place for (carrier, name), place in pose.points.items() if carrier == link}
-    return {name: place for name, place in found.items() if name != 'P'}
+    ends = {name: place for (carrier, name), place in pose.points.items() if carrier == link}
+    return {name: place for name, place in ends.items() if name != 'P'}
 
 
 def _length(pose: Pose, link: str) -> float:
@@ -243,16 +248,11 @@ def _length(pose: Pose, link: str) -> float:
     return abs(other - one)
 
 
-# A designed four-bar painted by matplotlib: at its positions, and beside it its rocker's angle.
-#
-# The first position is drawn as an engineer draws it, the others as lines behind it, all in the
-# assembly in which they are met. What was wanted is blue.
-
 _DRAWN, _DRAWN_OF_PATH = 6, 4
-"""Positions in which the linkage is drawn, at most; a path is to be seen between them."""
+"""Most positions that are drawn; fewer for a path, which should be visible between them."""
 
 _TINY = 1.0 / 25.0
-"""A link shorter than this, of the picture, is drawn once more, larger."""
+"""A link shorter than this, relative to the picture, is drawn again, enlarged."""
 
 _MAGNIFIED = 4
 
@@ -270,19 +270,19 @@ def draw_design(
     Parameters
     ----------
     design
-        The four-bar and what was wanted of it.
+        The four-bar and its wanted positions.
     title
-        What stands above.
+        Title of the picture.
     file
         PNG, SVG or PDF.
     error
-        Of the rocker's angle over a range: crank angles, and the errors there, in [rad]; (n,)
-        each.
+        Error of the rocker's angle over a range: crank angles, and the errors there, in [rad];
+        (n,) each.
 
     Raises
     ------
     LinkageError
-        Where the design closes at none of its positions, matplotlib is not installed, or the file
+        If the design closes at none of its positions, matplotlib is not installed, or the file
         cannot be written.
 
     """
@@ -326,10 +326,10 @@ def draw_design(
             magnify(panel, pose, link)
         above = _paint_beside(figure, right, ways, shown, error)
         if missing:
-            said = ', '.join(map(str, missing))
-            axes.plot([], [], ' ', label=f'position {said}: the loop does not close')
+            numbers = ', '.join(map(str, missing))
+            axes.plot([], [], ' ', label=f'position {numbers}: the loop does not close')
         _legend(axes, columns=2)
-        figure.draw_without_rendering()  # from here on a text has its size
+        figure.draw_without_rendering()  # only now a text has a size
         _fix_layout(figure)
         write_numbers(axes, design, drawn, ways, size)
         number_angles(above, ways, shown)
@@ -339,7 +339,7 @@ def draw_design(
 
 
 def _chosen(shown: Sequence[Pose]) -> list[Pose]:
-    """Return the positions in which the linkage is drawn, the first on its own assembly first."""
+    """Return the positions to draw; the first of them on the design's own assembly comes first."""
     traced = all(pose.wanted.place is not None for pose in shown)
     count = min(len(shown), _DRAWN_OF_PATH if traced else _DRAWN)
     spread = [shown[round(i * (len(shown) - 1) / max(1, count - 1))] for i in range(count)]
@@ -350,7 +350,7 @@ def _chosen(shown: Sequence[Pose]) -> list[Pose]:
 def _frame(
     design: Design, drawn: Sequence[Pose], ways: Sequence[Branch]
 ) -> tuple[complex, complex]:
-    """Return the corners of the paper, in [m]."""
+    """Return the corners of the drawing, in [m]."""
     places = [place for pose in drawn for place in pose.points.values()]
     places += [one.place for one in design.wanted if one.place is not None]
     places += [place for way in ways if way.own for place in way.trace]
@@ -358,12 +358,12 @@ def _frame(
     places += arrow_ends(design, 1.15 * abs(high - low))
     low, high = corners(places)
     margin = 0.07 * abs(high - low)
-    # Pivots stand on ground that is drawn, and rays of wanted angles go beyond their pins.
+    # The ground of the pivots and the rays of wanted angles extend beyond the pins.
     return low - complex(margin, margin), high + complex(margin, margin)
 
 
 def _tiny(four_bar: FourBar, picture: float) -> str:
-    """Return the link that is too short to be seen; '' for none."""
+    """Return the link that is too short to see, or ''."""
     lengths = dict(zip((CRANK, COUPLER, ROCKER, GROUND), four_bar.lengths, strict=True))
     link = min(lengths, key=lengths.__getitem__)
     return link if lengths[link] < _TINY * picture else ''
@@ -376,7 +376,7 @@ def _paint_beside(
     shown: Sequence[Pose],
     error: tuple[ArrayLike, ArrayLike] | None,
 ) -> Any:
-    """Plot what there is to plot beside the linkage, and return the upper axes."""
+    """Paint the plots beside the linkage, and return the upper axes."""
     places = misses_places(shown)
     if error is None and not places:
         above = figure.add_subplot(right)
@@ -392,7 +392,7 @@ def _paint_beside(
 
 
 def _fix_layout(figure: Any) -> None:
-    """Keep the axes where they are, rounded: the solver's last digits are not the same twice."""
+    """Fix the axes at rounded places: the last digits of the layout solver are not repeatable."""
     figure.set_layout_engine('none')
     for axes in figure.axes:
         places = axes.get_position(original=True).bounds
@@ -400,7 +400,7 @@ def _fix_layout(figure: Any) -> None:
 
 
 def _legend(axes: Any, columns: int) -> None:
-    """Say what the lines are, above the axes, where no line is."""
+    """Write the legend above the axes, where no line is."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(
             loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=columns, frameon=False, fontsize=7,

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is drawn beside a design: a link's angle over the crank's, and below it what it misses."""
+"""The plots beside a design: a link's angle over the crank's, and below it the errors."""
 
 from __future__ import annotations
 
@@ -30,8 +30,6 @@ from linkage_ros.synthesis.proof import closed_position, closure_of, Met, prove,
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# A design as it is drawn: its poses at the positions, and its branches between them.
-
 Array = NDArray[np.float64]
 
 _SAMPLES = 481
@@ -45,11 +43,11 @@ class Pose(NamedTuple):
     Attributes
     ----------
     number
-        Of the position, counted from 1.
+        Number of the position, from 1.
     wanted, met
-        What was asked for, and what it came to.
+        The wanted position, and the actual one.
     own
-        Whether it is met on the design's own assembly.
+        Whether it is on the design's own assembly.
     closure, position
         The linkage in that assembly, and its position there.
 
@@ -70,7 +68,7 @@ class Pose(NamedTuple):
 
 class Branch(NamedTuple):
     """
-    One assembly, as the crank goes through a range.
+    One assembly, while the crank goes through a range.
 
     Attributes
     ----------
@@ -81,7 +79,7 @@ class Branch(NamedTuple):
     crank, rocker, coupler
         Angles of the links, in [rad], without jumps; (n,).
     trace
-        Places of the traced point, in [m]; (n,). Empty where there is none.
+        Places of the traced point, in [m]; (n,). Empty if there is none.
 
     """
 
@@ -95,46 +93,46 @@ class Branch(NamedTuple):
 
 def poses(design: Design) -> tuple[list[Pose], list[int]]:
     """
-    Return a design at its positions, and the numbers of those where it does not close.
+    Return a design at its positions, and the numbers of positions where it does not close.
 
     Raises
     ------
     LinkageError
-        Where it closes at none.
+        If it closes at none.
 
     """
     closures = {side: closure_of(design, side) for side in SIDES}
-    found, open_ = [], []
+    closed, open_ = [], []
     for number, (wanted, met) in enumerate(zip(design.wanted, prove(design), strict=True), 1):
         closure = closures[met.side]
         position = closed_position(closure, wanted.crank)
         if position.joints:
             own = met.side == design.four_bar.side
-            found.append(Pose(number, wanted, met, own, closure, position))
+            closed.append(Pose(number, wanted, met, own, closure, position))
         else:
             open_.append(number)
-    if not found:
+    if not closed:
         raise LinkageError(
             'the design', 'closes at none of its positions', 'there is nothing to draw'
         )
-    return found, open_
+    return closed, open_
 
 
 def branches(design: Design, shown: Sequence[Pose]) -> list[Branch]:
-    """Return the assemblies on which positions are met, over the ranges of the crank around."""
+    """Return the assemblies of the positions, over the ranges of the crank around these."""
     cranks = [pose.wanted.crank for pose in shown]
-    found: list[Branch] = []
+    swept: list[Branch] = []
     for side in SIDES:
         if any(pose.met.side == side for pose in shown):
             way = InputSweep(closure_of(design, side))
             own = design.four_bar.side
-            found += [_branch(way, interval, side, own) for interval in _ranges(way, cranks)]
-    return found
+            swept += [_branch(way, interval, side, own) for interval in _ranges(way, cranks)]
+    return swept
 
 
 def _ranges(way: InputSweep, cranks: Sequence[float]) -> list[InputRange]:
-    """Return the ranges in which positions lie; of a whole turn the one about them."""
-    found: list[InputRange] = []
+    """Return the ranges of the positions; for a crank that turns fully, one turn around them."""
+    ranges: list[InputRange] = []
     for crank in cranks:
         interval = way.range_about(crank)
         if interval is None:
@@ -143,9 +141,9 @@ def _ranges(way: InputSweep, cranks: Sequence[float]) -> list[InputRange]:
             low, high = min(cranks), max(cranks)
             half = max(pi, 0.5 * (high - low))
             return [InputRange(0.5 * (low + high) - half, 0.5 * (low + high) + half, True, _TURNS)]
-        if not any(interval.lowest <= known.highest <= interval.highest for known in found):
-            found.append(interval)
-    return found
+        if not any(interval.lowest <= known.highest <= interval.highest for known in ranges):
+            ranges.append(interval)
+    return ranges
 
 
 def _branch(way: InputSweep, interval: InputRange, side: Assembly, own: Assembly) -> Branch:
@@ -153,7 +151,7 @@ def _branch(way: InputSweep, interval: InputRange, side: Assembly, own: Assembly
     part = np.linspace(0.0, 1.0, _SAMPLES)
     limited = interval.limited != _TURNS
     if limited:
-        # Near a toggle the rocker goes as the root of the crank: closer there, for a round curve.
+        # Near a toggle the rocker follows the root of the crank: denser samples for a round curve.
         part = 0.5 - 0.5 * np.cos(pi * part)
     crank, joints, trace = [], [], []
     for value in (low + (high - low) * part).tolist():
@@ -170,33 +168,33 @@ def _branch(way: InputSweep, interval: InputRange, side: Assembly, own: Assembly
 
 _UNITS = (('m', 1.0), ('mm', 1e3), ('µm', 1e6), ('nm', 1e9))
 _ROUNDING = 1e-9
-"""What is missed by less, of the linkage's size, is not missed."""
+"""Smaller errors, relative to the linkage's size, count as none."""
 
 _EVERY = 6
-"""Of the points of a curve, when room for a number is looked for."""
+"""Every so many points of a curve are obstacles for a number."""
 
 _NUMBERED = 12
-"""Of more positions each second is numbered, or each third, and so on."""
+"""With more positions only every second is numbered, or every third, and so on."""
 
 
 def numbered(number: int, count: int) -> bool:
-    """Return whether a position has its number written to it."""
+    """Return whether a position is labelled with its number."""
     return (number - 1) % (1 + (count - 1) // _NUMBERED) == 0
 
 
 def paint_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -> None:
-    """Plot the rocker's angle over the crank's, or the coupler's where that is what was wanted."""
+    """Plot the angle of the rocker, or of the coupler if that was wanted, over the crank's."""
     from matplotlib.ticker import MultipleLocator  # local import: an extra, and slow to load
 
     coupler = _of_coupler(poses)
     link = 'coupler' if coupler else 'rocker'
     both = len({branch.own for branch in branches}) > 1
-    told: set[str] = set()
+    labelled: set[str] = set()
 
     def once(text: str) -> str:
-        said = '' if text in told else text
-        told.add(text)
-        return said
+        label = '' if text in labelled else text
+        labelled.add(text)
+        return label
 
     for branch in sorted(branches, key=lambda branch: not branch.own):
         angles, marks = _placed(branch, poses)
@@ -229,7 +227,7 @@ def paint_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -
 
 
 def number_angles(axes: Any, branches: Sequence[Branch], poses: Sequence[Pose]) -> None:
-    """Write the numbers of the positions into that plot, once it is laid out."""
+    """Write the numbers of the positions into that plot, after its layout."""
     names = Names(axes)
     lines = []
     for branch in branches:
@@ -264,7 +262,7 @@ def paint_error(axes: Any, error: tuple[ArrayLike, ArrayLike], poses: Sequence[P
 
 
 def paint_distances(axes: Any, poses: Sequence[Pose]) -> None:
-    """Plot how far the traced point is from each of its places."""
+    """Plot the distance of the traced point from each of its places."""
     from matplotlib.ticker import MaxNLocator  # local import: an extra, and slow to load
 
     missed = np.array([pose.met.distance for pose in poses])
@@ -283,7 +281,7 @@ def paint_distances(axes: Any, poses: Sequence[Pose]) -> None:
 
 
 def misses_places(poses: Sequence[Pose]) -> bool:
-    """Return whether places were wanted and are missed by more than rounding."""
+    """Return whether wanted places are missed by more than rounding."""
     size = sum(abs(place) for place in poses[0].points.values())
     return any(pose.met.distance > _ROUNDING * size for pose in poses)
 
@@ -293,7 +291,7 @@ def _wanted(pose: Pose, coupler: bool) -> float | None:
 
 
 def _on(branch: Branch, crank: float) -> float | None:
-    """Return a crank angle with the turns that bring it into a branch's range, if it is in it."""
+    """Return a crank angle with the turns that bring it into a branch's range, or None."""
     low, high = float(branch.crank[0]), float(branch.crank[-1])
     x = crank - tau * round((crank - 0.5 * (low + high)) / tau)
     return x if low - _ROUNDING <= x <= high + _ROUNDING else None
@@ -305,22 +303,22 @@ def _of_coupler(poses: Sequence[Pose]) -> bool:
 
 def _placed(branch: Branch, poses: Sequence[Pose]) -> tuple[Array, list[tuple[Pose, complex]]]:
     """
-    Return a branch's angles in the turn that was wanted, and its positions in that plot.
+    Return a branch's angles in the wanted turn, and the marks of its positions.
 
-    Angles of the link in [rad]; positions as crank angle + i·(the link's angle), in degrees.
+    Angles of the link in [rad]; marks as crank angle + i·(the link's angle), in degrees.
     """
     coupler = _of_coupler(poses)
     angles = branch.coupler if coupler else branch.rocker
-    found = []
+    placed = []
     for pose in poses:
         x = _on(branch, pose.wanted.crank)
         if pose.own == branch.own and x is not None:
             y = float(np.interp(x, branch.crank, angles))
-            found.append((pose, x, y, _wanted(pose, coupler)))
-    behind = [((wanted or 0.0) - y) / tau for _, _, y, wanted in found]
+            placed.append((pose, x, y, _wanted(pose, coupler)))
+    behind = [((wanted or 0.0) - y) / tau for _, _, y, wanted in placed]
     shift = tau * round(float(np.median(behind))) if behind else 0.0
     marks = []
-    for pose, x, y, wanted in found:
+    for pose, x, y, wanted in placed:
         there = y + shift
         at = there if wanted is None else wanted + tau * round((there - wanted) / tau)
         marks.append((pose, complex(degrees(x), degrees(at))))

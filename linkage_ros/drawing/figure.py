@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""A linkage painted by matplotlib: in a pose, and beside it its joints over the input."""
+"""A picture of a linkage by matplotlib: a pose, and beside it its joints over the input."""
 
 from __future__ import annotations
 
@@ -50,20 +49,20 @@ _GHOSTS = 5
 
 class View(NamedTuple):
     """
-    What a picture shows.
+    The content of a picture.
 
     Attributes
     ----------
     closure
         The linkage.
     inputs, position
-        The pose that it is drawn in.
+        The pose to draw.
     ghosts
         Poses in the background.
     interval
-        Range of the first input about the pose, the others held.
+        Range of the first input around the pose, with the others held.
     sweep
-        The linkage as it goes through that range.
+        The motion through that range.
 
     """
 
@@ -88,18 +87,18 @@ def view(
     inputs
         The pose to draw, in [rad] or [m].
     ghosts
-        Poses in the background; without them some of all over the range.
+        Poses in the background; by default some over the whole range.
 
     Raises
     ------
     LinkageError
-        Where a pose does not close.
+        If a pose does not close.
 
     """
     position = _closed(closure, inputs)
     way = InputSweep(closure, inputs)
     value = inputs[0]
-    # A pose beyond the limits lies in no range, and is drawn before the widest.
+    # A pose beyond the limits lies in no range; show the widest one.
     interval = way.range_about(value) or way.widest_range
     interval = interval or InputRange(value, value, way.turning)
     if ghosts:
@@ -149,7 +148,7 @@ def _pose_text(closure: Closure, inputs: tuple[float, ...]) -> str:
 
 
 def all_places(shown: View) -> list[complex]:
-    """Return all places through which something goes, in [m]."""
+    """Return all places that any part passes, in [m]."""
     places = [place for path in shown.sweep.paths.values() for place in path]
     for position in (shown.position, *shown.ghosts):
         for line in skeleton(shown.closure, position):
@@ -158,7 +157,7 @@ def all_places(shown: View) -> list[complex]:
 
 
 def symbol_size(shown: View) -> float:
-    """Return half the width of a bar, in [m]: what suits the picture and its shortest link."""
+    """Return half the width of a bar, in [m], for the picture and its shortest link."""
     low, high = corners(all_places(shown))
     picture = abs(high - low)
     points = shown.closure.points(shown.position)
@@ -186,7 +185,7 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
     Raises
     ------
     LinkageError
-        Where matplotlib is not installed, or the file cannot be written.
+        If matplotlib is not installed, or the file cannot be written.
 
     """
     context = settings()
@@ -219,7 +218,7 @@ def picture(shown: View, title: str, file: Path, *, names: bool = False) -> None
         paint(left, drawn)
         _joints(right, shown)
         if names:
-            figure.draw_without_rendering()  # from here on a text has its size
+            figure.draw_without_rendering()  # only now a text has a size
             _names(left, shown, drawn, size)
         save(figure, file)
 

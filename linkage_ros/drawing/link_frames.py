@@ -12,12 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-A linkage's shapes in the frames of the links that carry them, as plain data.
+The shapes of a linkage in the frames of the links that carry them, as plain data.
 
-Drawn once in a pose, and from then on moved with the links: what draws them anew, picture by
-picture, needs no kinematics. So a rod in a tube keeps the length that it has in that pose.
+They are made once for a pose, and then move with the links: a viewer that paints them picture by
+picture needs no kinematics. Therefore a rod in a tube keeps the length that it has in that pose.
 """
 
 from __future__ import annotations
@@ -34,11 +33,11 @@ from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.results import Position
 
 _DIGITS = 6
-"""Significant ones of what is drawn: a thousandth of a pixel."""
+"""Significant digits of places: a thousandth of a pixel."""
 
 
 class LinkFrame(NamedTuple):
-    """Where the frame of a link is in that of the ground, in [m], and its angle, in [rad]."""
+    """Origin of a link's frame in that of the ground, in [m], and its angle, in [rad]."""
 
     place: complex
     angle: float
@@ -46,23 +45,23 @@ class LinkFrame(NamedTuple):
 
 def link_frames(closure: Closure, position: Position) -> dict[str, LinkFrame]:
     """
-    Return where the links stand, and the blocks of sliders that are no links.
+    Return the frames of the links, and of the blocks of sliders that are not links.
 
-    Such a block has its frame in the slider's point, turned as what it slides along.
+    Such a block has its frame at the slider's point, with the angle of the link it slides along.
     """
     points, angles = closure.points(position), closure.link_angles(position)
-    found = {}
+    frames = {}
     for link, named in closure.linkage.links.items():
         point, (x, y) = next(iter(named.items()))
         angle = angles[link]
-        found[link] = LinkFrame(points[link, point] - complex(x, y) * rect(1.0, angle), angle)
+        frames[link] = LinkFrame(points[link, point] - complex(x, y) * rect(1.0, angle), angle)
     for block, along, point in blocks(closure):
-        found[block] = LinkFrame(points[block, point], angles[along])
-    return found
+        frames[block] = LinkFrame(points[block, point], angles[along])
+    return frames
 
 
 def blocks(closure: Closure) -> list[tuple[str, str, str]]:
-    """Return the blocks that are no links: name, what they slide along, the slider's point."""
+    """Return the blocks that are not links: name, link they slide along, the slider's point."""
     links = closure.linkage.links
     return [
         (block, slider.along, slider.point)
@@ -73,13 +72,13 @@ def blocks(closure: Closure) -> list[tuple[str, str, str]]:
 
 def drawn_in_frames(shown: View) -> dict[str, Any]:
     """
-    Return a linkage as it is drawn, as JSON has it; lengths are in [m].
+    Return the drawing of a linkage as JSON data; lengths are in [m].
 
-    ``shapes`` come in the order in which they are painted. Each has the ``link`` in whose frame it
-    stands, its ``role`` (see `linkage_ros.drawing.shapes`), and ``points``, x and y in turn: of a
-    circle its centre, beside a ``radius``; of a segment its ends; of an area its corners, with
-    ``closed``. ``frame`` is the lower left and upper right of all that it reaches, ``size`` half
-    the width of a bar, ``paths`` the curves of the traced points over the range of the input.
+    ``shapes`` come in the order in which they are painted. Each has the ``link`` of its frame, its
+    ``role`` (see `linkage_ros.drawing.shapes`), and ``points``, x and y in turn: of a circle its
+    centre, with a ``radius``; of a segment its ends; of an area its corners, with ``closed``.
+    ``frame`` is the lower left and upper right corner of the drawing, ``size`` half the width of a
+    bar, ``paths`` the curves of the traced points over the range of the input.
     """
     size = symbol_size(shown)
     frames = link_frames(shown.closure, shown.position)
@@ -102,23 +101,23 @@ def drawn_in_frames(shown: View) -> dict[str, Any]:
 
 
 def _shape(link: str, shape: Shape, frames: Mapping[str, LinkFrame]) -> dict[str, Any]:
-    # The ground's own frame is that in which all is drawn.
+    # The frame of the ground is that of the drawing.
     frame = LinkFrame(0j, 0.0) if link == GROUND else frames[link]
     back = rect(1.0, -frame.angle)
 
     def within(places: Sequence[complex]) -> list[float]:
         return _flat([(place - frame.place) * back for place in places])
 
-    found: dict[str, Any] = {'link': link, 'role': shape.role, 'name': shape.name}
+    data: dict[str, Any] = {'link': link, 'role': shape.role, 'name': shape.name}
     if isinstance(shape, Circle):
-        return {**found, 'points': within([shape.centre]), 'radius': _short(shape.radius)}
+        return {**data, 'points': within([shape.centre]), 'radius': _short(shape.radius)}
     if isinstance(shape, Segment):
-        return {**found, 'points': within([shape.start, shape.end])}
-    return {**found, 'points': within(shape.corners), 'closed': True}
+        return {**data, 'points': within([shape.start, shape.end])}
+    return {**data, 'points': within(shape.corners), 'closed': True}
 
 
 def _carriers(closure: Closure) -> dict[str, str]:
-    """Return for each traced point a link that has it."""
+    """Return for each traced point a link that carries it."""
     links = closure.linkage.links
     return {
         point: next(link for link, named in links.items() if point in named)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What all pictures share: colours, how shapes are painted, where names go, how it is stored."""
+"""The common parts of all pictures: colours, painting of shapes, placing of names, saving."""
 
 from __future__ import annotations
 
@@ -29,24 +29,22 @@ from linkage_ros.drawing.shapes import Circle, Polygon, Segment, Shape
 from linkage_ros.errors import LinkageError
 from linkage_ros.files.atomic_write import atomic_write
 
-# Where names go in a drawing, so that they hide little and lie on nothing that is read.
-
 _DIRECTIONS = 16
 _DISTANCES = 7
 
 
 class Label(NamedTuple):
     """
-    A name to be placed; all in one unit, such as pixels.
+    A name to be placed; all sizes in one unit, such as pixels.
 
     Attributes
     ----------
     anchors
-        Places that it may name; the first is the best.
+        Places that it may be next to; the first is the best.
     width, height
-        Of the text.
+        Size of the text.
     clear
-        How far from the anchor its box begins.
+        Distance of its box from the anchor.
 
     """
 
@@ -57,7 +55,7 @@ class Label(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """Where a label's centre goes, and the anchor that it names."""
+    """Place of a label's centre, and its anchor."""
 
     centre: complex
     anchor: complex
@@ -74,11 +72,11 @@ def place_labels(
     Parameters
     ----------
     labels
-        What to place; the first has the choice.
+        The labels; the first ones are placed first.
     obstacles
-        Points of what should not be hidden.
+        Points of lines and shapes that should not be hidden.
     frame
-        The lower left and the upper right corner of the paper.
+        The lower left and the upper right corner of the drawing.
 
     """
     boxes: list[tuple[complex, float, float]] = []
@@ -90,7 +88,7 @@ def place_labels(
             for ring in range(_DISTANCES):
                 for i in range(_DIRECTIONS):
                     way = rect(1.0, pi / 4.0 + i * 2.0 * pi / _DIRECTIONS)
-                    # The box touches a circle about the anchor.
+                    # The box touches a circle around the anchor.
                     away = label.clear + 0.45 * ring * label.height
                     centre = anchor + complex(
                         way.real * (away + half_width), way.imag * (away + half_height)
@@ -138,13 +136,13 @@ def _outside(centre: complex, width: float, height: float, frame: tuple[complex,
 
 
 COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000')
-"""Okabe and Ito's, which colour-blind readers can tell."""
+"""Colours of Okabe and Ito, which colour-blind readers can distinguish."""
 
 WANTED, TRACE, OTHER = COLOURS[0], COLOURS[2], COLOURS[4]
-"""Of a design: what was asked for, what a point traces, what is on the other assembly."""
+"""Colours in a design: wanted values, path of a point, other assembly."""
 
 OTHER_TEXT = '#a86b00'
-"""The last one's, dark enough for a text."""
+"""Colour of text about the other assembly, dark enough to read."""
 
 INK = '#1f2d3a'
 NAME_INK = '#35608a'
@@ -166,12 +164,12 @@ _SETTINGS: Any = {'font.size': 8.0, 'svg.hashsalt': 'linkage_ros', 'axes.linewid
 
 def settings() -> Any:
     """
-    Return the context in which a picture is made.
+    Return the matplotlib context of a picture.
 
     Raises
     ------
     LinkageError
-        Where matplotlib is not installed.
+        If matplotlib is not installed.
 
     """
     if find_spec('matplotlib') is None:
@@ -185,12 +183,12 @@ def settings() -> Any:
 
 def save(figure: Any, file: Path) -> None:
     """
-    Store a picture; the same one is the same bytes.
+    Save a picture; equal pictures give equal bytes.
 
     Raises
     ------
     LinkageError
-        Where the file cannot be written.
+        If the file cannot be written.
 
     """
     kind = file.suffix[1:].lower() or 'png'
@@ -206,13 +204,13 @@ def save(figure: Any, file: Path) -> None:
 
 
 def corners(places: Iterable[complex]) -> tuple[complex, complex]:
-    """Return the lower left and the upper right corner of places."""
+    """Return the lower left and the upper right corner of the bounding box of places."""
     xs, ys = zip(*((p.real, p.imag) for p in places), strict=True)
     return complex(min(xs), min(ys)), complex(max(xs), max(ys))
 
 
 def outline(shape: Shape) -> tuple[complex, ...]:
-    """Return the places that a shape's edge goes through."""
+    """Return the corners of a shape's edge."""
     if isinstance(shape, Segment):
         return shape.start, shape.end
     if isinstance(shape, Polygon):
@@ -273,12 +271,12 @@ def paint(axes: Any, drawn: Sequence[Shape]) -> None:
 
 class Names:
     """
-    Texts that go where they hide little, all placed together.
+    Texts placed together, each where it hides little.
 
     Parameters
     ----------
     axes
-        Of a figure that was laid out: only from then on a text has its size.
+        Axes of a figure with a final layout: before it a text has no size.
 
     """
 
@@ -288,12 +286,12 @@ class Names:
         self._labels: list[Label] = []
 
     def pixel(self, place: complex) -> complex:
-        """Return where a place in [m] is, in pixels."""
+        """Return the pixel of a place in [m]."""
         x, y = self._axes.transData.transform((place.real, place.imag))
         return complex(x, y)
 
     def want(self, text: str, anchors: Sequence[complex], clear: float, **style: Any) -> None:
-        """Name one of some places, in [m], from a distance in pixels on; the first is the best."""
+        """Add a text next to one of some places, in [m], the first the best; clear in pixels."""
         from matplotlib.patheffects import withStroke  # local import: an extra, and slow to load
 
         written = self._axes.text(
@@ -302,11 +300,11 @@ class Names:
         )  # fmt: skip
         box = written.get_window_extent()
         self._texts.append(written)
-        found = tuple(map(self.pixel, anchors))
-        self._labels.append(Label(found, box.width + 2.0, box.height, clear))
+        pixels = tuple(map(self.pixel, anchors))
+        self._labels.append(Label(pixels, box.width + 2.0, box.height, clear))
 
     def place(self, lines: Iterable[Sequence[complex]]) -> None:
-        """Put them where they hide little of lines from place to place, in [m]."""
+        """Place the texts where they hide little of some lines, in [m]."""
         obstacles = []
         for line in lines:
             for start, end in pairwise(map(self.pixel, line)):
@@ -314,10 +312,10 @@ class Names:
         box = self._axes.get_window_extent()
         frame = complex(box.x0, box.y0), complex(box.x1, box.y1)
         back = self._axes.transData.inverted()
-        for written, label, found in zip(
+        for written, label, placed in zip(
             self._texts, self._labels, place_labels(self._labels, obstacles, frame), strict=True
         ):
-            centre, anchor = found
+            centre, anchor = placed
             written.set_position(back.transform((centre.real, centre.imag)))
             away = centre - anchor
             beside = max(abs(away.real) - 0.5 * label.width, abs(away.imag) - 0.5 * label.height)

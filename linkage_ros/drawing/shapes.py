@@ -12,13 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 A linkage in a pose as an engineer draws it: shapes in metres, in the frame of the ground.
 
-Nothing here knows what paints them. A shape has a role, from which follows how it looks, and the
-name of the part that it belongs to; the shapes come in the order in which they are painted, what
-lies on top last. Links are bars, or plates where they have three points that are not in line.
+The shapes do not depend on how they are painted. Each has a role, which determines its look, and
+the name of its part; they come in the order of painting, the topmost last. Links are bars, or
+plates if they have three points that are not collinear.
 """
 
 from __future__ import annotations
@@ -35,13 +34,13 @@ from linkage_ros.kinematics.results import Position
 Role = Literal[
     'link', 'input', 'plate', 'block', 'tube', 'rail', 'slot', 'ground', 'hatch', 'pin', 'ghost'
 ]
-"""What a shape is; ``input`` is a link that is driven."""
+"""Kind of a shape; ``input`` is a driven link."""
 
 Travels = Mapping[str, tuple[float, float]]
 """Lowest and highest slide of each slider in the drawing, in [m]."""
 
 _FLAT = 1e-6
-"""How far off their line, of its length, points may lie and be in line."""
+"""Largest distance of collinear points from their line, relative to its length."""
 
 _ARC = pi / 8.0
 
@@ -76,7 +75,7 @@ Shape = Polygon | Segment | Circle
 
 
 class _Pose(NamedTuple):
-    """A linkage in a pose, as all that is drawn here sees it."""
+    """A linkage in a pose, with the values that the shapes need."""
 
     closure: Closure
     points: dict[tuple[str, str], complex]
@@ -95,9 +94,9 @@ def shapes(closure: Closure, position: Position, size: float, travels: Travels) 
     closure, position
         The linkage, and a position that closes.
     size
-        Half the width of a bar, in [m]; all symbols go by it.
+        Half the width of a bar, in [m]; all symbols scale with it.
     travels
-        How far rails have to go.
+        Range of the slides, for the length of rails.
 
     """
     return [shape for _, shape in carried_shapes(closure, position, size, travels)]
@@ -106,7 +105,7 @@ def shapes(closure: Closure, position: Position, size: float, travels: Travels) 
 def carried_shapes(
     closure: Closure, position: Position, size: float, travels: Travels
 ) -> list[tuple[str, Shape]]:
-    """Draw a linkage as `shapes` does; return with each shape the link that carries it."""
+    """Draw a linkage as `shapes` does; return each shape with the link that carries it."""
     pose = _Pose(
         closure,
         closure.points(position),
@@ -130,8 +129,8 @@ def carried_shapes(
         for link in linkage.links
         if link != GROUND
     ]
-    # Plates hide least below the bars, and what is driven is to be seen.
-    for link, parts in sorted(links, key=lambda found: _layer(found[1])):
+    # Plates hide least below the bars, and driven links should be visible.
+    for link, parts in sorted(links, key=lambda item: _layer(item[1])):
         drawn += [(link, part) for part in parts]
     for name, slider in linkage.sliders.items():
         if name not in cylinders:
@@ -145,7 +144,7 @@ def carried_shapes(
 
 
 def skeleton(closure: Closure, position: Position) -> list[Segment]:
-    """Return the links of a linkage as lines from point to point, for a pose in the background."""
+    """Return the links as lines from point to point, for a pose in the background."""
     points = closure.points(position)
     blocks = closure.structure.blocks
     drawn = []
@@ -163,23 +162,23 @@ def skeleton(closure: Closure, position: Position) -> list[Segment]:
 
 
 def driven_links(closure: Closure) -> set[str]:
-    """Return the links that an input places against their parent."""
-    found = set()
+    """Return the links that an input moves relative to their parent."""
+    driven = set()
     for given in closure.linkage.inputs:
         if given.slider:
-            found.add(closure.structure.blocks[given.slider])
+            driven.add(closure.structure.blocks[given.slider])
         elif given.child != GROUND:
-            found.add(given.child)
+            driven.add(given.child)
         else:
-            found.add(given.parent)
-    return found
+            driven.add(given.parent)
+    return driven
 
 
 def hull(points: Iterable[complex]) -> list[complex]:
     """
-    Return the corners of the smallest convex area around points, counter-clockwise.
+    Return the corners of the convex hull of points, counter-clockwise.
 
-    Of points in line, the two farthest; of one place, that one. (A. M. Andrew's chain.)
+    For collinear points, the two farthest; for one place, that place. (A. M. Andrew's chain.)
     """
     places = sorted(set(points), key=lambda p: (p.real, p.imag))
     if len(places) < 3:
@@ -201,7 +200,7 @@ def hull(points: Iterable[complex]) -> list[complex]:
 
 
 def rounded(corners: Sequence[complex], radius: float) -> tuple[complex, ...]:
-    """Return the outline at a distance around the corners of a convex area, in order."""
+    """Return the outline at a distance around a convex polygon, in order."""
     if len(corners) == 1:
         steps = round(tau / _ARC)
         return tuple(corners[0] + rect(radius, i * _ARC) for i in range(steps))
@@ -220,14 +219,14 @@ def _layer(parts: Sequence[Shape]) -> int:
 
 
 def _is_cylinder(pose: _Pose, name: str) -> bool:
-    """Return whether a slider is one of a rod in a tube: both links move, and turn together."""
+    """Return whether a slider is a rod in a tube: both links move, with the same angle."""
     slider = pose.closure.linkage.sliders[name]
     lowest, _ = pose.travels[name]
     return bool(slider.block) and slider.along != GROUND != slider.block and lowest > 0.0
 
 
 def _supports(pose: _Pose) -> list[complex]:
-    """Return the pins of the ground."""
+    """Return the places of the pins on the ground."""
     links = pose.closure.structure.links
     return [
         pose.points[GROUND, point]
@@ -237,7 +236,7 @@ def _supports(pose: _Pose) -> list[complex]:
 
 
 def _support(pivot: complex, size: float) -> list[Shape]:
-    """Draw a pivot of the ground: a triangle that stands on hatched ground."""
+    """Draw a pivot on the ground: a triangle on hatched ground."""
     foot, half = pivot - 2.6j * size, 1.7 * size
     return [
         Polygon('ground', GROUND, (pivot, foot - half, foot + half)),
@@ -258,7 +257,7 @@ def _hatch(start: complex, end: complex, size: float) -> list[Shape]:
 
 
 def _line(pose: _Pose, slider: Slider) -> tuple[complex, complex]:
-    """Return where the line of a slider starts, and its direction."""
+    """Return the start of a slider's line, and its direction."""
     direction = complex(*slider.direction)
     unit = direction / abs(direction) * rect(1.0, pose.angles[slider.along])
     return pose.points[slider.along, slider.through], unit
@@ -271,13 +270,13 @@ def _rail_ends(pose: _Pose, name: str, beyond: float) -> tuple[complex, complex]
 
 
 def _ground_rail(pose: _Pose, name: str, slider: Slider) -> list[Shape]:
-    """Draw a line of the ground: the surface that the block slides on, hatched below."""
+    """Draw a slider's line on the ground: a surface, hatched below."""
     size = pose.size
     start, end = _rail_ends(pose, name, 3.0 * size)
     _, unit = _line(pose, slider)
     upright = abs(unit.real) <= _FLAT
     if unit.real < -_FLAT or (upright and unit.imag > 0.0):
-        # The ground is to lie below, or left of what runs upright.
+        # The ground should lie below the line, or left of a vertical line.
         start, end, unit = end, start, -unit
     below = -1j * unit * 1.5 * size
     return _hatch(start + below, end + below, size)
@@ -301,7 +300,7 @@ def _block(pose: _Pose, name: str, slider: Slider) -> Polygon:
 
 
 def _link(pose: _Pose, link: str, role: Role, cylinders: Sequence[str]) -> list[Shape]:
-    """Draw a link: its points, and as much of its rails as is used."""
+    """Draw a link: its points, and the used part of its rails."""
     linkage, size = pose.closure.linkage, pose.size
     places = [pose.points[link, point] for point in linkage.links[link]]
     drawn: list[Shape] = []

@@ -29,7 +29,7 @@ from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
 _LONGER_SIDE = 420.0
-"""Of a picture, in pixels."""
+"""Longer side of a picture, in pixels."""
 
 
 def svg(shown: Closure | Position) -> str:
@@ -41,7 +41,7 @@ def svg(shown: Closure | Position) -> str:
     Parameters
     ----------
     shown
-        A position; or a closure, which is drawn where it starts.
+        A position; or a closure, which is drawn at its start.
 
     Returns
     -------
@@ -51,9 +51,9 @@ def svg(shown: Closure | Position) -> str:
     Raises
     ------
     LinkageError
-        Where the position has no pose.
+        If the position does not close.
     TypeError
-        Where it is neither.
+        If it is neither.
 
     """
     position = shown.position(*usual_inputs(shown)) if isinstance(shown, Closure) else shown

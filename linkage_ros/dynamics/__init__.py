@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The forces on a planar linkage, and how it moves under them."""
+"""The forces on a planar linkage, and its motion under them."""

@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-The forces that act on a linkage beside that of its drive, and what they act on.
+The loads on a linkage, in addition to its drives, and the parts that they act on.
 
-Points are those of the linkage's links, by link and name. SI units throughout.
+Points are named by link and point. SI units throughout.
 """
 
 from __future__ import annotations
@@ -31,10 +30,10 @@ from linkage_ros.kinematics.linkage import GROUND, Linkage
 @dataclass(frozen=True, slots=True)
 class Spring:
     """
-    A spring with a damper beside it, between points of two links.
+    A spring with a parallel damper, between points of two links.
 
-    It pulls with k·(ℓ − ℓ0) + c·ℓ̇ where its length is ℓ. Where its ends meet it has no direction
-    and pulls nothing.
+    It pulls with k·(ℓ − ℓ0) + c·ℓ̇ at the length ℓ. If its ends coincide it has no direction and
+    no force.
 
     Attributes
     ----------
@@ -47,7 +46,7 @@ class Spring:
     damping
         c, in [N·s/m].
     name
-        How messages call it.
+        Its name in messages.
 
     """
 
@@ -66,23 +65,23 @@ class Spring:
         return (self.from_link, self.from_point), (self.to_link, self.to_point)
 
     def tension(self, length: float, growth: float) -> float:
-        """Return what it pulls with, in [N], from its length, in [m], and its growth, in [m/s]."""
+        """Return the pulling force, in [N], for a length, in [m], and its rate, in [m/s]."""
         return self.stiffness * (length - self.free_length) + self.damping * growth
 
 
 @dataclass(frozen=True, slots=True)
 class Loads:
     """
-    Gravity, springs and the drive's own inertia.
+    Gravity, springs and the inertia of the drive.
 
     Attributes
     ----------
     gravity
-        In the frame of the ground, in [m/s²].
+        Acceleration of gravity in the frame of the ground, in [m/s²].
     springs
         All springs.
     drive_inertia
-        Of each input's motor, seen at the input: in [kg·m²], or in [kg] where the input slides.
+        Inertia of each input's motor, seen at the input: in [kg·m²], or in [kg] for a slide.
 
     """
 
@@ -94,14 +93,14 @@ class Loads:
 @dataclass(frozen=True, slots=True)
 class JointFriction:
     """
-    What a pin or slider resists its motion with.
+    The friction of a pin or slider.
 
     Attributes
     ----------
     viscous
         Of a pin in [N·m·s/rad], of a slider in [N·s/m].
     coulomb
-        Of a pin in [N·m], of a slider in [N]; the same whatever force the joint carries.
+        Of a pin in [N·m], of a slider in [N]; independent of the force in the joint.
 
     """
 
@@ -114,8 +113,8 @@ class Friction:
     """
     Friction by the name of the pin or slider.
 
-    A pin of three links or more resists in each of its joints: of each of its links against the
-    first one that `links` names it on.
+    A pin of three links or more has friction in each of its joints: between each of its links and
+    the first link in `links` that has it.
     """
 
     joints: Mapping[str, JointFriction] = field(default_factory=dict)
@@ -143,13 +142,13 @@ def check_masses(linkage: Linkage) -> None:
 
 def check_loads(linkage: Linkage, loads: Loads, friction: Friction | None = None) -> None:
     """
-    Refuse forces on what the linkage does not have.
+    Refuse loads and friction on parts that the linkage does not have.
 
     Raises
     ------
     DefinitionError
-        With the key ``loads.springs.NAME`` (the spring's number, from 1, where it has no name) or
-        ``effects.friction.joints.NAME``.
+        With the key ``loads.springs.NAME`` (the number of the spring, from 1, if it has no name)
+        or ``effects.friction.joints.NAME``.
 
     """
     for number, spring in enumerate(loads.springs, 1):

@@ -12,9 +12,8 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-The equation of motion of a linkage, and the effort of its drive, by virtual work.
+The equation of motion of a linkage, and the efforts of its drives, by virtual work.
 
 With one input q, each centre of mass moves with r' = dr/dq and each link turns with θ' = dθ/dq,
 which are the velocities at q̇ = 1; r'' and θ'' are the accelerations at q̇ = 1 and q̈ = 0. So::
@@ -25,14 +24,14 @@ which are the velocities at q̇ = 1; r'' and θ'' are the accelerations at q̇ =
 
     I·q̈ + ½·(dI/dq)·q̇² + dV/dq + C·q̇ + F·sign(q̇) = τ
 
-which is Eksergian's equation of motion (R. Eksergian, Dynamical Analysis of Machines, J. Franklin
+This is Eksergian's equation of motion (R. Eksergian, Dynamical Analysis of Machines, J. Franklin
 Institute, 1930–31; B. Paul, Kinematics and Dynamics of Planar Machinery, 1979, ch. 12; for virtual
-work also R. L. Norton, Design of Machinery, ch. 10). Id is the drive's own inertia; ψ the angle in
-a pin or the slide in a slider, with the viscous coefficient c and the Coulomb moment or force T; ℓ
-the length of a spring.
+work also R. L. Norton, Design of Machinery, ch. 10). Id is the inertia of the drive; ψ the angle
+in a pin or the slide in a slider, with the viscous coefficient c and the Coulomb moment or force
+T; ℓ the length of a spring.
 
-With several inputs there is one such equation each: its left side is the work of inertia, loads
-and friction over the velocities that its input alone would give at a rate of 1.
+With several inputs there is one such equation for each: its left side is the work of inertia,
+loads and friction over the velocities that this input alone would cause at a rate of 1.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 
 _ROUNDING = 1e-9
-"""A slip below this part of the rates that it comes from is none."""
+"""Slips below this fraction of the rates that they come from count as zero."""
 
 
 class Terms(NamedTuple):
@@ -60,7 +59,7 @@ class Terms(NamedTuple):
     Attributes
     ----------
     inertia
-        I, in [kg·m²], or in [kg] where the input slides; the others go with it.
+        I, in [kg·m²], or in [kg] if the input slides; the units of the others follow.
     half_slope
         ½·dI/dq.
     potential_slope
@@ -68,10 +67,10 @@ class Terms(NamedTuple):
     viscous
         C; the force on q is −C·q̇.
     coulomb
-        F; the force on q is −F·sign(q̇), and anything up to F either way where q stands.
+        F; the force on q is −F·sign(q̇), and up to F in either direction at q̇ = 0.
     slips
-        T·ψ' of each joint with Coulomb friction, so that F is the sum of their sizes; 0 where ψ'
-        is 0 but for rounding. Empty where no joint has such friction.
+        T·ψ' of each joint with Coulomb friction, so that F is the sum of their absolute values; 0
+        if ψ' is 0 within rounding. Empty without such friction.
 
     """
 
@@ -88,7 +87,7 @@ class Rubbing(NamedTuple):
     A joint with friction.
 
     Its rate is factor·(v[one] − v[other]) of the closure's coordinates, in [rad/s] or [m/s];
-    ``joint`` is its number among the joints of the structure.
+    ``joint`` is its index among the joints of the structure.
     """
 
     joint: int
@@ -106,16 +105,16 @@ class Mechanics:
     Parameters
     ----------
     closure
-        The linkage, as it is solved.
+        The linkage with its solution.
     loads
-        What acts on it; nothing if not given.
+        The loads; none by default.
     friction
-        In its pins and sliders; none if not given.
+        Friction in pins and sliders; none by default.
 
     Raises
     ------
     DefinitionError
-        Where a link that moves has no mass, or a force acts on what is not there.
+        If a link that moves has no mass, or a load names a part that does not exist.
 
     """
 
@@ -152,8 +151,8 @@ class Mechanics:
         """
         Return the equation of motion of a linkage with one input.
 
-        There is none where no rates exist, as at a toggle, where the linkage does not close, and
-        within floats of a toggle, where the terms are beyond a double.
+        Return None if no rates exist, as at a toggle, if the linkage does not close, and so near a
+        toggle that the terms overflow.
         """
         if not position.status.has_rates:
             return None
@@ -192,18 +191,18 @@ class Mechanics:
     @cached_property
     def equation(self) -> Callable[[float], Terms | None]:
         """
-        Return what gives the equation of motion of a linkage with one input, by the input.
+        Return the equation of motion of a linkage with one input, as a function of the input.
 
-        It gives what `terms` gives of the position, to the last bit, in a straight line.
+        Its results equal `terms` at the position to the last bit; it is straight-line code.
         """
         compiled = Compiled(self.closure, 0, self._wanted_terms)
         fast, position, terms = compiled.fast, self.closure.position, self.terms
 
         def equation(value: float) -> Terms | None:
-            found = fast(value)
-            if found is None:
+            values = fast(value)
+            if values is None:
                 return terms(position(value))
-            (inertia, half_slope, potential_slope, viscous, coulomb), slips = found
+            (inertia, half_slope, potential_slope, viscous, coulomb), slips = values
             return Terms(inertia, half_slope, potential_slope, viscous, coulomb, slips)
 
         return equation
@@ -213,7 +212,7 @@ class Mechanics:
         return [terms[:-1], terms.slips] if terms else []
 
     def potential(self, position: Position) -> float:
-        """Return V at a closed position, in [J]; weight is 0 at the height of the origin."""
+        """Return V at a closed position, in [J]; weight has potential 0 at the origin's height."""
         places = self._follower.places(position)
         moment = 0j
         for mass, _, point, _ in self._bodies:
@@ -225,7 +224,7 @@ class Mechanics:
         return energy
 
     def kinetic(self, position: Position, velocity: Velocity) -> float:
-        """Return the kinetic energy, that of the drive's own inertia included, in [J]."""
+        """Return the kinetic energy, including that of the drive's inertia, in [J]."""
         places = self._follower.places(position)
         velocities = self._follower.velocities(position, velocity, places)
         v = velocity.state.coordinates
@@ -240,14 +239,14 @@ class Mechanics:
 
     def energy(self, position: Position, *rates: float) -> float:
         """
-        Return kinetic and potential energy together, in [J].
+        Return the sum of kinetic and potential energy, in [J].
 
         Parameters
         ----------
         position
-            A closed position, no toggle.
+            A closed position, not a toggle.
         *rates
-            Of the driven joints, in [rad/s] or [m/s].
+            Rates of the driven joints, in [rad/s] or [m/s].
 
         """
         velocity = self.closure.velocity(position, *rates)
@@ -257,20 +256,20 @@ class Mechanics:
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> tuple[float, ...]:
         """
-        Return what each drive must give for a motion: its own inertia, loads and friction borne.
+        Return the effort of each drive for a motion, against inertia, loads and friction.
 
         Parameters
         ----------
         position
-            A closed position, no toggle.
+            A closed position, not a toggle.
         velocity, acceleration
-            As the closure has found them. They hold the inputs' own.
+            Results of the closure, including those of the inputs.
 
         Returns
         -------
         efforts
-            For each input a moment in [N·m], or a force in [N] where it slides, positive where it
-            drives the input forward. Coulomb friction is 0 in a joint that stands.
+            For each input a moment in [N·m], or a force in [N] if it slides, positive if it drives
+            the input forward. Coulomb friction is 0 in a joint at rest.
 
         """
         follower, count = self._follower, len(self._units)
@@ -300,7 +299,7 @@ class Mechanics:
         return efforts
 
     def _spring_pulls(self, places: list[complex], velocities: list[complex]) -> list[float]:
-        """Return what each spring pulls its ends together with, in [N]."""
+        """Return the force with which each spring pulls its ends together, in [N]."""
         return [
             spring.tension(*stretched(places, velocities, start, end))
             for spring, (_, _, _, start, end) in zip(
@@ -324,9 +323,9 @@ class Mechanics:
 
 def resistance(rubbing: Rubbing, v: list[float]) -> float:
     """
-    Return what a joint resists its motion with, in [N·m] or [N], of the sign of its rate.
+    Return the friction of a joint against its motion, in [N·m] or [N], with the rate's sign.
 
-    Coulomb friction is 0 in a joint that stands, rounding apart.
+    Coulomb friction is 0 in a joint at rest, within rounding.
     """
     _, viscous, coulomb, one, other, factor = rubbing
     slip = factor * (v[one] - v[other])
@@ -335,7 +334,7 @@ def resistance(rubbing: Rubbing, v: list[float]) -> float:
 
 
 def _stands(v: list[float], one: int, other: int) -> bool:
-    """Return whether the difference of two rates is 0 but for rounding."""
+    """Return whether the difference of two rates is 0 within rounding."""
     rates = abs(v[one]) + abs(v[other]) + abs(v[1])
     return abs(v[one] - v[other]) <= _ROUNDING * rates
 
@@ -343,7 +342,7 @@ def _stands(v: list[float], one: int, other: int) -> bool:
 def stretched(
     places: list[complex], velocities: list[complex], start: int, end: int
 ) -> tuple[float, float]:
-    """Return how long a spring is and how fast it grows; not at all where its ends meet."""
+    """Return the length of a spring and its rate; both 0 if its ends coincide."""
     along, apart = places[end] - places[start], velocities[end] - velocities[start]
     length = abs(along)
     if not length:

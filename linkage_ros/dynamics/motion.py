@@ -13,29 +13,29 @@
 # limitations under the License.
 
 """
-How a linkage of one freedom moves under a force: sticking, slipping, and stopped at its ends.
+The motion of a linkage of one freedom under a force: sticking, slipping, and stopped at its ends.
 
 The equation of motion is that of `linkage_ros.dynamics.mechanics`::
 
     I(q)·q̈ + ½·I'(q)·q̇² + V'(q) + C(q)·q̇ + (F(q) + B)·sign(q̇) = τ
 
-with a brake B beside the friction F of the joints. Within a step the sign is that of the rate
-at its start: what is integrated is smooth. Where the rate then changes its sign, the instant is
-found at which it is zero: the mechanism stands there, until |τ − V'| exceeds F + B, or goes on
-the other way at once. For one freedom this is Coulomb's law itself, with no rate below which the
-friction would be rounded off. Where there is no friction nothing is looked for.
+with a brake B in addition to the friction F of the joints. Within a step the sign is that of the
+rate at its start, so the integrand is smooth. If the rate changes its sign, the integrator finds
+the instant at which it is zero: the mechanism stays there until |τ − V'| exceeds F + B, or
+reverses at once. For one freedom this is Coulomb's law itself, without a threshold rate below
+which friction is smoothed. Without friction no instant is searched for.
 
-F(q) = Σ T·|ψ'(q)| has a kink where the slip ψ' of a joint turns, as in the pin of a rocker at
+F(q) = Σ T·|ψ'(q)| has a kink where the slip ψ' of a joint reverses, as in the pin of a rocker at
 either end of its swing. A step across it is of order 2, whatever the method. So within a step the
-signs of the slips too are those at its start; where one has turned at its end, the instant is
-found and the step is cut there. Both pieces are smooth, and the order is that of the method
-(`test/dynamics/test_kinks.py`). Where no joint has Coulomb friction nothing is looked for.
+signs of the slips, too, are those at its start; if one has changed at the end, the integrator
+finds the instant and cuts the step there. Both pieces are smooth, and the order is that of the
+method (`test/dynamics/test_kinks.py`). Without Coulomb friction no instant is searched for.
 
-A stop is hard: the instant is found at which it is met, the rate becomes −e·q̇, and the rest of
-the step goes on from there. A mechanism that is pushed against a stop rests at it.
+A stop is hard: the integrator finds the instant of the impact, the rate becomes −e·q̇, and the
+rest of the step continues from there. A mechanism that is pushed against a stop rests at it.
 
-Equations of motion with dry friction are treated so as differential inclusions: D. E. Stewart,
-Rigid-Body Dynamics with Friction and Impact, SIAM Review 42, 2000.
+Such a treatment of dry friction is a differential inclusion: D. E. Stewart, Rigid-Body Dynamics
+with Friction and Impact, SIAM Review 42, 2000.
 """
 
 from __future__ import annotations
@@ -48,11 +48,9 @@ from typing import NamedTuple, TypeVar
 from linkage_ros.dynamics.integrators.method import Step
 from linkage_ros.dynamics.mechanics import Terms
 
-# When something happens within a step: the instant at which a margin is used up.
-
 _NARROWINGS = 80
 NARROW = 1e-14
-"""How exactly an instant is found, as a share of the step."""
+"""Precision of an instant, as a fraction of the step."""
 
 State = TypeVar('State')
 
@@ -67,23 +65,23 @@ def last_before(
     """
     Return the instant at which the margin is 0, the last state before it, and whether it is that.
 
-    Where there is no state it is not known what happens; then the instant is the end of what there
-    is. By the Illinois form of regula falsi (M. Dowell, P. Jarratt, A modified regula falsi method
-    for computing the root of an equation, BIT 11, 1971), and by halving where it has no two
-    values: where the margin is 0 at the start too, or there is no state at the end.
+    If no state exists beyond some instant, that instant is returned, and False. The method is the
+    Illinois form of regula falsi (M. Dowell, P. Jarratt, A modified regula falsi method for
+    computing the root of an equation, BIT 11, 1971), and bisection if it lacks two values: if the
+    margin is 0 at the start too, or there is no state at the end.
 
     Parameters
     ----------
     reach
-        The state after some seconds; None where there is none.
+        Returns the state after some seconds; None if there is none.
     margin
-        Of a state, 0 or more before the instant.
+        Returns the margin of a state, 0 or more before the instant.
     start
         The state at 0.
     end
         A time beyond the instant, in [s].
     beyond
-        The state then, its margin below 0.
+        The state at that time; its margin is below 0.
 
     """
     before, last, after, known = 0.0, start, end, True
@@ -95,46 +93,46 @@ def last_before(
         at = 0.5 * (before + after)
         if low > 0.0 and known:
             guess = before + (after - before) * low / (low - high)
-            # Not nearer to an end than matters: so the last looks close in from both sides.
+            # Keep a distance from both ends, so that the last steps close in from both sides.
             at = min(max(guess, before + 0.5 * narrow), after - 0.5 * narrow)
-        found = reach(at)
-        if found is None:
+        state = reach(at)
+        if state is None:
             after, known = at, False
             continue
-        now = margin(found)
+        now = margin(state)
         if now < 0.0:
             low *= 0.5 if stays > 0 else 1.0
             after, high, known, stays = at, now, True, 1
         else:
             high *= 0.5 if stays < 0 else 1.0
-            before, last, low, stays = at, found, now, -1
+            before, last, low, stays = at, state, now, -1
             if now == 0.0:
-                return at, found, True
+                return at, state, True
     return after, last, known
 
 
 LARGEST = 1e10
 """
-Values and rates beyond this are no motion, in [rad], [m] or either a second.
+Values and rates beyond this are no valid motion, in [rad], [m] or either per second.
 
 As doubles, angles are 2e-6 rad apart there.
 """
 
 _LEAST = 1e-100
-"""Less inertia than this is none, in [kg·m²] or [kg]: accelerations are not beyond a double."""
+"""Smaller inertias count as zero, in [kg·m²] or [kg]: so accelerations cannot overflow."""
 
 _PIECES = 20
 """
-Into how many pieces a step may fall, at stops, where it sticks, and where it is too long.
+Most pieces of a step: at stops, where it sticks, and where it is too long.
 
-Then it rests: bounces that are so many within one step come to their end.
+After these the mechanism rests: with so many bounces in one step it comes to rest anyway.
 """
 
 _KINKS = 20
-"""How many times a step is cut where slips turn; what comes then is integrated as it is."""
+"""Most cuts of a step where slips reverse; the rest of the step is integrated without cuts."""
 
 _SHORTEST = 0.5**30
-"""Share of a step, below which a piece of it is none."""
+"""Smallest fraction of a step that is integrated."""
 
 
 class Motion(NamedTuple):
@@ -144,9 +142,9 @@ class Motion(NamedTuple):
     Attributes
     ----------
     value
-        Of the input, in [rad] or [m].
+        Value of the input, in [rad] or [m].
     rate
-        In [rad/s] or [m/s].
+        Its rate, in [rad/s] or [m/s].
     terms
         The equation of motion at the value.
 
@@ -158,7 +156,7 @@ class Motion(NamedTuple):
 
 
 class _Event(Enum):
-    """What ends a piece of a step."""
+    """The event that ends a piece of a step."""
 
     LOW = 'lower stop'
     HIGH = 'upper stop'
@@ -168,18 +166,18 @@ class _Event(Enum):
 
 class OneFreedom:
     """
-    A mechanism with one input that a force moves.
+    A mechanism with one input that is moved by a force.
 
     Parameters
     ----------
     terms
-        The equation of motion at a value of the input; None where there is none.
+        The equation of motion at a value of the input; None if there is none.
     step
         The method of integration.
     stops
-        Where it is stopped, in [rad] or [m].
+        Lower and upper stop, in [rad] or [m].
     restitution
-        Rate behind an impact by that before, 0 to 1.
+        Ratio of the rates after and before an impact, 0 to 1.
 
     """
 
@@ -198,7 +196,7 @@ class OneFreedom:
         self._restitution = restitution
 
     def at(self, value: float, rate: float) -> Motion | None:
-        """Return a state; nothing where it cannot move so."""
+        """Return a state, or None if it cannot exist."""
         low, high = self._stops
         return self._reached(value, rate) if low <= value <= high else None
 
@@ -209,11 +207,11 @@ class OneFreedom:
 
     def advance(self, motion: Motion, seconds: float, force: float, brake: float = 0.0) -> Motion:
         """
-        Carry a state on by one step.
+        Advance a state by one step.
 
-        A step that cannot be done in one, since it leads to where there is no motion, is halved
-        until it can; where nothing of it can be done, or it falls into too many pieces, the
-        mechanism is held as by a stop. So the work is bounded, whatever the force.
+        A step that leads to where no motion exists is halved until it succeeds. If no part of it
+        succeeds, or it falls into too many pieces, the mechanism is held as by a stop. So the work
+        is bounded, whatever the force.
 
         Parameters
         ----------
@@ -224,7 +222,7 @@ class OneFreedom:
         force
             τ on the input, in [N·m] or [N].
         brake
-            B, what a brake on the input holds, in [N·m] or [N].
+            B, the holding force of a brake on the input, in [N·m] or [N].
 
         """
         left = seconds
@@ -244,11 +242,11 @@ class OneFreedom:
                     return self._bounced(motion)
                 reached = reach(length)
             event = None
-            # At the last state before one thing another may have happened already.
-            while (found := self._event(reached, sense, sticks, slips)) is not None:
-                margin = self._margin(found, sense, slips)
+            # At the last state before one event, another event may have happened already.
+            while (happened := self._event(reached, sense, sticks, slips)) is not None:
+                margin = self._margin(happened, sense, slips)
                 length, last, known = last_before(reach, margin, motion, length, reached)
-                reached, event = last, found if known else None
+                reached, event = last, happened if known else None
             motion = reached
             if event is _Event.KINK:
                 kinks += 1
@@ -264,7 +262,7 @@ class OneFreedom:
         return _at_rest(motion)
 
     def _sense(self, motion: Motion, force: float, brake: float) -> float:
-        """Return which way it moves, 1 or -1, or 0 where it stays."""
+        """Return the direction of motion, 1 or -1, or 0 if it stays at rest."""
         value, rate, terms = motion
         if rate:
             return copysign(1.0, rate)
@@ -283,7 +281,7 @@ class OneFreedom:
         sense: float,
         slips: tuple[float, ...],
     ) -> Callable[[float], Motion | None]:
-        """Return what gives the state after some seconds of one step."""
+        """Return a function that gives the state after some seconds of one step."""
         value, rate, here = motion
         terms, step, reached = self._terms, self._step, self._reached
         start = _acceleration(here, rate, force, braking, sense)
@@ -291,16 +289,16 @@ class OneFreedom:
         def field(q: float, w: float) -> float | None:
             if not (-LARGEST <= q <= LARGEST and -LARGEST <= w <= LARGEST):
                 return None
-            found = terms(q)
-            if found is None or found.inertia < _LEAST:
+            there = terms(q)
+            if there is None or there.inertia < _LEAST:
                 return None
             return _acceleration(
-                found, w, force, braking, sense, _turned(found, slips) if slips else 0.0
+                there, w, force, braking, sense, _turned(there, slips) if slips else 0.0
             )
 
         def reach(seconds: float) -> Motion | None:
-            found = step(field, value, rate, start, seconds)
-            return None if found is None else reached(*found)
+            end = step(field, value, rate, start, seconds)
+            return None if end is None else reached(*end)
 
         return reach
 
@@ -315,7 +313,7 @@ class OneFreedom:
     def _event(
         self, motion: Motion, sense: float, sticks: bool, slips: tuple[float, ...]
     ) -> _Event | None:
-        """Return what has happened on the way to a state."""
+        """Return the event that has happened before a state, or None."""
         value, rate, terms = motion
         low, high = self._stops
         if sticks and sense * rate < 0.0:
@@ -329,7 +327,7 @@ class OneFreedom:
     def _margin(
         self, event: _Event, sense: float, slips: tuple[float, ...]
     ) -> Callable[[Motion], float]:
-        """Return what says how far a state is from an event."""
+        """Return a function that gives the margin of a state to an event."""
         low, high = self._stops
         if event is _Event.TURN:
             return lambda motion: sense * motion.rate
@@ -344,7 +342,7 @@ class OneFreedom:
         )
 
     def _stopped(self, motion: Motion, event: _Event) -> Motion:
-        """Return the state behind an impact."""
+        """Return the state after an impact."""
         low, high = self._stops
         stop, outward = (high, 1.0) if event is _Event.HIGH else (low, -1.0)
         at_stop = self._reached(stop, motion.rate) or motion
@@ -360,7 +358,7 @@ def _at_rest(motion: Motion) -> Motion:
 
 
 def _turned(terms: Terms, before: tuple[float, ...]) -> float:
-    """Return the Coulomb friction of the joints whose slip has turned since, in [N·m] or [N]."""
+    """Return the Coulomb friction of the joints whose slip has reversed, in [N·m] or [N]."""
     turned = 0.0
     for slip, earlier in zip(terms.slips, before, strict=True):
         if slip * earlier < 0.0:
@@ -372,9 +370,9 @@ def _acceleration(
     terms: Terms, rate: float, force: float, braking: float, sense: float, turned: float = 0.0
 ) -> float:
     """
-    Return q̈ of the equation of motion, friction and brake against ``sense``; 0 where it is.
+    Return q̈ of the equation of motion, friction and brake against ``sense``; 0 if that is 0.
 
-    The friction ``turned`` of some joints counts the other way, as it would go on without a kink.
+    The friction ``turned`` of some joints has the opposite sign: its form without a kink.
     """
     if sense == 0.0:
         return 0.0

@@ -13,20 +13,20 @@
 # limitations under the License.
 
 """
-The forces in the pins and sliders of a linkage, by Newton and Euler's equations of every link.
+The forces in the pins and sliders of a linkage, by the Newton-Euler equations of every link.
 
-For each link that moves, with all that acts on it::
+For each link that moves, over all forces and moments that act on it::
 
     Σ F = m·(a − g)        Σ (p − c) × F + Σ M = J·α
 
-p is where a force acts and c the centre of mass. Unknown are the force in each pin, the force
+p is where a force acts and c the centre of mass. The unknowns are the force in each pin, the force
 across and the moment in each slider, and the effort of each drive: as many as equations, one
 linear system A·f = b (R. L. Norton, Design of Machinery, ch. 11; E. J. Haug, Computer Aided
 Kinematics and Dynamics of Mechanical Systems, 1989, ch. 6).
 
-The columns of A are what each unknown does to each link (`joint_matrix.py`). So, by virtual work,
-the rows of Aᵀ are what small displacements Δ of the links open in each joint: Aᵀ·Δ = δ.
-`Reactions.shift` solves this for Δ, with the inputs held: how far play in a pin or the stretch of
+A column of A is the effect of one unknown on each link (`JointMatrix`). By virtual work, a row of
+Aᵀ gives the displacement δ in a joint that small displacements Δ of the links cause: Aᵀ·Δ = δ.
+`Reactions.shift` solves this for Δ with the inputs held: how far play in a pin or the stretch of
 a link moves the linkage, to first order.
 """
 
@@ -47,23 +47,11 @@ from linkage_ros.kinematics.topology import Joint
 import numpy as np
 from numpy.typing import NDArray
 
-# What a unit of each joint's force and of each drive's effort does to each link: a square matrix.
-#
-# Three rows for each link that moves: both components of force and the moment about its centre;
-# two columns for each joint: a pin's components of force, or a slider's force across its line and
-# its moment; one column for each drive. A force f at p is (f, (p − c) × f) to the link that it
-# acts on and the opposite to the other one. Moments are divided by the closure's scale, so that
-# all entries are of one size.
-#
-# The same matrix, transposed, says what small displacements of the links open in each joint, since
-# a joint's force does no work: its row is the displacement of the one link's point from the
-# other's.
-
 Array = NDArray[np.float64]
 
 
 class Side(NamedTuple):
-    """A link that takes part in a joint: its first row, its centre among the places, its sign."""
+    """A link of a joint: its first row, the index of its centre among the places, its sign."""
 
     row: int
     center: int
@@ -81,32 +69,41 @@ class Line(NamedTuple):
     unit: complex
 
     def direction(self, coordinates: Sequence[float]) -> complex:
-        """Return its direction in the frame of the ground, a unit vector."""
+        """Return the direction in the frame of the ground, a unit vector."""
         return facing(coordinates[self.coordinate]) * self.unit
 
 
 class JointMatrix:
     """
-    The matrix of a linkage.
+    The square matrix of what a unit of each joint's force and drive's effort does to each link.
+
+    Three rows for each link that moves: both components of force and the moment about its centre.
+    Two columns for each joint: the components of force of a pin, or the force of a slider across
+    its line and its moment. One column for each drive. A force f at p is (f, (p − c) × f) on one
+    link and the opposite on the other. Moments are divided by the closure's scale, so that all
+    entries are of one size.
+
+    The transposed matrix gives what small displacements of the links open in each joint, since a
+    joint's force does no work: a row is the displacement between the points of the two links.
 
     Parameters
     ----------
     closure
         The linkage.
     centers
-        For each link that moves the index, among the places given to `at`, of the point that its
-        moments are about.
+        For each link that moves the index, among the places given to `at`, of the reference point
+        of its moments.
     places
-        For each joint of the structure the index of its place: of a slider, that of its point.
+        For each joint of the structure the index of its place; of a slider, of its point.
 
     Attributes
     ----------
     size
-        Of the matrix.
+        Number of rows.
     rows
         For each link that moves its first row.
     sides
-        For each joint the links in it that move, ``joint.link`` with the sign +1 first.
+        For each joint its links that move, ``joint.link`` with the sign +1 first.
     lines
         For each slider, by the number of its joint, its line.
 
@@ -153,7 +150,7 @@ class JointMatrix:
         Parameters
         ----------
         coordinates
-            As the closure has found them.
+            Coordinates of the closure.
         places
             In the frame of the ground, in [m].
 
@@ -174,7 +171,7 @@ class JointMatrix:
     def _plan_pins(
         self, joints: Sequence[Joint], places: Sequence[int], where: list[int]
     ) -> list[tuple[int, int, float]]:
-        """Fill in what is constant of the pins; return, for the rest, places, centres, factors."""
+        """Fill in the constant entries of the pins; return places, centres and factors."""
         pins = []
         for number, (joint, sides) in enumerate(zip(joints, self.sides, strict=True)):
             column = 2 * number
@@ -190,7 +187,7 @@ class JointMatrix:
     def _plan_thrust(
         self, number: int, turn: complex, column: int, place: int, where: list[int]
     ) -> tuple[Line, complex, int, tuple[Side, ...]]:
-        """Plan a force on a slider: along its line, turned by a constant."""
+        """Plan a force on a slider: along its line, turned by a constant factor."""
         sides = self.sides[number]
         for row, _, _ in sides:
             where += (self._entry(row + i, column) for i in range(3))
@@ -212,8 +209,8 @@ class JointMatrix:
 
 
 def _filled(constant: Array, where: NDArray[np.intp], *values: float) -> Array:
-    """Return a matrix with values in certain places, counted along its rows."""
-    matrix = constant.copy()  # the diagnostics ask for forces from another thread than the ticks
+    """Return the matrix with values at the given entries, counted along its rows."""
+    matrix = constant.copy()  # ticks and diagnostics ask for forces from different threads
     matrix.reshape(-1)[where] = values
     return matrix
 
@@ -223,18 +220,18 @@ _SOLVED = (Status.CLOSED, Status.LIMITED)
 
 class Reaction(NamedTuple):
     """
-    What ``joint.to`` exerts on ``joint.link``; the opposite acts on ``joint.to``.
+    The force and moment of ``joint.to`` on ``joint.link``; the opposite acts on ``joint.to``.
 
-    The drive's own effort is no part of it: that acts beside the joint that it drives.
+    The effort of a drive is not part of it: that acts beside the joint that it drives.
 
     Attributes
     ----------
     fx, fy
-        Force in the frame of the ground, in [N]: at the pin; in a slider at its point, across the
-        line, and along it no more than friction.
+        Force in the frame of the ground, in [N]. In a pin: at the pin. In a slider: at its point,
+        across the line, with friction along it.
     moment
-        About that point, counter-clockwise, in [N·m]: in a pin no more than friction; in a slider
-        what keeps the block from turning.
+        Moment about that point, counter-clockwise, in [N·m]. In a pin: friction only. In a slider:
+        the moment that keeps the block from turning.
 
     """
 
@@ -245,7 +242,7 @@ class Reaction(NamedTuple):
 
 class Reactions:
     """
-    The joints of a linkage, as they carry forces.
+    The forces in the joints of a linkage.
 
     Parameters
     ----------
@@ -255,11 +252,11 @@ class Reactions:
     Attributes
     ----------
     joints
-        Those of ``closure.structure.joints``, in the same order.
+        ``closure.structure.joints``, in the same order.
     names
-        Of each joint: of its pin or slider; where a pin has several joints, ``pin/link`` with the
-        joint's ``link``; where a slider is named as a pin, ``slider/link`` with the link that it
-        is along.
+        Name of each joint: its pin or slider. If a pin has several joints, ``pin/link`` with the
+        joint's ``link``; if a slider has the name of a pin, ``slider/link`` with the link that it
+        slides along.
 
     """
 
@@ -274,7 +271,7 @@ class Reactions:
         moving = [link for link in structure.links if link != GROUND]
         points, weights = [], []
         for link in moving:
-            # A block that a pin in a slot stands for has no mass, and one point.
+            # The block of a pin in a slot has no mass, and one point.
             mass = linkage.masses.get(link)
             center = mass.center if mass else next(iter(structure.links[link].values()))
             weights.append((mass.mass, mass.inertia) if mass else (0.0, 0.0))
@@ -307,7 +304,7 @@ class Reactions:
             )
             for joint in linkage.joints.values()
         )
-        # The matrix counts moments by the scale, the closure counts lengths by it.
+        # The matrix divides moments by the scale; the closure divides lengths by it.
         self._drives = tuple(
             (1.0, closure.scale) if given.slider else (closure.scale, 1.0)
             for given in linkage.inputs
@@ -319,18 +316,18 @@ class Reactions:
         """
         Return the reaction in each joint, in the order of `names`.
 
-        There is none at a toggle and where the linkage does not close.
+        Return None at a toggle and where the linkage does not close.
 
         Parameters
         ----------
         position, velocity, acceleration
-            As the closure has found them.
+            Results of the closure.
 
         """
-        found = self._balance(position, velocity, acceleration)
-        if found is None:
+        balance = self._balance(position, velocity, acceleration)
+        if balance is None:
             return None
-        forces, resistances = found
+        forces, resistances = balance
         x, lines = position.state.coordinates, self._matrix.lines
         reactions: tuple[Reaction, ...] = ()
         for number in range(len(self.joints)):
@@ -348,14 +345,14 @@ class Reactions:
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> tuple[float, ...] | None:
         """
-        Return what each drive must give, from the forces: as `Mechanics.drive_efforts` otherwise.
+        Return the effort of each drive, from the forces; `Mechanics.drive_efforts` uses work.
 
-        There is none at a toggle and where the linkage does not close.
+        Return None at a toggle and where the linkage does not close.
         """
-        found = self._balance(position, velocity, acceleration)
-        if found is None:
+        balance = self._balance(position, velocity, acceleration)
+        if balance is None:
             return None
-        forces, _ = found
+        forces, _ = balance
         a, inertia = acceleration.state.coordinates, self._mechanics.loads.drive_inertia
         first = 2 * len(self.joints)
         drives = zip(forces[first:], a[1:], self._drives, strict=False)
@@ -365,30 +362,30 @@ class Reactions:
 
     def shift(self, position: Position, offsets: Sequence[complex]) -> tuple[float, ...] | None:
         """
-        Return how far joints that do not meet exactly move the published joints.
+        Return how far offsets in the joints move the published joints.
 
-        To first order in the offsets: the error falls with their square. There is no answer at a
+        This is first order in the offsets: the error falls with their square. Return None at a
         toggle and where the linkage does not close.
 
         Parameters
         ----------
         position
-            The linkage as it would be without offsets. Its inputs are held.
+            The linkage without offsets. Its inputs are held.
         offsets
-            For each joint, in the order of `names`, the place of its point on ``joint.link`` less
+            For each joint, in the order of `names`, the place of its point on ``joint.link`` minus
             that of its point on ``joint.to``, in the frame of the ground, in [m]. Of a slider only
-            what is across its line counts.
+            the component across its line counts.
 
-            Play: a link that is pushed with the force f leans away from what pushes it, so the
-            offset is −e·f/|f| with the radial play e and the force f of `Reaction`, whichever of
-            the two links has the hole. Stretch: where a pin of a link lies farther out by the
-            vector u than the linkage says, the offset is −u in a joint whose ``link`` it is and
-            +u in one whose ``to`` it is.
+            Play: a link that is pushed with the force f moves away from the link that pushes it,
+            so the offset is −e·f/|f| with the radial play e and the force f of `Reaction`,
+            whichever link has the hole. Stretch: if a pin of a link is displaced by the vector u
+            from its nominal place, the offset is −u in a joint whose ``link`` it is and +u in one
+            whose ``to`` it is.
 
         Returns
         -------
         shift
-            Of each published joint, in [rad] or [m].
+            Change of each published joint, in [rad] or [m].
 
         """
         if position.status not in _SOLVED:
@@ -429,14 +426,14 @@ class Reactions:
     def _balance(
         self, position: Position, velocity: Velocity, acceleration: Acceleration
     ) -> tuple[list[float], list[float]] | None:
-        """Return the solution of the system, and what each joint resists its motion with."""
+        """Return the solution of the system, and the friction in each joint."""
         if position.status not in _SOLVED:
             return None
         loads, scale = self._mechanics.loads, self._scale
         gravity = complex(*loads.gravity)
         places = self._follower.places(position)
         pulls = self._follower.accelerations(position, velocity, acceleration, places)
-        x, v, a = (found.state.coordinates for found in (position, velocity, acceleration))
+        x, v, a = (part.state.coordinates for part in (position, velocity, acceleration))
         sides: list[float] = []
         for mass, inertia, center, turn in self._bodies:
             pull = mass * (pulls[center] - gravity)
@@ -468,7 +465,7 @@ class Reactions:
         x: Sequence[float],
         places: list[complex],
     ) -> None:
-        """Bring friction in a joint to the right sides of its links."""
+        """Add the friction in a joint to the right sides of its links."""
         line = self._matrix.lines.get(number)
         for row, center, sign in self._matrix.sides[number]:
             if line is None:
@@ -478,23 +475,23 @@ class Reactions:
                 self._push(sides, row, lever, -sign * resisting * line.direction(x))
 
     def _push(self, sides: list[float], row: int, lever: complex, force: complex) -> None:
-        """Bring a known force on a link to its right sides."""
+        """Add a known force on a link to its right sides."""
         sides[row] -= force.real
         sides[row + 1] -= force.imag
         sides[row + 2] -= (lever.real * force.imag - lever.imag * force.real) / self._scale
 
 
 def _solved(matrix: Array, *sides: float) -> list[float] | None:
-    """Return the solution of a linear system, if it has one."""
+    """Return the solution of a linear system, or None if it is singular."""
     try:
-        found: list[float] = np.linalg.solve(matrix, sides).tolist()
+        solution: list[float] = np.linalg.solve(matrix, sides).tolist()
     except np.linalg.LinAlgError:
         return None
-    return found if all(map(isfinite, found)) else None
+    return solution if all(map(isfinite, solution)) else None
 
 
 def _turned_solved(matrix: Array, *sides: float) -> list[float] | None:
-    """Return the solution of the system that has the transposed matrix."""
+    """Return the solution of the system with the transposed matrix."""
     return _solved(matrix.T, *sides)
 
 

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Numbers in, numbers out: the loop closure of a planar linkage."""
+"""The loop closure of a planar linkage, and its analysis."""

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Functions that the steps of a solution are written in.
+The functions in which the steps of a solution are written.
 
-They take numbers. They also take the symbols of a `Tape`, which write down what is done to them:
-so a step that is written once also becomes a line of a compiled linkage.
+They take numbers, or symbols of a `Tape`, which records the operations on them: so a step that is
+written once also becomes code of a compiled linkage.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def cos(angle: float) -> float:
 
 
 def sqrt(square: float) -> float:
-    """Return the root of a number."""
+    """Return the square root of a number."""
     try:
         return math.sqrt(square)
     except TypeError:
@@ -62,7 +62,7 @@ def atan2(y: float, x: float) -> float:
 
 
 def copysign(size: float, sign: float) -> float:
-    """Return a number of the one's size and the other's sign."""
+    """Return a number with the size of the first and the sign of the second."""
     try:
         return math.copysign(size, sign)
     except TypeError:
@@ -70,7 +70,7 @@ def copysign(size: float, sign: float) -> float:
 
 
 def remainder(number: float, period: float) -> float:
-    """Return how far a number is from the nearest multiple of a period."""
+    """Return the distance of a number from the nearest multiple of a period, signed."""
     try:
         return math.remainder(number, period)
     except TypeError:
@@ -114,10 +114,10 @@ def all_finite(numbers: Sequence[float]) -> bool:
 
 def where(condition: bool, one: float, other: float) -> float:
     """
-    Return the one number where a condition holds, the other where not.
+    Return ``one`` if a condition holds, otherwise ``other``.
 
-    Both are worked out, and both must be numbers. It is for two forms of equal standing; a
-    condition that decides what becomes of a linkage is an ``if``.
+    Both are evaluated, and both must be numbers. Use it for two equivalent forms; write ``if`` for
+    a condition that decides about the linkage.
     """
     if hasattr(condition, 'apply'):
         return _real(condition, 'where', condition, one, other)
@@ -126,9 +126,9 @@ def where(condition: bool, one: float, other: float) -> float:
 
 def called(function: Callable[..., Any], *arguments: Any) -> Any:
     """
-    Return what a function returns that takes numbers alone: an iteration, or a library's.
+    Call a function that takes numbers only, such as an iteration or a library function.
 
-    Of symbols it is a call in the program, whose arguments and results are known only there.
+    With symbols, it becomes a call in the program, evaluated only when the program runs.
     """
     for argument in arguments:
         if hasattr(argument, 'apply'):
@@ -137,22 +137,19 @@ def called(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def is_found(result: Any) -> bool:
-    """Return whether a function that was `called` has found something, and not None."""
+    """Return whether the result of a function that was `called` is not None."""
     return bool(_real(result, 'found')) if hasattr(result, 'apply') else result is not None
 
 
 def _real(symbol: Any, name: str, *arguments: Any) -> float:
-    """Return what a symbol writes down; it stands for the number that it will be."""
-    found: float = symbol.apply(name, *(arguments or (symbol,)))
-    return found
+    """Return the symbol of an operation, typed as the number that it stands for."""
+    result: float = symbol.apply(name, *(arguments or (symbol,)))
+    return result
 
 
 def _complex(symbol: Any, name: str, *arguments: Any) -> complex:
-    found: complex = symbol.apply(name, *(arguments or (symbol,)))
-    return found
-
-
-# Vectors and lines of the plane.
+    result: complex = symbol.apply(name, *(arguments or (symbol,)))
+    return result
 
 
 def cross(one: complex, other: complex) -> float:
@@ -161,11 +158,11 @@ def cross(one: complex, other: complex) -> float:
 
 
 def resolved(vector: complex, unit: complex) -> tuple[float, float]:
-    """Return a vector's parts along a unit vector and to the left of it."""
+    """Return the components of a vector along a unit vector and to the left of it."""
     turned = vector * unit.conjugate()
     return turned.real, turned.imag
 
 
 def folded(angle: float) -> float:
-    """Return the acute angle between two lines, of an angle between them, in [rad]."""
+    """Return the acute angle between two lines, given any angle between them, in [rad]."""
     return abs(math_remainder(angle, pi))

@@ -13,12 +13,11 @@
 # limitations under the License.
 
 """
-The other assemblies of links that are iterated: what else closes at the inputs of the pose.
+Other assemblies of links that are iterated: further solutions at the inputs of the pose.
 
-How many there are is not known beforehand (of a platform on three arms six at most; K. H. Hunt, J.
-Mech. Transm. Autom. Des. 105, 1983). They are searched for from starts that are drawn: random
-angles, and the places that then miss the constraints least. What is found are assemblies; that
-there are no others is not said.
+Their number is not known beforehand (a platform on three arms has at most six; K. H. Hunt, J.
+Mech. Transm. Autom. Des. 105, 1983). The search starts from random angles, with the places that
+minimise the residuals of the constraints. Its results are assemblies; others may exist.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
 STARTS = 400
 _SEED = 1
 _SAME = 1e-6
-"""What angles [rad] and places [lengths] differ by at most and are one assembly."""
+"""Largest difference of angles [rad] and places [lengths] within one assembly."""
 
 
 class Assembly(NamedTuple):
@@ -48,10 +47,10 @@ class Assembly(NamedTuple):
     Attributes
     ----------
     points
-        Where the points lie that the pose names, in the frame of the ground, in [m].
+        Places of the points that the pose names, in the frame of the ground, in [m].
     turns
-        After how many whole turns of the input the pose's own branch comes to it; 0 where it does
-        not.
+        Number of whole turns of the input after which the branch of the pose reaches it; 0 if it
+        does not.
 
     """
 
@@ -61,14 +60,14 @@ class Assembly(NamedTuple):
 
 def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
     """
-    Return assemblies of an iterated group, at the inputs of the pose, other than that of the pose.
+    Return the assemblies of an iterated group at the inputs of the pose, except that of the pose.
 
     Parameters
     ----------
     closure
         A linkage with a pose.
     number
-        Of the group. What comes before it stays as it is.
+        Index of the group. The groups before it keep their places.
 
     """
     group = closure.structure.groups[number]
@@ -78,30 +77,30 @@ def other_assemblies(closure: Closure, number: int) -> list[Assembly]:
         for step, owner in zip(closure.steps, closure.step_groups, strict=True)
         if owner == number and isinstance(step, Iteration)
     )
-    found = _search(step)
-    if not found:
+    solutions = _search(step)
+    if not solutions:
         return []
-    own, *others = found
+    first, *others = solutions
     return [
         Assembly(_places(closure, group, unknowns), _turns(closure, group, step, unknowns))
         for unknowns in others
-        if not _same(unknowns, own)
+        if not _same(unknowns, first)
     ]
 
 
 def _search(step: Iteration) -> list[Array]:
-    """Return the solutions at the pose's inputs, the pose's own first."""
-    own = step.solution()
-    if own is None:
+    """Return the solutions at the pose's inputs, that of the pose first."""
+    first = step.solution()
+    if first is None:
         return []
-    found = [own]
+    solutions = [first]
     rng = np.random.default_rng(_SEED)
     for _ in range(STARTS):
-        angles = rng.uniform(-np.pi, np.pi, len(own) // 3)
+        angles = rng.uniform(-np.pi, np.pi, len(first) // 3)
         solution = step.solution_from(angles)
-        if solution is not None and not any(_same(solution, one) for one in found):
-            found.append(solution)
-    return found
+        if solution is not None and not any(_same(solution, one) for one in solutions):
+            solutions.append(solution)
+    return solutions
 
 
 def _same(one: Array, other: Array) -> bool:
@@ -111,23 +110,23 @@ def _same(one: Array, other: Array) -> bool:
 
 
 def _places(closure: Closure, group: Iterated, unknowns: Array) -> dict[str, complex]:
-    """Return where the points lie that the pose names on links of the group."""
+    """Return the places of the points of the group that the pose names."""
     pose = closure.linkage.pose
     assert pose is not None
-    found = {}
+    places = {}
     for name in pose.points:
         for body, link in enumerate(group.links):
             points = closure.structure.links[link]
             if name in points:
                 angle, x, y = unknowns.reshape(-1, 3)[body].tolist()
                 arm = complex(*points[name]) - complex(*next(iter(points.values())))
-                found[name] = complex(x, y) * closure.scale + arm * rect(1.0, angle)
+                places[name] = complex(x, y) * closure.scale + arm * rect(1.0, angle)
                 break
-    return found
+    return places
 
 
 def _turns(closure: Closure, group: Iterated, step: Iteration, unknowns: Array) -> int:
-    """Return after how many turns the branch of the pose comes to a solution, 0 for never."""
+    """Return the number of turns after which the pose's branch reaches a solution; 0 if never."""
     if len(step.inputs) > 1 or closure.linkage.inputs[0].slider:
         return 0
     branch = step.branch()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Many states of a linkage: what they are in arrays."""
+"""Many states of a linkage, as arrays."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ Mask: TypeAlias = NDArray[np.bool_]
 
 CODES: Final = {status: code for code, status in enumerate(Status)}
 """
-How an array says a status: closed is 0, and the greater the worse.
+The code of each status in an array: closed is 0, and a greater code is worse.
 
-Below the toggle there are rates, up to it a pose.
+Codes below that of the toggle have rates; codes up to it have a pose.
 """
 
 
@@ -42,13 +42,13 @@ class Batch(NamedTuple):
     Attributes
     ----------
     status
-        The status of each, as `CODES` has it: 0 is closed.
+        Code of each state, by `CODES`: 0 is closed.
     positions
-        Of the published joints, a row for each, in [rad] or [m]; NaN in a state that is open or
+        A row for each published joint, in [rad] or [m]; NaN in a state that is open or
         indeterminate.
     velocities, accelerations
-        Likewise, in [rad/s] or [m/s], [rad/s²] or [m/s²]; NaN at a toggle, too. None where they
-        were not asked for.
+        Likewise, in [rad/s] or [m/s], [rad/s²] or [m/s²]; NaN at a toggle too. None if they were
+        not requested.
 
     """
 

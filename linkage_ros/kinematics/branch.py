@@ -13,23 +13,25 @@
 # limitations under the License.
 
 """
-The curve of solutions of links that are iterated, followed from cell to cell without a leap.
+The solution curve of links that Newton's method solves, followed without jumping to another one.
 
-With n unknowns u and one input x, the n constraints F(u, x) = 0 leave a curve in z = (u, x). It is
-followed by its length, so that a toggle, where the curve turns back in x, is a place like others.
-A cell goes from one solution to the next, s being the way along the first one's tangent; between
-them stands the cubic c(s) that has their places and tangents. A cell is taken only if it holds
-one piece of curve. For B the Jacobian of F and of the way along at c(h/2), and δB a bound, entry
-by entry, of how much it changes within the box about the cubic::
+The n constraints F(u, x) = 0 on n unknowns u and one input x define a curve of points z = (u, x).
+The curve is followed by its length, so a toggle, where it turns back in x, is no special point.
+A cell leads from one solution to the next; s is the distance along the tangent at its first node,
+and the cubic c(s) has the places and tangents of both nodes. A cell is accepted only if it is
+proven to hold one piece of curve. Let h be the width of the cell, B the Jacobian at c(h/2) of F
+and of the distance s, and δB a bound, entry by entry, of the change of B within the box around
+the cubic::
 
     |B⁻¹|·δB contracts: some w > 0 has |B⁻¹|·δB·w ≤ q·w, with q ≤ 0.6
-    |B⁻¹·(F(c(h/2)), 0)| is small against the box
+    |B⁻¹·(F(c(h/2)), 0)| is small compared with the box
 
-Then B is regular all over the box, and for each s there is at most one solution in it (Krawczyk's
+Then B is regular in the whole box, and for each s the box holds at most one solution (Krawczyk's
 test: A. Neumaier, Interval Methods for Systems of Equations, Cambridge 1990, theorem 5.1.8).
-Another assembly cannot be in the box, however near it comes. The bound by the unknowns is one of
-the sines and cosines themselves; what known links do within a cell is taken from its ends and its
-middle, and the residual from the middle, where that of a cubic through both ends is largest.
+Another assembly cannot be in the box, however near it comes. The bound over the unknowns comes
+from the sines and cosines themselves. The change of the known links within a cell is estimated
+from its ends and its middle, and the residual from the middle, where the residual of a cubic
+through both ends is largest.
 """
 
 from __future__ import annotations
@@ -45,33 +47,33 @@ from linkage_ros.kinematics.step import State
 import numpy as np
 
 _CONTRACTS = 0.6
-"""Largest q; the step is set for two thirds of it."""
+"""Largest accepted q; the step size aims at two thirds of it."""
 
 _LONGEST = 0.25
 _SHORTEST = 2.0**-36
-"""Of a step, in [rad] or lengths; the longest grows with how far away the links are."""
+"""Bounds of a step, in [rad] or lengths; the longest grows with the distance of the links."""
 
 _MOST_CELLS = 2**13
-"""Of a call: some 27 are usual for a turn, and 300 for links that go far away on lines."""
+"""Cells of one call: about 27 are usual for a turn, 300 for links that go far away on lines."""
 
 _AWAY = 2.0**20
-"""In lengths: what is so far away, on lines that get parallel, does not come back."""
+"""In lengths: links that are so far away, on lines that become parallel, do not come back."""
 
 _STRAIGHT = 0.25
-"""What the slope of x may depart by from a straight line within a cell, of its change."""
+"""Largest departure of the slope of x from a straight line in a cell, relative to its change."""
 
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
-"""Of the size of the coordinates: what a constraint may be off by at a solution."""
+"""Largest residual of a constraint at a solution, relative to the size of the coordinates."""
 
 KnownAt = Callable[[float], State | None]
-"""What is known of the links before, at an input; nothing where they do not close."""
+"""State of the links solved before, at an input; None where they do not close."""
 
 RatesAt = Callable[[float], tuple[State, State] | None]
-"""What is known, and its derivatives by the input; nothing where there are none."""
+"""State of the links solved before and its derivatives by the input; None if there are none."""
 
 
 class Node(NamedTuple):
-    """A place of the curve: the unknowns and the input behind them, and the unit tangent."""
+    """A point of the curve: the unknowns followed by the input, and the unit tangent there."""
 
     place: Array
     tangent: Array
@@ -86,9 +88,9 @@ class Cell(NamedTuple):
     begin, end
         The nodes.
     width
-        How far the end lies along the tangent of the begin.
+        Distance of the end along the tangent at the begin.
     folds
-        Whether the end is where the curve turns back in x.
+        Whether the curve turns back in x at the end.
 
     """
 
@@ -104,13 +106,13 @@ class Cell(NamedTuple):
         return np.array([z, z + t * (h / 3.0), z_end - ahead, z_end])
 
     def at(self, part: float) -> Array:
-        """Return the cubic at a part of the width, from 0 to 1."""
+        """Return the point of the cubic at a fraction of the width, from 0 to 1."""
         p, r = part, 1.0 - part
         weights = np.array([r * r * r, 3.0 * r * r * p, 3.0 * r * p * p, p * p * p])
         return weights @ self.control()
 
     def part_of(self, x: float) -> float:
-        """Return where the cubic has an input, as a part of the width."""
+        """Return the fraction of the width at which the cubic has an input."""
         a, b, c, d = (float(value) - x for value in self.control()[:, -1])
         low, high = 0.0, 1.0
         rising = d > a
@@ -136,14 +138,14 @@ class Cell(NamedTuple):
 
 class Continuation:
     """
-    Follows the solutions of constraints as one input goes.
+    Follows the solutions of constraints while one input changes.
 
     Parameters
     ----------
     constraints
         As many equations as there are unknowns.
     known_at, rates_at
-        What is known before.
+        Functions that give the state of the links solved before.
 
     """
 
@@ -157,7 +159,7 @@ class Continuation:
         self._rates_at = rates_at
 
     def first(self, unknowns: Array, x: float) -> Node | None:
-        """Return the node at a solution, its tangent towards larger inputs."""
+        """Return the node at a solution, with its tangent towards larger inputs."""
         system = self._system(np.append(unknowns, x))
         if system is None:
             return None
@@ -181,18 +183,18 @@ class Continuation:
 
     def cells(self, node: Node, sign: float, last: float) -> Iterator[Cell]:
         """
-        Yield cell after cell, up to a toggle, or to an input that is not passed.
+        Yield cell after cell, up to a toggle or to an input that must not be passed.
 
-        They end, too, where no cell can be shown to hold one curve alone, as where two cross.
+        They also end where no cell is proven to hold a single curve, as where two curves cross.
 
         Parameters
         ----------
         node
-            Where to begin.
+            The first node.
         sign
             +1 towards larger inputs, −1 towards smaller ones.
         last
-            The input where to end.
+            The input at which to end.
 
         """
         if node.tangent[-1] * sign < 0.0:
@@ -226,9 +228,9 @@ class Continuation:
 
     def _cell(self, node: Node, step: float, last: float | None) -> tuple[Cell | None, float]:
         """
-        Return the next cell, or nothing, and by how much its step should be changed.
+        Return the next cell or None, and the factor by which to change the step.
 
-        With ``last`` it ends at that input.
+        If ``last`` is given, the cell ends at that input.
         """
         z, tangent = node
         if last is None:
@@ -255,22 +257,22 @@ class Continuation:
         return cell, min(2.0, 0.67 * _CONTRACTS / max(contraction, 1e-3))
 
     def _straight(self, cell: Cell) -> bool:
-        """Return whether x goes one way within a cell, or turns back once, and not twice."""
+        """Return whether x changes in one direction within a cell, or turns back only once."""
         a, b, c, d = cell.control()[:, -1].tolist()
         begin, middle, end = b - a, c - b, d - c
         most = max(min(abs(begin), abs(end)), abs(begin - end))
         return bool(abs(middle - 0.5 * (begin + end)) <= _STRAIGHT * most)
 
     def _contraction(self, cell: Cell) -> float:
-        """Return q of a cell; infinite where the middle is no good approximation."""
+        """Return q of a cell; infinite where its middle is a poor approximation."""
         control = cell.control()
         middle = 0.125 * (control[0] + control[3]) + 0.375 * (control[1] + control[2])
         moved = np.abs(control - middle).max(axis=0)
         at = float(middle[-1])
-        found = self._rates_at(at)
-        if found is None:
+        known_rates = self._rates_at(at)
+        if known_rates is None:
             return inf
-        known, speeds = found
+        known, speeds = known_rates
         n = len(middle) - 1
         errors, slopes = self._slopes(middle, known, speeds)
         matrix = np.vstack([slopes, cell.begin.tangent])
@@ -308,7 +310,7 @@ class Continuation:
         )
 
     def _folded(self, cell: Cell) -> Cell:
-        """Return what of a cell lies before the place where x turns back."""
+        """Return the part of a cell before the point where x turns back."""
         z, tangent = cell.begin
         low, high = (0.0, float(tangent[-1])), (cell.width, float(cell.end.tangent[-1]))
         end, width = cell.end, cell.width
@@ -325,7 +327,7 @@ class Continuation:
             end, slope = node, float(node.tangent[-1])
             if abs(slope) < 1e-14 or high[0] - low[0] < 1e-15:
                 break
-            # Illinois: the end that stays counts half, so that both close in.
+            # Illinois method: the end that stays counts half, so that both ends close in.
             if slope * low[1] > 0.0:
                 low, high = (width, slope), (high[0], 0.5 * high[1])
             else:
@@ -345,7 +347,7 @@ class Continuation:
         return Node(place, tangent / sqrt(float(tangent @ tangent)))
 
     def _corrected(self, start: Array, row: Array, goal: float) -> Array | None:
-        """Return the solution at which a combination of the coordinates has a value."""
+        """Return the solution at which a linear combination of the coordinates has a value."""
         place, last = start, inf
         size = 1.0 + float(np.abs(start).max())
         for _ in range(12):
@@ -368,9 +370,9 @@ class Continuation:
         return None
 
     def _system(self, place: Array) -> tuple[Array, Array] | None:
-        """Return the constraints' errors, and their derivatives by the unknowns and the input."""
-        found = self._rates_at(float(place[-1]))
-        return None if found is None else self._slopes(place, *found)
+        """Return the residuals, and their derivatives by the unknowns and the input."""
+        known_rates = self._rates_at(float(place[-1]))
+        return None if known_rates is None else self._slopes(place, *known_rates)
 
     def _jacobian(self, unknowns: Array, known: State) -> Array:
         _, jacobian = equations(self._constraints, unknowns.tolist(), known)
@@ -392,7 +394,7 @@ def _apart(one: State, other: State) -> tuple[list[float], list[float]]:
 
 
 def _radius(matrix: Array) -> float:
-    """Return a bound of the spectral radius of a matrix without negative entries."""
+    """Return an upper bound of the spectral radius of a non-negative matrix."""
     weights = np.ones(len(matrix))
     bound = inf
     for _ in range(12):
@@ -403,42 +405,40 @@ def _radius(matrix: Array) -> float:
     return bound
 
 
-# The branch of a single input that a pose names: all solutions that lead from it without a toggle.
-#
-# It is a function of the unwrapped input. Where the curve of solutions turns back, the branch
-# ends, and with it the range of the input. Where, after some whole turns of the input, all links
-# are where they were, it begins again, and goes on for ever. There are finitely many poses to a
-# crank direction, and a turn leads from one to another, so that a branch without an end comes
-# back; how many turns are followed is bounded all the same. A branch that is shorter than a turn
-# has one pose to a crank direction: whole turns of the input change nothing there, as they do not
-# with dyads.
+# The branch of one input is a function of the unwrapped input. It ends where the curve of
+# solutions turns back, and the range of the input ends there too. If, after some whole turns of
+# the input, all links are where they were, the branch starts again and continues for ever. A
+# crank direction has finitely many poses and a turn leads from one to another, so a branch
+# without an end comes back; the number of turns followed is bounded all the same. A branch that
+# is shorter than a turn has one pose for each crank direction: as with dyads, whole turns of the
+# input change nothing there.
 
 _MOST_TURNS = 64
 _MOST_LAPS = 32
-"""Of a slide: each is twice as long as the one before."""
+"""Laps of a slide: each is twice as long as the one before."""
 
 _SAME = 1e-9
-"""What known places and angles may differ by and be the same."""
+"""Largest difference of known places and angles that count as equal."""
 
 _LAST_FLOATS = 32.0 * UNIT_ROUNDOFF
-"""Of the input, or of 1: how near its end a toggle cannot be told from its neighbours."""
+"""Relative to the input, or to 1: how near its end a toggle and its neighbours look alike."""
 
 _NEXT_TO_END = 2.0**-10
-"""In [rad] or lengths: how far links may go where those before them are next to a toggle."""
+"""In [rad] or lengths: how far links may move while the links before are next to a toggle."""
 
 
 class Interval(NamedTuple):
     """
-    Where a branch goes, in the coordinate of its input.
+    The range of a branch, in the coordinate of its input.
 
     Attributes
     ----------
     low, high
-        Its ends; of one that comes back, from the pose to where it begins again.
+        Its ends; of a branch that comes back, the pose and the input where it starts again.
     limited
-        Of each end whether the linkage ends there; else it was not followed farther.
+        For each end whether the linkage ends there; otherwise it was not followed farther.
     turns
-        After how many whole turns of the input it begins again; 0 where it does not.
+        Number of whole turns of the input after which it starts again; 0 if it does not.
 
     """
 
@@ -449,24 +449,24 @@ class Interval(NamedTuple):
 
     @property
     def period(self) -> int:
-        """How many whole turns of the input change nothing; 0 where each turn is another."""
+        """Return how many whole turns of the input change nothing; 0 if each turn differs."""
         return self.turns or int(self.high - self.low < tau)
 
 
 class Start(NamedTuple):
     """
-    Where an iteration starts.
+    The start of Newton's method.
 
     Attributes
     ----------
     unknowns
-        Next to the solution; at an end of the branch, the solution.
+        Near the solution; at an end of the branch, the solution.
     farthest
-        How far from them the solution may be.
+        Largest distance of the solution from them.
     turned
-        What the unknowns' angles gained by the turns before, in [rad].
+        Change of the unknowns' angles by the turns before, in [rad].
     ends
-        Whether it is at the end of the branch, within the last few floats: a toggle.
+        Whether this is the end of the branch, within the last few floats: a toggle.
 
     """
 
@@ -478,10 +478,10 @@ class Start(NamedTuple):
 
 class _Side:
     """
-    One side of the pose, followed as far as it was asked for.
+    One side of the pose, followed as far as was needed.
 
-    ``inputs`` are those where the ``cells`` end, times the sign, and ``end`` is that where the
-    branch ends, once that is found.
+    ``inputs`` are the inputs at the ends of the ``cells``, times the sign; ``end`` is the input at
+    which the branch ends, or None until it is known.
     """
 
     __slots__ = ('cells', 'end', 'inputs', 'laps', 'node', 'sign')
@@ -497,20 +497,20 @@ class _Side:
 
 class Branch:
     """
-    A branch.
+    All solutions that lead from a pose without a toggle, for one input.
 
     Parameters
     ----------
     continuation
-        Follows it.
+        Follows the branch.
     unknowns, x
         The solution at the pose, and the input there.
     known_at
-        Returns what is known before at an input, nothing where that does not close.
+        Returns the state of the links solved before at an input, None where they do not close.
     turning
-        Whether the input turns.
+        Whether the input is an angle.
     far
-        How far a slide is followed at least.
+        Least distance over which a slide is followed.
 
     """
 
@@ -539,7 +539,7 @@ class Branch:
         self.interval = self._followed(node, x)
 
     def start(self, x: float) -> Start | None:
-        """Return where the iteration starts at an input; nothing where the branch is not."""
+        """Return the start of Newton's method at an input; None outside the branch."""
         turned = 0.0
         low, high, _, turns = self.interval
         if not self._sides:
@@ -558,7 +558,7 @@ class Branch:
         gained = turned * self._gained
         number = bisect_left(side.inputs, side.sign * x)
         if number == len(side.cells):
-            # Next to a toggle of the links before, where cells get too small to go on.
+            # Next to a toggle of the links before, the cells become too small to continue.
             return Start(side.node.place[:-1], _NEXT_TO_END, gained, False)
         cell = side.cells[number]
         if cell.folds and abs(x - cell.end.place[-1]) <= _LAST_FLOATS * max(1.0, abs(x)):
@@ -567,11 +567,11 @@ class Branch:
         return Start(cell.at(cell.part_of(x))[:-1], 0.2 * size, gained, False)
 
     def nearest_end(self, x: float) -> Array | None:
-        """Return the unknowns at the end of the branch behind which an input lies."""
+        """Return the unknowns at the end of the branch that an input lies behind."""
         return self._sides[int(x >= self._x)].node.place[:-1] if self._sides else None
 
     def _followed(self, node: Node | None, x: float) -> Interval:
-        """Follow the branch to its ends, or to where it comes back."""
+        """Follow the branch to its ends, or until it comes back."""
         if node is None:
             return Interval(x, x, (True, True), 0)
         back, ahead = self._sides
@@ -594,7 +594,7 @@ class Branch:
         return side.inputs[-1] if side.inputs else side.sign * self._x
 
     def _lap(self, side: _Side) -> bool:
-        """Follow a side a turn farther, or to twice as far; return whether it goes on there."""
+        """Follow a side for another turn, or twice as far; return whether it continues."""
         if side.end is not None or side.laps >= (_MOST_TURNS if self._turning else _MOST_LAPS):
             return False
         side.laps += 1
@@ -612,12 +612,12 @@ class Branch:
         elif side.sign * (last - at) > 0.0:
             side.end = self._last_known(at, side.sign)
             if side.end == at and side.cells:
-                # Where branches cross the group is singular, too: which one goes on is not told.
+                # Where branches cross the group is singular too: no way to choose between them.
                 side.cells[-1] = side.cells[-1]._replace(folds=True)
         return side.end is None
 
     def _last_known(self, x: float, sign: float) -> float:
-        """Return the last float at which the links before close, next to where cells end."""
+        """Return the last float at which the links before close, next to the end of the cells."""
         inside, step = x, 2.0**-50
         while step < 2.0**-20 and self._known_at(inside + sign * step) is not None:
             inside, step = inside + sign * step, 2.0 * step
@@ -633,11 +633,11 @@ class Branch:
         return inside
 
     def _comes_back(self, first: Node, side: _Side) -> bool:
-        """Return whether all is where it began, and note after how many turns, and what gained."""
+        """Return whether a side has come back; if so, set the turns and the angles gained."""
         begun, now = self._known_at(self._x), self._known_at(float(side.node.place[-1]))
         if begun is None or now is None:
             return False
-        # A slide that differs by a whole number of turns would be one in 10⁹.
+        # That a slide differs by a whole number of turns by chance is one in 10⁹.
         (x, pins), (x_now, pins_now) = begun, now
         angles = (remainder(a - b, tau) for a, b in zip(x, x_now, strict=True))
         if max(map(abs, angles)) > _SAME * (1.0 + abs(self._x)):

@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""What no linkage can be made of, refused before anything is looked for."""
+"""Checks of a linkage before it is solved: each refuses a definition that cannot work."""
 
 from __future__ import annotations
 
@@ -33,12 +32,12 @@ from linkage_ros.kinematics.linkage import (
 
 def check(linkage: Linkage) -> None:
     """
-    Refuse a linkage whose parts do not fit each other.
+    Refuse a linkage whose parts do not match.
 
     Raises
     ------
     DefinitionError
-        With the key of the part, and the remedy.
+        With the key of the part and the remedy.
 
     """
     if GROUND not in linkage.links:
@@ -79,7 +78,7 @@ def check(linkage: Linkage) -> None:
 
 
 def _check_points(linkage: Linkage) -> None:
-    # A slider joins its links as a pin does, at no point of its own.
+    # A slider joins links without a shared point, so such a link may have a single point.
     sliding = {name for s in linkage.sliders.values() for name in (s.block, s.along)}
     for name, points in linkage.links.items():
         if len(points) < 2 and not (points and name in sliding):
@@ -188,7 +187,7 @@ def _check_all_limits(linkage: Linkage) -> None:
 
 
 def _check_limits(key: str, limits: Limits, name: str) -> None:
-    """Refuse limits between which nothing is."""
+    """Refuse limits that allow no motion."""
     low, high = limits.low, limits.high
     if isnan(low) or isnan(high) or low == inf or high == -inf:
         raise DefinitionError(
@@ -197,10 +196,10 @@ def _check_limits(key: str, limits: Limits, name: str) -> None:
             'write [low, high]; -.inf or .inf for none on a side',
         )
     if low >= high:
-        said = 'are the same number' if low == high else 'cross'
+        fault = 'are the same number' if low == high else 'cross'
         raise DefinitionError(
             f'{key}.limits',
-            f'{limits} of {quoted(name)} {said}',
+            f'{limits} of {quoted(name)} {fault}',
             'write [low, high], the lower one first',
         )
     for what in ('velocity', 'effort'):

@@ -12,7 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The diagonal between two links that are pinned together: crank pin to ground pivot."""
+"""
+The diagonal of a dyad: the vector from its first outer pin A to its second outer pin D.
+
+If A and D lie on two links that are pinned together, at O, they are like the crank pin and the
+ground pivot of a four-bar: `CrankDiagonal`. Its half-angle form loses nothing where OA lies along
+OD (a change point), where the coordinates of A and D cancel. All other diagonals are computed from
+the coordinates: `FreeDiagonal`.
+"""
 
 from __future__ import annotations
 
@@ -26,13 +33,6 @@ from linkage_ros.kinematics.rounding import passes_zero, reach, Root, root_of, S
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 
-# The diagonal of a dyad: from its first outer pin A to its second outer pin D.
-#
-# Two pins that lie on links which are themselves pinned together, at O, are as crank pin and
-# ground pivot of a four-bar: `CrankDiagonal`. Its half-angle form loses nothing where OA lies
-# along OD (a change point), where the coordinates of A and D cancel. For all others there are the
-# coordinates: `FreeDiagonal`.
-
 
 class Diagonal(NamedTuple):
     """
@@ -41,20 +41,20 @@ class Diagonal(NamedTuple):
     Attributes
     ----------
     square
-        s² = |AD|²; 0 where no direction can be told.
+        s² = |AD|²; 0 where the direction is undefined.
     direction
-        Of AD, in [rad].
+        Direction of AD, in [rad].
     fold, stretch
-        √(s² − lower²) and √(upper² − s²): how far the dyad is from its limits. Signed at a change
-        point; the latter is 1 where the dyad has no upper limit.
+        √(s² − lower²) and √(upper² − s²): the distance of the dyad from its limits. Signed at a
+        change point; stretch is 1 if the dyad has no upper limit.
     gap
-        What A and D are too near or too far by; 0 where the dyad closes.
+        Length by which A and D are too near or too far; 0 where the dyad closes.
     near, far
         2·√(ad)·sin(φ/2) and 2·√(ad)·cos(φ/2) of a `CrankDiagonal`, else 0.
     excess
-        What s² has beyond the diagonal's ``least``, its constant part.
+        s² minus its constant part, ``least``.
     status
-        Of the dyad, as far as the diagonal decides it.
+        Status of the dyad, as far as the diagonal decides it.
 
     """
 
@@ -71,11 +71,11 @@ class Diagonal(NamedTuple):
 
 class DiagonalRate(NamedTuple):
     """
-    The rates of a diagonal: ṡ/s = swing·growth, and its direction's rate is base + swing·turn.
+    The rates of a diagonal: ṡ/s = swing·growth; the rate of its direction is base + swing·turn.
 
-    Growth and turn may be huge where A is next to D. What they are multiplied by in a dyad is as
-    small then: that product comes first. ``lean`` is the growth by fold and stretch: at a change
-    point all three are 0, and it is not.
+    Growth and turn may be huge where A is next to D. A dyad multiplies them by factors that are
+    as small there, and forms that product first. ``lean`` is growth/(fold·stretch): at a change
+    point growth, fold and stretch are 0, but lean is not.
     """
 
     growth: float
@@ -87,14 +87,14 @@ class DiagonalRate(NamedTuple):
 
 class DiagonalAcceleration(NamedTuple):
     """
-    The derivative of a `DiagonalRate`, ṡ²/s² added to that of ṡ/s.
+    The derivative of a `DiagonalRate`, with ṡ²/s² added to that of ṡ/s.
 
-    That is s̈/s = change·growth + swing²·pull, which is no difference of large numbers where A is
-    next to D; and the direction's is base + change·turn + swing²·swirl.
+    s̈/s = change·growth + swing²·pull, which is no difference of large numbers where A is next to
+    D; the second derivative of the direction is base + change·turn + swing²·swirl.
 
-    The bend is what the pull leaves of a dyad's own second derivative (each dyad says what), by
-    fold and stretch: near a change point a difference of large numbers, so a `CrankDiagonal` tells
-    it in the place of the pull, where all others leave it to the dyad.
+    ``bend`` is the pull minus a term of the dyad (e in its derivation is ġ + g² minus that term),
+    divided by fold·stretch. Near a change point it would be a difference of large numbers, so a
+    `CrankDiagonal` gives it in closed form; for all others it is None and the dyad computes it.
     """
 
     pull: float
@@ -106,12 +106,12 @@ class DiagonalAcceleration(NamedTuple):
 
 class AnyDiagonal(Protocol):
     """
-    What a dyad asks of a diagonal.
+    The interface of a diagonal to a dyad.
 
     Attributes
     ----------
     least
-        A constant that s² is never below.
+        A constant lower bound of s².
 
     """
 
@@ -121,7 +121,7 @@ class AnyDiagonal(Protocol):
         """Return the diagonal."""
 
     def rates(self, diagonal: Diagonal, known: State, speeds: State, /) -> DiagonalRate:
-        """Return how the diagonal grows and turns."""
+        """Return the rates of the diagonal's length and direction."""
 
     def accelerations(
         self,
@@ -148,11 +148,12 @@ class CrankDiagonal:
         s² − lower² = ((d − a)² − lower²) + near²
         upper² − s² = (upper² − (a + d)²) + far² = (upper² − (d − a)²) − near²
 
-    Where a and d are long beside upper, so that no stretch can be near s = a + d, the last line is
-    taken: the one before it would cancel a + d. The brackets are constants of the linkage, and so
-    is the sum of both, span = upper² − lower². It gives the greater one from the smaller: where
-    they are alike, what rounds the one then makes the other as much smaller, and their product,
-    which has its extreme there, loses nothing. Each from its own bracket, it lost 147 u·κ.
+    If a + d > 2·upper, s cannot come near a + d, and the second form of the last line is used: the
+    first would cancel a + d. The brackets are constants of the linkage, and so is the sum of both
+    differences, span = upper² − lower². It gives the greater difference from the smaller: where
+    they are alike, a rounding error of one makes the other as much smaller, and their product,
+    which has its extreme there, loses nothing. Computed each from its own bracket, it lost
+    147 u·κ.
 
     Parameters
     ----------
@@ -162,11 +163,12 @@ class CrankDiagonal:
         The margins |d − a| − lower and upper − a − d, correctly rounded; stretch is infinite where
         the dyad has no upper limit.
     limits
-        lower and upper, and the span, which their difference would cancel; infinite likewise.
+        lower and upper, and the span, which their difference would cancel; upper and span may be
+        infinite.
     arms
         Indices, among the coordinates, of the directions of OA and OD.
     offset
-        φ less the difference of those two coordinates, in (−π, π] rad.
+        φ minus the difference of those two coordinates, in (−π, π] rad.
 
     Attributes
     ----------
@@ -215,14 +217,14 @@ class CrankDiagonal:
         half = 0.5 * (known.coordinates[first] - base)
         half_sine, half_cosine = sin(half), cos(half)
         if self.offset:
-            # Not added to an angle that may have turned a thousand times.
+            # The offset is not added to the angle, which may have turned a thousand times.
             sine, cosine = self._half_turn
             half_sine, half_cosine = (
                 half_sine * cosine + half_cosine * sine,
                 half_cosine * cosine - half_sine * sine,
             )
         near, far = self.root * half_sine, self.root * half_cosine
-        # Not of the roots, which are rounded once more.
+        # From the half angles, since the roots are rounded once more.
         excess, rest = self.quad * half_sine * half_sine, self.quad * half_cosine * half_cosine
         square = self._apart_square + excess
         lower, upper, span = self.limits
@@ -251,7 +253,7 @@ class CrankDiagonal:
             status = Status.TOGGLE
         else:
             if upper != inf:
-                # Of the two the greater is made of the smaller, where it is not signed.
+                # The greater one is computed from the smaller, unless it is signed.
                 folding = fold_bracket + excess
                 stretching = self._whole - excess if self.short_pair else stretch_bracket + rest
                 folds = folding < stretching
@@ -267,15 +269,15 @@ class CrankDiagonal:
 
     def rates(self, diagonal: Diagonal, _known: State, speeds: State) -> DiagonalRate:
         """
-        Return φ̇·q and −φ̇·p, beside what OD turns by.
+        Return the growth q and the turn −p for φ̇, and the rate of OD as base.
 
         With n̂ the diagonal's direction turned left::
 
             p = OA·AD/s² = −d(direction)/dφ = (a·(d − a) − near²/2)/s²
             q = OA·n̂/s   = (ds/dφ)/s        = near·far/(2s²)
 
-        The lean is q by the roots fold and stretch, of which at a change point one is near or far
-        itself.
+        lean is q/(fold·stretch); at a change point fold equals near, or stretch equals far, and
+        their ratio is 1.
         """
         first, second = self.arms
         square, near, far = diagonal.square, diagonal.near, diagonal.far
@@ -287,7 +289,7 @@ class CrankDiagonal:
         return DiagonalRate(q, -p, speeds.coordinates[first] - base, base, lean)
 
     def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
-        """Return near by fold and far by stretch; where one is the other the ratio is 1."""
+        """Return near/fold and far/stretch; the ratio is 1 where its bracket is 0."""
         fold_bracket, stretch_bracket = self.brackets
         return (
             diagonal.near / diagonal.fold if fold_bracket else 1.0,
@@ -305,14 +307,15 @@ class CrankDiagonal:
         """
         Return the derivative of `rates`.
 
-        By φ, p' = −q·(1 + 2p) with 1 + 2p = (d² − a²)/s², and q' = p + p² − q². The bend is::
+        The derivatives by φ are p' = −q·(1 + 2p) with 1 + 2p = (d² − a²)/s², and q' = p + p² − q².
+        The bend is::
 
             ((d − a)² − lower²)·far²/(s² − lower²)/(4s²)
               − (upper² − (a + d)²)·near²/(upper² − s²)/(4s²)
 
-        by fold and stretch, which is q' + q² − q²·cot(σβ)·cot(σγ') of an RRR dyad, and
-        q' + q²·(1 − c²) of an RPR one, with what cancels there taken out: at a change point one of
-        the brackets is 0, and near by fold, or far by stretch, is 1.
+        divided by fold·stretch. It equals q' + q² − q²·cot(σβ)·cot(σγ') of an RRR dyad, and
+        q' + q²·(1 − c²) of an RPR dyad, without the cancellation: at a change point one of the
+        brackets is 0, and near/fold or far/stretch is 1.
         """
         first, second = self.arms
         a, d = self.sides
@@ -323,7 +326,7 @@ class CrankDiagonal:
         return DiagonalAcceleration(pull, swirl, change, base, self.bend(diagonal))
 
     def bend(self, diagonal: Diagonal) -> float:
-        """Return the bend that `accelerations` tells of."""
+        """Return the bend, as `accelerations` defines it."""
         near, far, fold, stretch = diagonal.near, diagonal.far, diagonal.fold, diagonal.stretch
         fold_bracket, stretch_bracket = self.brackets
         fold_ratio, stretch_ratio = self.ratios(diagonal)
@@ -338,14 +341,14 @@ class CrankDiagonal:
 
     @property
     def singular_angles(self) -> tuple[float, ...]:
-        """Differences of the two coordinates at which all links lie in one line, in [rad]."""
+        """Differences of the two coordinates at which all links are collinear, in [rad]."""
         margins = ((self.fold_margin, 0.0), (self.stretch_margin, pi))
         return tuple(phi - self.offset for margin, phi in margins if margin == 0.0)
 
 
 def mean_root(a: float, d: float) -> float:
     """Return 2·√(ad), correctly rounded."""
-    # Two roots, since a·d may underflow where the lengths differ by many decades.
+    # Two roots, since a·d may underflow if the lengths differ by many decades.
     root = 2.0 * math.sqrt(a) * math.sqrt(d)
     if not root:
         return root
@@ -355,11 +358,11 @@ def mean_root(a: float, d: float) -> float:
 
 class UnsignedDiagonal(CrankDiagonal):
     """
-    The diagonal between two links neither of which an input turns against the ground.
+    The diagonal between two pinned links neither of which an input turns against the ground.
 
-    Their angles are known but for whole turns, and with them the sign of a half angle. So a change
-    point is not passed: the assembly stays the one that is named, and the links turn back there as
-    at a toggle.
+    Their angles are known only modulo a turn, and so the sign of a half angle is unknown. A change
+    point is therefore not passed: the assembly stays the named one, and the links turn back there
+    as at a toggle.
     """
 
     __slots__ = ()
@@ -368,15 +371,12 @@ class UnsignedDiagonal(CrankDiagonal):
 
     def at(self, known: State) -> Diagonal:
         """Return the diagonal."""
-        found = super().at(known)
-        return found._replace(fold=abs(found.fold), stretch=abs(found.stretch))
+        signed = super().at(known)
+        return signed._replace(fold=abs(signed.fold), stretch=abs(signed.stretch))
 
     def ratios(self, diagonal: Diagonal) -> tuple[float, float]:
-        """Return near by fold and far by stretch."""
+        """Return near/fold and far/stretch."""
         return diagonal.near / diagonal.fold, diagonal.far / diagonal.stretch
-
-
-# The diagonal between any two pins, from their coordinates.
 
 
 class FreeDiagonal:
@@ -388,7 +388,7 @@ class FreeDiagonal:
     ends
         Indices of A and D among the pins.
     limits
-        lower and upper of s, and upper² − lower², as of a `CrankDiagonal`.
+        lower and upper of s, and upper² − lower², as in `CrankDiagonal`.
 
     """
 
@@ -430,7 +430,7 @@ class FreeDiagonal:
 def free_diagonal(
     vector: complex, size: float, lower: float, upper: float, span: float, bounded: bool = True
 ) -> Diagonal:
-    """Return the diagonal of a vector whose ends have coordinates of a size."""
+    """Return the diagonal of a vector; ``size`` bounds the coordinates of its ends."""
     s = abs(vector)
     square = s * s
     if square < SMALLEST:
@@ -458,7 +458,7 @@ def free_diagonal(
 
 
 def free_diagonal_rate(diagonal: Diagonal, vector: complex, velocity: complex) -> DiagonalRate:
-    """Return how a diagonal grows that changes at a velocity."""
+    """Return the rates of a diagonal whose vector changes at a velocity."""
     unit = velocity / vector
     return DiagonalRate(
         unit.real, unit.imag, 1.0, 0.0, unit.real / diagonal.fold / diagonal.stretch
@@ -468,7 +468,7 @@ def free_diagonal_rate(diagonal: Diagonal, vector: complex, velocity: complex) -
 def free_diagonal_acceleration(
     growth: DiagonalRate, vector: complex, pull: complex
 ) -> DiagonalAcceleration:
-    """Return the derivative of `free_diagonal_rate`, for a diagonal with an acceleration."""
+    """Return the derivative of `free_diagonal_rate`; ``pull`` is the vector's acceleration."""
     square = pull / vector
     square += growth.turn * (growth.turn - 2j * growth.growth)
     return DiagonalAcceleration(square.real, square.imag, 0.0, 0.0, None)

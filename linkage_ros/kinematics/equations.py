@@ -12,12 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-What holds links that are iterated: pins, sliders and driven joints as equations.
+Pins, sliders and driven joints as equations, for the links that are iterated.
 
 The unknowns are the angle of each body and the place of one point of it, three numbers a body.
-Each constraint tells what it is off by, its slopes by the unknowns, and its first and second
+Each constraint gives its residual, its derivatives by the unknowns, and its first and second
 derivative by time for given rates and accelerations.
 """
 
@@ -36,7 +35,7 @@ Array = NDArray[np.floating[Any]]
 
 
 class End(NamedTuple):
-    """A point: of the body ``body`` at ``arm`` from its own point, or the pin ``pin``."""
+    """A point at ``arm`` from the point of the body ``body``; or the known pin ``pin``."""
 
     body: int
     arm: complex
@@ -52,14 +51,14 @@ class Facing(NamedTuple):
 
 
 class Meeting(NamedTuple):
-    """Two points meet."""
+    """Two points coincide."""
 
     one: End
     other: End
 
 
 class Parallel(NamedTuple):
-    """One link is at an angle to another: constant, or the input ``turn``, where that is not 0."""
+    """An angle between two links: a constant plus the input with index ``turn``, if not 0."""
 
     one: Facing
     other: Facing
@@ -68,7 +67,7 @@ class Parallel(NamedTuple):
 
 
 class OnLine(NamedTuple):
-    """A point is on a line through another; with a ``slide``, an input, it is that far along."""
+    """A point on a line through another one; at the distance of the input ``slide``, if not 0."""
 
     point: End
     through: End
@@ -82,7 +81,7 @@ Constraint = Meeting | Parallel | OnLine
 def equations(
     constraints: Sequence[Constraint], unknowns: Sequence[float], known: State
 ) -> tuple[list[float], list[list[float]]]:
-    """Return what the constraints are off by, and their derivatives by the unknowns, as rows."""
+    """Return the residuals of the constraints, and their derivatives by the unknowns, as rows."""
     n = len(unknowns)
     errors: list[float] = []
     rows: list[list[float]] = []
@@ -127,16 +126,16 @@ def spread(
     known_moved: State,
 ) -> Array:
     """
-    Return a bound of how much the derivatives by the unknowns change, entry by entry.
+    Return a bound of the change of the derivatives by the unknowns, entry by entry.
 
     Parameters
     ----------
     constraints, unknowns, known
-        As of `equations`.
+        As in `equations`.
     moved
-        How far each unknown moves from its value, in either direction.
+        Largest change of each unknown, in either direction.
     known_moved
-        How far each coordinate and each pin moves that is known before.
+        Largest change of each known coordinate and pin.
 
     """
     n = len(unknowns)
@@ -192,32 +191,32 @@ def derivative(
     changes: State | None,
     accelerations: Sequence[float],
 ) -> list[float]:
-    """Return the first derivative of the constraints; the second, where changes are given."""
+    """Return the first derivative of the constraints; the second if changes are given."""
     order = 1 if changes is None else 2
-    found: list[float] = []
+    derivatives: list[float] = []
     for constraint in constraints:
         if isinstance(constraint, Meeting):
             one, other = (
                 _point_motion(e, unknowns, known, speeds, rates, changes, accelerations)[order]
                 for e in constraint
             )
-            found += [one.real - other.real, one.imag - other.imag]
+            derivatives += [one.real - other.real, one.imag - other.imag]
         elif isinstance(constraint, Parallel):
             state = speeds if changes is None else changes
             values = rates if changes is None else accelerations
             one, other = (_turn(f, values, state) for f in (constraint.one, constraint.other))
             driven = state.coordinates[constraint.turn] if constraint.turn else 0.0
-            found.append(one - other - driven)
+            derivatives.append(one - other - driven)
         else:
             moved = line_motion(
                 constraint, unknowns, known, speeds, rates, changes, accelerations
             )[order]
             if constraint.slide:
                 state = speeds if changes is None else changes
-                found.append(moved.real - state.coordinates[constraint.slide])
+                derivatives.append(moved.real - state.coordinates[constraint.slide])
             else:
-                found.append(moved.imag)
-    return found
+                derivatives.append(moved.imag)
+    return derivatives
 
 
 def _angle(of: Facing, unknowns: Sequence[float], x: Sequence[float]) -> float:
@@ -230,7 +229,7 @@ def _turn(of: Facing, values: Sequence[float], state: State) -> float:
 
 
 def _place(end: End, unknowns: Sequence[float], known: State) -> tuple[complex, complex]:
-    """Return a point, and its arm as it lies now."""
+    """Return a point, and its arm in the frame of the ground."""
     if end.body < 0:
         return known.pins[end.pin], 0j
     k = 3 * end.body
@@ -239,7 +238,7 @@ def _place(end: End, unknowns: Sequence[float], known: State) -> tuple[complex, 
 
 
 def along(line: OnLine, known: State, unknowns: Any) -> complex:
-    """Return a point in the frame of the line that it is to be on."""
+    """Return a point in the frame of its line."""
     point, through = (_place(e, unknowns, known)[0] for e in (line.point, line.through))
     return (point - through) * facing(-_angle(line.line, unknowns, known.coordinates))
 

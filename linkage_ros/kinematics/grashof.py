@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The name of a four-bar, from its four lengths alone."""
+"""The type of a four-bar, from its four lengths, and the four-bars in a linkage."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from linkage_ros.kinematics.topology import Driven, Dyad, Structure
 
 class FourBarType(NamedTuple):
     """
-    What a four-bar is called, after Grashof and Barker.
+    The type of a four-bar, after Grashof and Barker.
 
     Attributes
     ----------
     code
-        Barker's: G Grashof, S change point; then C crank or R rocker for input, coupler and
+        Barker's code: G Grashof, S change point; then C crank or R rocker for input, coupler and
         output. RRR1 to RRR4 are triple rockers, by the longest link.
     name
-        As an engineer says it.
+        The name in words.
     margin
-        How much shorter the shortest and the longest link are together than the other two;
-        negative where they are longer, 0 at a change point. In the unit of the lengths.
+        Sum of the other two links minus the sum of the shortest and the longest, in the unit of
+        the lengths; 0 at a change point.
 
     """
 
@@ -48,7 +48,7 @@ class FourBarType(NamedTuple):
     margin: float
 
 
-# By the place of the shortest link, or of the longest: input, coupler, output, frame.
+# In the order of the shortest link, or of the longest: input, coupler, output, frame.
 _GRASHOF = (
     ('GCRR', 'crank-rocker'),
     ('GRCR', 'double rocker (the coupler turns fully)'),
@@ -71,16 +71,16 @@ _CHANGE_POINTS = (
 
 def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     """
-    Name a four-bar.
+    Return the type of a four-bar.
 
-    F. Grashof (Theoretische Maschinenlehre, vol. 2, 1883): some link turns fully against the
-    others where the shortest and the longest are together no longer than the other two. The
-    fourteen names are those of C. R. Barker, A complete classification of planar four-bar
-    linkages, Mechanism and Machine Theory 20 (1985) 535-554; R. L. Norton, Design of Machinery,
-    ch. 2, lists them. Lengths count as equal where they differ by their rounding only.
+    F. Grashof (Theoretische Maschinenlehre, vol. 2, 1883): some link turns fully relative to the
+    others if the shortest and the longest together are no longer than the other two. The fourteen
+    names are those of C. R. Barker, A complete classification of planar four-bar linkages,
+    Mechanism and Machine Theory 20 (1985) 535-554; R. L. Norton, Design of Machinery, ch. 2, lists
+    them. Lengths count as equal if they differ only by their rounding.
 
-    Neither the shortest nor the longest link is ever in doubt: two shortest ones, or two longest,
-    make the one inequality or the other impossible; at a change point they come in pairs.
+    Two shortest or two longest links cause no doubt: they make one of the inequalities impossible;
+    at a change point they come in pairs.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     Returns
     -------
     type : FourBarType
-        Without a code where one is longer than the others together: there is no loop.
+        Without a code if one link is longer than the others together: there is no loop.
 
     """
     sides = (a, b, c, d)
@@ -113,9 +113,6 @@ def four_bar_type(a: float, b: float, c: float, d: float) -> FourBarType:
     return FourBarType(*_CHANGE_POINTS[sides.index(shortest)], 0.0)
 
 
-# The four-bars that a linkage is made of, wholly or in part.
-
-
 class FourBar(NamedTuple):
     """
     A loop of four links and four pins: a dyad on two links that are pinned together.
@@ -125,11 +122,11 @@ class FourBar(NamedTuple):
     group
         Number of the dyad among the groups.
     links
-        Input, coupler, output and frame: the frame is the link that is known first.
+        Input, coupler, output and frame; the frame is the link that is known first.
     lengths
-        Theirs between the pins, in this order, in [m].
+        Their lengths between the pins, in this order, in [m].
     kind
-        After Grashof, as seen from the frame.
+        Type after Grashof, seen from the frame.
 
     """
 
@@ -144,9 +141,9 @@ def four_bars(structure: Structure) -> Iterator[FourBar]:
     known = [GROUND]
     for number, group in enumerate(structure.groups):
         if isinstance(group, Dyad):
-            found = _four_bar(structure, known, number, group)
-            if found is not None:
-                yield found
+            four_bar = _four_bar(structure, known, number, group)
+            if four_bar is not None:
+                yield four_bar
             known += [link for body in group.bodies for link in body]
         elif isinstance(group, Driven):
             known.append(group.joint.link)

@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""Where an iteration starts: the pose of its links that the linkage file gives, roughly."""
+"""The start of an iteration: the approximate pose of its links from the linkage file."""
 
 from __future__ import annotations
 
@@ -27,16 +26,16 @@ from linkage_ros.kinematics.linkage import Linkage
 
 class InitialGuess(NamedTuple):
     """
-    A rough pose.
+    An approximate pose.
 
     Attributes
     ----------
     inputs
-        The inputs at which it holds, in [rad] or the unit of the lengths.
+        The inputs of the pose, in [rad] or the unit of the lengths.
     angles
-        Of the links, in [rad].
+        Angles of the links, in [rad].
     places
-        Of the first point of each link, in the frame of the ground.
+        Places of the first point of each link, in the frame of the ground.
 
     """
 
@@ -54,27 +53,27 @@ def initial_guess(
     place_known: Callable[[Sequence[float]], tuple[Mapping[str, complex], Mapping[str, float]]],
 ) -> InitialGuess:
     """
-    Fit links to the points that the file's pose gives.
+    Fit links to the points of the pose in the file.
 
     Parameters
     ----------
     linkage
         The linkage.
     links
-        Names of the links to be placed.
+        Names of the links to place.
     blocks
         For each slider the link that slides.
     points
-        Of every link, in its own frame and in the unit of the lengths.
+        Points of every link, in its own frame and in the unit of the lengths.
     scale
         Metres in that unit.
     place_known
-        Returns places and link angles that are known at given inputs.
+        Returns the places and link angles that are known at given inputs.
 
     Raises
     ------
     DefinitionError
-        Where there is no pose, or where a link has fewer than two of its points.
+        If there is no pose, or if it has too few points of a link.
 
     """
     if linkage.pose is None:
@@ -94,7 +93,7 @@ def initial_guess(
     angles = dict(known_angles)
 
     def by_slider(link: str) -> float | None:
-        """Return the angle that a slider gives a link, by its other link or by its direction."""
+        """Return the angle of a link from its slider: by the other link or by the direction."""
         for name, slider in linkage.sliders.items():
             block, rail = blocks[name], slider.along
             ends = slider.through, slider.point
@@ -118,14 +117,14 @@ def initial_guess(
                 there = given[apart[0]] - given[known[0]]
                 angles[link] = phase(there / (points[link][apart[0]] - points[link][known[0]]))
             else:
-                found = by_slider(link)
-                if found is None:
+                angle = by_slider(link)
+                if angle is None:
                     raise DefinitionError(
                         'pose.points',
                         f'does not say where {link!r} lies',
                         f'give two of its points: {listed(points[link])}',
                     )
-                angles[link] = found
+                angles[link] = angle
         return angles[link]
 
     places = []

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The links that are known so far, where they lie, and the steps that place their points.
+The links that are known so far, their places, and the steps that place their points.
 
-Everything is in the unit of ``scale`` metres: a power of two near the longest length, so that
-scaling rounds nothing. A point is placed by a step of its own, and only when it is asked for.
+Lengths are in the unit of ``scale`` metres: a power of two near the longest length, so that
+scaling causes no rounding error. Each point is placed by its own step, and only if it is needed.
 """
 
 from __future__ import annotations
@@ -32,16 +32,14 @@ from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnR
 from linkage_ros.kinematics.step import Step
 from linkage_ros.kinematics.topology import Joint, Structure
 
-# Where links and sliders are, in terms of the coordinates of a solution.
-
 
 @dataclass(frozen=True, slots=True)
 class Angle:
     """
     A link's angle: a coordinate and a constant, in [rad].
 
-    ``unit`` is e^{i·constant}, made from lengths where they are known: an axis stays one, and no
-    angle is rounded at the size of a sum.
+    ``unit`` is e^{i·constant}. It is made from lengths where they are known, so that an axis stays
+    exact and no angle is rounded at the size of a sum.
     """
 
     coordinate: int
@@ -49,12 +47,12 @@ class Angle:
     unit: complex
 
     def plus(self, angle: float, unit: complex | None = None) -> Angle:
-        """Return the angle of what stands at a constant angle to the link."""
+        """Return the angle of a direction at a constant angle to the link."""
         turned = rect(1.0, angle) if unit is None else unit
         return Angle(self.coordinate, self.constant + angle, self.unit * turned)
 
     def along(self, vector: complex) -> Angle:
-        """Return the angle of a vector of the link."""
+        """Return the angle of a vector fixed to the link."""
         return self.plus(phase(vector), vector / abs(vector))
 
 
@@ -70,10 +68,10 @@ class Slide:
 @dataclass(frozen=True, slots=True)
 class Held:
     """
-    Where a link is held: its ``point``, in its own frame, lies where ``at`` of ``link`` does.
+    How a link is held: its ``point``, in its own frame, coincides with ``at`` of ``link``.
 
-    With a ``slide``, it lies that far along a line from there, whose ``direction`` is a unit
-    vector in the frame of ``link``. A ``pin`` is the number of a pin that an iteration has placed.
+    With a ``slide``, the point lies that far along a line from there, whose ``direction`` is a
+    unit vector in the frame of ``link``. ``pin`` is the index of a pin that an iteration placed.
     """
 
     point: complex
@@ -87,10 +85,10 @@ class Held:
 @dataclass(frozen=True, slots=True)
 class Line:
     """
-    The way of a point of one link along a slider, in the frame of the link that it slides on.
+    The line of a point of one link along a slider, in the frame of the link that it slides on.
 
-    The point lies at start + sign·(slide of the slider)·direction, a unit vector; ``angle`` is
-    that of the moving link less that of the other one.
+    The point lies at start + sign·(slide of the slider)·direction, a unit vector; ``angle`` is the
+    angle of the moving link minus that of the other link.
     """
 
     start: complex
@@ -101,7 +99,7 @@ class Line:
 
 class KnownLinks:
     """
-    What is known of a linkage; at first the ground.
+    The known links of a linkage; at first the ground.
 
     Parameters
     ----------
@@ -115,18 +113,18 @@ class KnownLinks:
     scale
         Metres in the unit of the lengths.
     points
-        Of every link, in its own frame and in the unit of the lengths.
+        Points of every link, in its own frame and in the unit of the lengths.
     blocks
         For each slider the link that slides.
     steps
-        In order; ``step_groups`` tells for each the number of its group, which is ``group`` now.
+        The steps; ``step_groups`` has the group number of each, ``group`` the current number.
     angles, slides
-        Of known links and sliders, in the coordinates.
+        Of the known links and sliders, in terms of the coordinates.
     held
-        Where each known link but the ground is held.
+        How each known link except the ground is held.
     turns_with
-        For each coordinate that is a sum of inputs, how often each input is in it: +1, −1 or 0.
-        Such an angle is known with its whole turns; others are known but for these.
+        For each coordinate that is a sum of inputs, the factor of each input: +1, −1 or 0. Such an
+        angle is known with its whole turns; other angles are known only modulo a turn.
 
     """
 
@@ -155,7 +153,7 @@ class KnownLinks:
         self._pins: dict[tuple[str, complex], int] = {}
 
     def place(self, link: str, point: complex) -> int:
-        """Return the index of a pin, with the steps that place it, for a known link's point."""
+        """Return the index of the pin at a known link's point, and add the steps that place it."""
         index = self._pins.get((link, point))
         if index is not None:
             return index
@@ -198,23 +196,23 @@ class KnownLinks:
         return self.coordinate_count - count
 
     def pin_to(self, link: str, joint: Joint) -> None:
-        """Hold a link by a pin that is known."""
+        """Hold a link by a known pin."""
         self.held[link] = Held(
             self.points[link][joint.name], joint.to, self.points[joint.to][joint.name]
         )
 
     def ride(self, link: str, point: complex, on: str, line: Line, slide: Slide) -> None:
-        """Hold a link by a slider, without turning."""
+        """Hold a link by a slider that keeps its angle."""
         self.angles[link] = self.angles[on].plus(line.angle)
         self.held[link] = Held(point, on, line.start, slide, line.direction)
 
     def point_of(self, slider: str, link: str) -> complex:
-        """Return the point by which a link takes part in a slider."""
+        """Return the point of a link in a slider."""
         given = self._linkage.sliders[slider]
         return self.points[link][given.through if link == given.along else given.point]
 
     def line(self, name: str, on: str, point: complex) -> Line:
-        """Return the way of a point of the one link of a slider as the other link sees it."""
+        """Return the line of a point of one link of a slider, in the frame of the other."""
         slider = self._linkage.sliders[name]
         through = self.points[slider.along][slider.through]
         sliding = self.points[self.blocks[name]][slider.point]
@@ -229,7 +227,7 @@ class KnownLinks:
     def arm(self, link: str, start: str, end: str) -> complex:
         """Return the vector from one pin of a link to another."""
         arm = self.points[link][end] - self.points[link][start]
-        if not arm:  # apart in the file, but not beside the size of the linkage
+        if not arm:  # different in the file, but equal at the size of the linkage
             raise DefinitionError(
                 f'links.{link}', 'has two pins in one place', 'give them different places'
             )
@@ -244,7 +242,7 @@ class KnownLinks:
         return self.place(link, self.points[link][point])
 
     def common(self, one: str, other: str, apart: tuple[str, ...]) -> str | None:
-        """Return the pin of two links, if they have one that is none of the given points."""
+        """Return the common pin of two links other than the given points, or None."""
         if one == other:
             return None
         shared = set(self.points[one]) & set(self.points[other]) - set(apart)
@@ -252,7 +250,7 @@ class KnownLinks:
 
 
 def _scale(links: Iterable[Mapping[str, Point]]) -> float:
-    """Return the power of two next to the longest distance on a link."""
+    """Return the power of two above the longest distance on a link."""
     longest = 0.0
     for points in links:
         places = list(points.values())

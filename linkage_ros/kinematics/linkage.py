@@ -12,12 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-What a linkage is: links with named points, pins, sliders, inputs and the joints to publish.
+A linkage: links with named points, pins, sliders, inputs and the joints to publish.
 
 Lengths are in metres, angles in radians, masses in kilograms. A point named on two or more links
-is a pin of them.
+is a pin of these links.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ class Slider:
     Attributes
     ----------
     point
-        Name of the point; no point of ``along``.
+        Name of the point; not a point of ``along``.
     along
         Name of the link that carries the line.
     through
@@ -51,10 +50,10 @@ class Slider:
     direction
         Direction of the line in the frame of ``along``, any length but zero.
     block
-        Name of the link that slides without turning against the line; '' where what carries the
-        point may turn about it (a pin in a slot, a rod in a swivel).
+        Name of the link that slides without turning against the line; '' if the link that carries
+        the point may turn about it (a pin in a slot, a rod in a swivel).
     angle
-        Of the block less that of ``along``, in [rad].
+        Angle of the block minus that of ``along``, in [rad].
 
     """
 
@@ -69,16 +68,16 @@ class Slider:
 @dataclass(frozen=True, slots=True)
 class Limits:
     """
-    What a joint of the machine can do, as ``<limit>`` of a URDF has it; infinite: no limit.
+    The limits of a joint of the machine, as in ``<limit>`` of a URDF; infinite means no limit.
 
     Attributes
     ----------
     low, high
-        Between which the joint stays, in [rad] or [m].
+        Range of the joint, in [rad] or [m].
     velocity
-        The greatest rate, either way, in [rad/s] or [m/s].
+        Largest rate in either direction, in [rad/s] or [m/s].
     effort
-        The greatest torque or force, either way, in [N·m] or [N].
+        Largest torque or force in either direction, in [N·m] or [N].
 
     """
 
@@ -89,7 +88,7 @@ class Limits:
 
     @property
     def bounded(self) -> bool:
-        """Whether there is a value that the joint cannot have."""
+        """Whether the range of the joint is limited on any side."""
         return self.low > -inf or self.high < inf
 
     def __str__(self) -> str:
@@ -97,16 +96,16 @@ class Limits:
 
 
 NO_LIMITS = Limits()
-"""The limits of a joint of which nothing is said."""
+"""The limits of a joint without limits in the file."""
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
     """
-    A driven joint, named ``joint``, with what the machine's can do.
+    A driven joint, named ``joint``, with the limits of the machine's joint.
 
-    It is the angle of ``child`` less that of ``parent``, which share a pin, in [rad]; or, where
-    ``slider`` is named, the slide of that one, in [m].
+    Its value is the angle of ``child`` minus that of ``parent``, which share a pin, in [rad]; or,
+    if ``slider`` is named, the slide of that slider, in [m].
     """
 
     joint: str
@@ -118,7 +117,7 @@ class Input:
 
 @dataclass(frozen=True, slots=True)
 class RevoluteJoint:
-    """A published angle: that of ``child`` less that of ``parent``, in [rad], as URDF has it."""
+    """A published angle, of ``child`` minus that of ``parent``, in [rad], as in a URDF."""
 
     parent: str
     child: str
@@ -136,15 +135,15 @@ class SlideJoint:
 @dataclass(frozen=True, slots=True)
 class Pose:
     """
-    Where the linkage starts; with points, where an iteration does.
+    The start of the linkage; its points are the initial guess of an iteration.
 
     Attributes
     ----------
     inputs
         One value for each input, in [rad] or [m].
     points
-        Points of the links that no dyad covers, in the frame of the ground, roughly, in [m]; none
-        where there are no such links.
+        Approximate points, in the frame of the ground, in [m], of the links that no dyad covers;
+        empty if there are no such links.
 
     """
 
@@ -155,7 +154,7 @@ class Pose:
 @dataclass(frozen=True, slots=True)
 class Mass:
     """
-    What a link weighs.
+    The mass of a link.
 
     Attributes
     ----------
@@ -181,21 +180,21 @@ class Linkage:
     Attributes
     ----------
     links
-        For each link its points, by name, in the link's own frame, in [m].
+        The points of each link, by name, in the link's own frame, in [m].
     inputs
         The driven joints.
     assembly
         For the pin or slider that closes a dyad, the side on which it lies.
     joints
-        What is published, in this order.
+        The published joints, in this order.
     sliders
         The sliders, by name.
     traced
-        Names of points whose curves matter.
+        Names of points whose curves are recorded or drawn.
     pose
-        Where it starts; where a dyad does not cover all of it, where the iteration does.
+        The start; for links that no dyad covers, the initial guess of the iteration.
     masses
-        Of links, by name; only where forces matter, and then of every link that moves.
+        Masses by link name; given only for forces, and then for every link that moves.
 
     """
 
@@ -210,9 +209,9 @@ class Linkage:
 
     @property
     def limits(self) -> dict[str, Limits]:
-        """Return the limits of those joints that have some, inputs first, by name."""
-        found = {name: joint.limits for name, joint in self.joints.items()}
-        # An input that is published too has its limits as an input.
+        """Return the limits of the joints that have any, by name, inputs first."""
+        published = {name: joint.limits for name, joint in self.joints.items()}
+        # An input that is also published has its limits as an input.
         named = {given.joint: given.limits for given in self.inputs}
-        named |= {name: limits for name, limits in found.items() if name not in named}
+        named |= {name: limits for name, limits in published.items() if name not in named}
         return {name: limits for name, limits in named.items() if limits != NO_LIMITS}

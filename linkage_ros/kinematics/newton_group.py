@@ -13,18 +13,18 @@
 # limitations under the License.
 
 """
-Links that no dyad covers (class III and higher), by Newton's method on their constraints.
+Newton's method on the constraints of links that no dyad covers (class III and higher).
 
 The unknowns are the angle of each link and the place of one point of it. A pin makes two points
-meet, a slider keeps an angle and a point on a line, a driven joint fixes an angle or a slide: as
-many equations as unknowns, with the Jacobian written out. Velocities and accelerations solve the
-same matrix for the constraints' own derivatives.
+coincide, a slider keeps an angle and a point on a line, a driven joint fixes an angle or a slide:
+as many equations as unknowns, with the Jacobian in closed form. Velocities and accelerations
+solve the same matrix for the derivatives of the constraints.
 
-The assembly is the one that the given pose leads to by continuity. Of a single input it is a
-`Branch`, which is followed once, so that a state depends on its input alone, and not on where the
-linkage was before: it starts from the branch's own curve, and what Newton's method finds farther
-from there than the curve allows is no answer. Of several inputs the straight line from the pose's
-inputs is followed anew for each state, with the same proof that no other assembly is met.
+The assembly is the one that continuity from the given pose leads to. With a single input it is a
+`Branch`, which is followed once, so that a state depends only on its input and not on where the
+linkage was before: the method starts from the curve of the branch, and a solution farther from
+there than the curve allows is rejected. With several inputs, the straight line from the inputs of
+the pose is followed again for each state, with the same proof that no other assembly is met.
 """
 
 from __future__ import annotations
@@ -65,16 +65,16 @@ if TYPE_CHECKING:
 
 
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
-"""Of the size of the coordinates: what a constraint may be off by at a solution."""
+"""Largest residual of a constraint at a solution, relative to the size of the coordinates."""
 
 _SINGULAR = 1e-11
-"""Of several inputs: smallest singular value of the Jacobian, of the largest, that has rates."""
+"""Several inputs: least ratio of smallest to largest singular value at which rates exist."""
 
 _AROUND = 64.0
-"""In [rad] or lengths: what a search for a solution does not go beyond."""
+"""In [rad] or lengths: largest distance from the start in a search for a solution."""
 
 _MOVED = 1e-6
-"""In lengths: by less than that links are not said to miss each other."""
+"""In lengths: a smaller closure error is not reported."""
 
 
 class IteratedPose(NamedTuple):
@@ -84,11 +84,11 @@ class IteratedPose(NamedTuple):
     Attributes
     ----------
     status, gap
-        Whether they close; where not, what a constraint is off by at best.
+        Whether they close; if not, the smallest residual that was reached.
     unknowns
         For each body its angle and the place of its point.
     jacobian
-        Of the constraints by the unknowns.
+        Derivatives of the constraints by the unknowns.
 
     """
 
@@ -100,7 +100,7 @@ class IteratedPose(NamedTuple):
 
 class Iteration:
     """
-    A group of links that is solved by iteration.
+    A group of links that Newton's method solves.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class Iteration:
     sliding
         For each input whether it is a slide.
     far
-        Length that no slide needs to exceed for a link to be stretched.
+        No slide needs to be longer than this to stretch a link.
 
     """
 
@@ -150,7 +150,7 @@ class Iteration:
 
     @property
     def equation_count(self) -> int:
-        """How many equations are solved at once."""
+        """Return the number of equations solved at once."""
         return len(self._start)
 
     @property
@@ -175,9 +175,9 @@ class Iteration:
         Parameters
         ----------
         count
-            How many of the numbers are coordinates.
+            Number of coordinates at the head of ``numbers``.
         *numbers
-            The coordinates and the pins that are known before.
+            The known coordinates, then the known pins.
 
         """
         known = State(list(numbers[:count]), list(numbers[count:]))
@@ -185,28 +185,28 @@ class Iteration:
         start = self._start_at(inputs)
         if start is None or start.ends:
             return None
-        found = self._correct(known, start.unknowns, start.farthest)
-        if found is None:
+        corrected = self._correct(known, start.unknowns, start.farthest)
+        if corrected is None:
             return None
-        unknowns, jacobian = found
+        unknowns, jacobian = corrected
         if len(inputs) > 1 and _conditioning(jacobian) <= _SINGULAR:
             return None
         return (*unknowns.tolist(), *(unknowns + start.turned)[0::3].tolist(), jacobian)
 
     def _not_closed(self, known: State) -> IteratedPose:
-        """Return the pose at a toggle, or what of it there is where links are open."""
+        """Return the pose at a toggle, or the nearest one where the links are open."""
         inputs = self._inputs_of(known)
         start = self._start_at(inputs)
         if start is None:
             return self._open(known, inputs)
         if start.ends:
-            # Where the Jacobian is singular, what Newton's method finds is no nearer.
+            # The Jacobian is singular here, so Newton's method would come no nearer.
             unknowns, jacobian = start.unknowns, self._system(known, start.unknowns)[1]
         else:
-            found = self._correct(known, start.unknowns, start.farthest)
-            if found is None:
+            corrected = self._correct(known, start.unknowns, start.farthest)
+            if corrected is None:
                 return self._open(known, inputs)
-            unknowns, jacobian = found
+            unknowns, jacobian = corrected
         values = unknowns.tolist()
         self._place(known, values, (unknowns + start.turned)[0::3].tolist())
         return IteratedPose(Status.TOGGLE, 0.0, values, jacobian)
@@ -217,9 +217,9 @@ class Iteration:
 
     def branch(self) -> Branch | None:
         """
-        Return the branch of a single input, followed when it is first asked for.
+        Return the branch of a single input, followed on the first call.
 
-        There is none where the pose leads to no solution.
+        Return None if the pose leads to no solution.
         """
         if self._branch is None:
             solution = self.solution()
@@ -236,15 +236,15 @@ class Iteration:
         return self._branch
 
     def solution(self) -> Array | None:
-        """Return the unknowns at the pose's inputs, nothing where the pose leads to none."""
+        """Return the unknowns at the pose's inputs; None if the pose leads to no solution."""
         if self._solution is None:
             known = self._known_at(self._inputs)
-            found = self._correct(known, self._start, inf) if known is not None else None
-            self._solution = found[0] if found is not None else None
+            corrected = self._correct(known, self._start, inf) if known is not None else None
+            self._solution = corrected[0] if corrected is not None else None
         return self._solution
 
     def rates(self, pose: IteratedPose, known: State, speeds: State) -> list[float]:
-        """Append the rates of what `close` has appended."""
+        """Append the rates of the coordinates and pins that `close` appended."""
         still = [0.0] * len(pose.unknowns)
         drift = derivative(self._constraints, pose.unknowns, known, speeds, still, None, still)
         rates = _solved(pose, drift)
@@ -257,7 +257,7 @@ class Iteration:
     def accelerations(
         self, pose: IteratedPose, rates: list[float], known: State, speeds: State, changes: State
     ) -> None:
-        """Append the accelerations of what `close` has appended."""
+        """Append the accelerations of the coordinates and pins that `close` appended."""
         still = [0.0] * len(rates)
         drift = derivative(self._constraints, pose.unknowns, known, speeds, rates, changes, still)
         solved = _solved(pose, drift)
@@ -267,14 +267,14 @@ class Iteration:
             changes.coordinates.append(change.real)
 
     def conditioning(self, pose: IteratedPose) -> float:
-        """Return the smallest singular value of the constraints' Jacobian, of the largest."""
+        """Return the ratio of the Jacobian's smallest singular value to its largest."""
         return _conditioning(pose.jacobian)
 
     def solution_from(self, angles: Array) -> Array | None:
         """
-        Return the solution at the pose's inputs that a start with these angles leads to.
+        Return the solution at the pose's inputs that these angles lead to.
 
-        The bodies start where they miss their constraints least, which are linear in the places.
+        The constraints are linear in the places, which start at the least-squares solution.
         """
         known = self._known_at(self._inputs)
         if known is None:
@@ -284,19 +284,19 @@ class Iteration:
         errors, jacobian = self._system(known, start)
         places = np.arange(len(start)) % 3 > 0
         start[places] = np.linalg.lstsq(jacobian[:, places], -errors, rcond=None)[0]
-        found = self._correct(known, start, _AROUND)
-        return None if found is None else found[0]
+        corrected = self._correct(known, start, _AROUND)
+        return None if corrected is None else corrected[0]
 
     def solution_at(self, x: float) -> Array | None:
-        """Return the unknowns at a value of the single input, nothing where the branch is not."""
+        """Return the unknowns at a value of the single input; None outside the branch."""
         start, known = self._start_at((x,)), self._known(x)
         if start is None or known is None:
             return None
-        found = self._correct(known, start.unknowns, start.farthest)
-        return None if found is None else found[0]
+        corrected = self._correct(known, start.unknowns, start.farthest)
+        return None if corrected is None else corrected[0]
 
     def _place(self, known: State, unknowns: list[float], angles: list[float]) -> None:
-        """Append a solution, with the angles as the turns before have left them."""
+        """Append a solution; its angles include the turns made before."""
         known.coordinates.extend(angles)
         known.pins.extend(_places(unknowns))
         for slide in self._slides:
@@ -307,7 +307,7 @@ class Iteration:
         state.pins.extend(_places(values))
 
     def _system(self, known: State, unknowns: Array) -> tuple[Array, Array]:
-        """Return what the constraints are off by, and their derivatives by the unknowns."""
+        """Return the residuals, and their derivatives by the unknowns."""
         errors, jacobian = self._listed_system(known, unknowns.tolist())
         return np.array(errors), jacobian
 
@@ -322,7 +322,7 @@ class Iteration:
         return self._straight.at(numbers)
 
     def _known_at(self, inputs: Sequence[float]) -> State | None:
-        """Return what is known before this step, at any inputs."""
+        """Return the state of the links solved before this step, or None."""
         known = State([0.0, *inputs], [])
         for step in self._before:
             if not step.close(known).status.has_pose:
@@ -332,7 +332,7 @@ class Iteration:
     def _moving_at(
         self, inputs: Sequence[float], rates: Sequence[float]
     ) -> tuple[State, State] | None:
-        """Return what is known before this step, and its rates; nothing where it has none."""
+        """Return the state of the links solved before and its rates, or None."""
         known, speeds = State([0.0, *inputs], []), State([0.0, *rates], [])
         for step in self._before:
             pose = step.close(known)
@@ -348,14 +348,14 @@ class Iteration:
         return self._moving_at((x,), (1.0,))
 
     def _start_at(self, inputs: Sequence[float]) -> Start | None:
-        """Return where to start; nothing where the assembly does not lead."""
+        """Return where Newton's method starts; None if the assembly does not lead there."""
         if len(inputs) > 1:
             return self._along_a_line(inputs)
         branch = self.branch()
         return None if branch is None else branch.start(inputs[0])
 
     def _along_a_line(self, inputs: Sequence[float]) -> Start | None:
-        """Return the start at several inputs, on the straight line from those of the pose."""
+        """Return the start on the straight line from the pose's inputs to several inputs."""
         solution = self.solution()
         if solution is None:
             return None
@@ -388,7 +388,7 @@ class Iteration:
 
     def _correct(self, known: State, start: Array, farthest: float) -> tuple[Array, Array] | None:
         """Return the solution within a distance of a start, and its Jacobian."""
-        # In lists: of so few numbers an array's own overhead is greater than the arithmetic.
+        # Lists: for so few numbers the overhead of an array exceeds the arithmetic.
         begin = start.tolist()
         unknowns, last = begin, inf
         size = 1.0 + _greatest(begin)
@@ -409,10 +409,10 @@ class Iteration:
 
     def _open(self, known: State, inputs: Sequence[float]) -> IteratedPose:
         """
-        Return how near the links come, downhill from where their assembly ends.
+        Return how near the links come, descending from the end of their assembly.
 
-        Where they would close, but in another assembly or after another number of turns, what they
-        miss each other by is told as they lie at that end.
+        If they would close, but in another assembly or after another number of turns, the closure
+        error is the one at that end.
         """
         end = self._branch.nearest_end(inputs[0]) if self._branch is not None else None
         unknowns = self._start if end is None else end
@@ -433,18 +433,18 @@ class Iteration:
 
 class _StraightSystem:
     """
-    The constraints and their derivatives as a straight line.
+    The constraints and their derivatives as straight-line code.
 
-    Most derivatives are constants, such as 0 and 1: only the others are worked out.
+    Most derivatives are constants, such as 0 and 1; only the others are evaluated.
 
     Parameters
     ----------
     constraints
         The constraints.
     numbers
-        Coordinates, pins and unknowns, one after the other, for which they can be worked out.
+        Coordinates, pins and unknowns, in this order, at which they can be evaluated.
     coordinates, unknowns
-        How many there are of each.
+        Number of each.
 
     """
 
@@ -466,16 +466,16 @@ class _StraightSystem:
         self._places = np.array([place - unknowns for place in self._line.places[unknowns:]])
 
     def at(self, numbers: Sequence[complex]) -> tuple[tuple[float, ...], Array]:
-        """Return what the constraints are off by, each of which varies, and the Jacobian."""
+        """Return the residuals, all of which vary, and the Jacobian."""
         n = self._count
-        found = self._line.varying(*numbers)
+        varying = self._line.varying(*numbers)
         jacobian = self._constants.copy()
-        jacobian[self._places] = found[n:]
-        return found[:n], jacobian.reshape(n, n)
+        jacobian[self._places] = varying[n:]
+        return varying[:n], jacobian.reshape(n, n)
 
 
 def _greatest(values: Sequence[float]) -> float:
-    """Return the greatest size; NaN where one is."""
+    """Return the greatest absolute value; NaN if any value is NaN."""
     return nan if isnan(sum(values)) else max(map(abs, values))
 
 
@@ -489,33 +489,30 @@ def _conditioning(jacobian: Array) -> float:
 
 
 def _solved(pose: IteratedPose, drift: Sequence[float]) -> list[float]:
-    """Return the derivatives of the unknowns that make up for the constraints' own."""
-    found = called(_solve, pose.jacobian, *drift)
-    return [found[i] for i in range(len(drift))]
+    """Return the rates of the unknowns that cancel the drift of the constraints."""
+    rates = called(_solve, pose.jacobian, *drift)
+    return [rates[i] for i in range(len(drift))]
 
 
 def _solve(jacobian: Array, *drift: float) -> list[float]:
-    found: list[float] = np.linalg.solve(jacobian, np.negative(drift)).tolist()
-    return found
-
-
-# The joints of links that no dyad covers, as constraints of an `Iteration`.
+    rates: list[float] = np.linalg.solve(jacobian, np.negative(drift)).tolist()
+    return rates
 
 
 class Constraints:
     """
-    What holds a group of links.
+    The joints of a group of links, as constraints of an `Iteration`.
 
     Parameters
     ----------
     linkage
         The linkage.
     joints
-        Those of the group.
+        The joints of the group.
     links
         The links of the group.
     planner
-        Knows and places what comes before the group.
+        Gives and places the links solved before the group.
 
     Attributes
     ----------
@@ -543,7 +540,7 @@ class Constraints:
         self._add_drives()
 
     def iteration(self, before: tuple[Step, ...]) -> Iteration:
-        """Return the step that solves the group, given those before it."""
+        """Return the step that solves the group, given the steps before it."""
         planner = self._planner
 
         def place_known(

@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""From the groups of a linkage to the steps that solve it, in numbers."""
+"""The steps that solve a linkage, made from its groups."""
 
 from __future__ import annotations
 
@@ -54,7 +53,7 @@ _SIDES['RPR'] = _SIDES['RRP']
 
 
 _LEVEL = Angle(0, 0.0, 1 + 0j)
-"""What a direction in the frame of the ground is measured from."""
+"""The zero direction of angles in the frame of the ground."""
 
 
 class _Hinge(NamedTuple):
@@ -66,11 +65,11 @@ class _Hinge(NamedTuple):
     a, d
         OA and OD, in the unit of the lengths.
     arms, offset
-        Coordinates of the two links, and what the angle from OD to OA is beyond their difference.
+        Coordinates of the two links, and the angle from OD to OA minus their difference.
     base
-        What a direction that a `CrankDiagonal` gives is measured from.
+        The zero of the directions that a `CrankDiagonal` gives.
     crank_first
-        Whether the link of A is the crank: of the two the one that is known later.
+        Whether the link of A is the crank, that is the one of the two that is known later.
 
     """
 
@@ -83,10 +82,10 @@ class _Hinge(NamedTuple):
 
     def side_at_change_point(self, diagonal: CrankDiagonal, sign: int) -> int:
         """
-        Return the sign of a dyad whose side holds for a crank between 0 and π from the ground.
+        Return the sign of a dyad whose side is given for a crank between 0 and π from the ground.
 
-        A dyad that folds has the sign of the half angle from OD to OA. Where OD is the crank and
-        OA the ground, that is negative there.
+        A dyad that folds has the sign of the half angle from OD to OA. If OD is the crank and OA
+        the ground, that sign is negative there.
         """
         folds = diagonal.fold_margin == 0.0 and not isinstance(diagonal, UnsignedDiagonal)
         return -sign if folds and not self.crank_first else sign
@@ -347,7 +346,7 @@ class SolutionPlan(KnownLinks):
             self.slides[name] = Slide(k + len(group.links) + i, 1.0)
 
     def _carries(self, start: str, end: str) -> tuple[DrivenOffset, ...]:
-        """Return the way from one link of a body to another, through its driven joints."""
+        """Return the transformations from one link of a body to another, by its driven joints."""
         ways: dict[str, tuple[DrivenOffset, ...]] = {start: ()}
         while end not in ways:
             for i, given in enumerate(self._linkage.inputs):
@@ -378,7 +377,7 @@ class SolutionPlan(KnownLinks):
         )
 
     def _hinge(self, first: str, second: str) -> _Hinge | None:
-        """Return how two pins lie on links that share a pin O, if any two do."""
+        """Return the links with a common pin O that carry two pins, or None."""
         known = list(self.angles)
         for other in self.carriers(second):
             for one in self.carriers(first):
@@ -393,7 +392,7 @@ class SolutionPlan(KnownLinks):
         return None
 
     def _rail(self, pin: str, on: str, line: Line, length: float) -> Rail:
-        """Return a line on a known link as it sees a known pin."""
+        """Return a line on a known link as the rail of a known pin."""
         base = self.angles[on].along(line.direction)
         for link in self.carriers(pin):
             pivot = self.common(link, on, (pin,))
@@ -403,7 +402,7 @@ class SolutionPlan(KnownLinks):
                 place = (self.points[on][pivot] - line.start) * line.direction.conjugate()
                 arms = angle.coordinate, base.coordinate
                 rail = CrankRail(arm, place, length, arms)
-                # As a parallelogram: both roots change their sign with a whole turn.
+                # As for a parallelogram: both roots change their sign with a whole turn.
                 turns_matter = len(rail.singular_angles) < 2
                 if turns_matter and not self._driven_only(arms):
                     return UnsignedRail(arm, place, length, arms)
@@ -412,7 +411,7 @@ class SolutionPlan(KnownLinks):
         return FreeRail(ends, length, base.coordinate, base.unit)
 
     def _driven_only(self, arms: tuple[int, int]) -> bool:
-        """Return whether two coordinates are sums of inputs, and so known with their turns."""
+        """Return whether two coordinates are sums of inputs, so that their turns are known."""
         return set(arms) <= set(self.turns_with)
 
     def _sign(self, kind: str, closing: str, meaning: str) -> int:
@@ -435,6 +434,6 @@ class SolutionPlan(KnownLinks):
 
 
 def _facing(coordinate: int, base: Angle, vector: complex) -> Angle:
-    """Return the angle of a link of which a vector stands at a coordinate, from a base."""
+    """Return the angle of a link, given the coordinate of its vector, measured from a base."""
     unit = base.unit * (vector / abs(vector)).conjugate()
     return Angle(coordinate, base.constant - phase(vector), unit)

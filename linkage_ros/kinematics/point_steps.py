@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""Steps that place a point of a link whose angle is known, or move a coordinate along."""
+"""Steps that place a point of a link at a known angle, or compute the angle of a driven link."""
 
 from __future__ import annotations
 
@@ -43,13 +42,13 @@ class FixedPoint:
         return PLACED
 
     def rates(self, _pose: Pose, _known: State, speeds: State) -> None:
-        """Append that it stands."""
+        """Append a velocity of zero."""
         speeds.pins.append(0j)
 
     def accelerations(
         self, _pose: Pose, _rates: None, _known: State, _speeds: State, changes: State
     ) -> None:
-        """Append that it stands."""
+        """Append an acceleration of zero."""
         changes.pins.append(0j)
 
 
@@ -64,7 +63,7 @@ class PointOnLink:
     arm
         Index, among the coordinates, of the angle of the link.
     vector
-        From the pin to the point where that coordinate is 0.
+        Vector from the pin to the point at a coordinate of 0.
 
     """
 
@@ -82,8 +81,8 @@ class PointOnLink:
         return PLACED
 
     def rates(self, _pose: Pose, known: State, speeds: State) -> complex:
-        """Append its velocity; return the way from the pin."""
-        # Not the difference of the two places: far from the origin that has few digits.
+        """Append its velocity; return the vector from the pin."""
+        # Not the difference of the two places, which has few digits far from the origin.
         arm = facing(known.coordinates[self._arm]) * self._vector
         turn = speeds.coordinates[self._arm]
         speeds.pins.append(speeds.pins[self._pin] + 1j * turn * arm)
@@ -108,9 +107,9 @@ class PointOnRail:
     arm
         Index, among the coordinates, of the angle of the link that carries the line.
     slide
-        Index, among the coordinates, of the way along the line.
+        Index, among the coordinates, of the slide along the line.
     unit
-        In which the point travels with the slide, where that coordinate of the link is 0.
+        Direction in which the point travels with the slide, at a link coordinate of 0.
 
     """
 
@@ -157,7 +156,7 @@ class RelativeAngle:
     arm, turn
         Indices, among the coordinates, of the other link's angle and of the joint.
     sign
-        +1 where the joint adds to that angle, −1 where it is taken away.
+        +1 if the joint adds to that angle, −1 if it is subtracted.
 
     """
 

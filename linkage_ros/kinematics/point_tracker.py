@@ -12,16 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-Points of links followed through positions, velocities and accelerations, and no others computed.
+Places, velocities and accelerations of certain points of links, and of no others.
 
-From the coordinates that a closure's steps have found, a point is walked to: from the ground (or
-from where an iteration has placed a link) along arms e^{iθ}·c of links and ways s·e^{iθ}·û along
-sliders. With the rates ω = θ̇ and α = θ̈ of its link, an arm r adds iω·r to the velocity and
-(iα − ω²)·r to the acceleration; a way adds (ṡ + iω·s)·û and (s̈ − ω²·s + i(α·s + 2ω·ṡ))·û, with û
-turned into the ground's frame (R. L. Norton, Design of Machinery, ch. 6 and 7: the velocity of
-slip and Coriolis' acceleration).
+A point is reached from the coordinates of a closure: from the ground (or from a link that an
+iteration has placed) along arms e^{iθ}·c of links and ways s·e^{iθ}·û along sliders. With the
+rates ω = θ̇ and α = θ̈ of its link, an arm r adds iω·r to the velocity and (iα − ω²)·r to the
+acceleration; a way adds (ṡ + iω·s)·û and (s̈ − ω²·s + i(α·s + 2ω·ṡ))·û, with û turned into the
+frame of the ground (R. L. Norton, Design of Machinery, ch. 6 and 7: slip velocity and Coriolis
+acceleration).
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
 
 
 class _Node(NamedTuple):
-    """A point: where its way starts, what turns the way, the way, and its slide or −1."""
+    """A point: index of its base, index of its angle, vector from the base, slide or −1."""
 
     base: int
     arm: int
@@ -48,22 +47,21 @@ class _Node(NamedTuple):
 
 class PointTracker:
     """
-    Certain points of links.
+    Certain points of links, tracked through the states of a closure.
 
-    Each method returns a list of every point that is walked through; those that were asked for
-    stand at `indices`.
+    Each method returns a list of every point on the way; the requested points are at `indices`.
 
     Parameters
     ----------
     known
-        The links of a closure, all known.
+        The links of a closure, all of them known.
     points
-        Each with the name of its link, and where it lies in that link's frame, in [m].
+        Each with the name of its link and its place in the frame of that link, in [m].
 
     Attributes
     ----------
     indices
-        For each of the points its index in the lists.
+        For each requested point its index in the lists.
 
     """
 
@@ -71,7 +69,7 @@ class PointTracker:
 
     def __init__(self, known: KnownLinks, points: Sequence[tuple[str, complex]]) -> None:
         walk = _Walk(known)
-        found = [walk.to(link, point / known.scale) for link, point in points]
+        ends = [walk.to(link, point / known.scale) for link, point in points]
         self._scale = known.scale
         self._fixed = [place * known.scale for place in walk.fixed]
         self._still = [0j] * len(walk.fixed)
@@ -80,10 +78,10 @@ class PointTracker:
             _Node(walk.number(base), arm, way * known.scale, slide)
             for base, arm, way, slide in walk.nodes
         )
-        self.indices = tuple(walk.number(place) for place in found)
+        self.indices = tuple(walk.number(place) for place in ends)
 
     def places(self, position: Position) -> list[complex]:
-        """Return where the points are in the frame of the ground, in [m]."""
+        """Return the places of the points in the frame of the ground, in [m]."""
         x = position.state.coordinates
         places = self._started(self._fixed, position.state.pins)
         for base, arm, way, slide in self._nodes:
@@ -126,7 +124,7 @@ class PointTracker:
         return accelerations
 
     def _started(self, fixed: list[complex], pins: list[complex]) -> list[complex]:
-        """Return what stands on the ground and what the steps have found."""
+        """Return the points on the ground and those that an iteration has placed."""
         started = fixed.copy()
         for index in self._pins:
             started.append(pins[index] * self._scale)
@@ -134,11 +132,11 @@ class PointTracker:
 
 
 _Place = tuple[str, int]
-"""A place on the walk: the list of `_Walk` that it stands in, and its index there."""
+"""A point: the list of `_Walk` that holds it, and its index there."""
 
 
 class _Walk:
-    """The way to the points, as short as it can be, in the unit of the closure's lengths."""
+    """The shortest way to the points, in the unit of the closure's lengths."""
 
     def __init__(self, known: KnownLinks) -> None:
         self._known = known
@@ -148,13 +146,13 @@ class _Walk:
         self.nodes: list[tuple[_Place, int, complex, int]] = []
 
     def number(self, place: _Place) -> int:
-        """Return the index of a place where all lists stand one after the other."""
+        """Return the index of a point if all lists are joined."""
         kind, index = place
         before = {'fixed': 0, 'pin': len(self.fixed), 'node': len(self.fixed) + len(self.pins)}
         return before[kind] + index
 
     def to(self, link: str, point: complex) -> _Place:
-        """Return the place of a point of a link, with the way to it."""
+        """Return a point of a link, and add the way to it."""
         if (link, point) not in self._places:
             self._places[link, point] = self._new(link, point)
         return self._places[link, point]

@@ -14,12 +14,12 @@
 
 
 """
-A pin seen from a rail: its place in the frame of the line along which another pin travels.
+The place of a pin in the frame of a line (rail) along which another pin travels.
 
-The line passes E in the direction û on a link that is known; the frame of the rail has its origin
-at E and û for its x axis. Where the seen pin A lies on a link that is pinned, at O, to the one
-that carries the rail, its place follows from the angle between the two links (`CrankRail`); for
-all others from the coordinates (`FreeRail`).
+The line passes E in the direction û on a known link; the frame of the rail has its origin at E and
+û for its x axis. If the pin A lies on a link that is pinned, at O, to the link that carries the
+rail, its place follows from the angle between the two links (`CrankRail`); otherwise it is
+computed from the coordinates (`FreeRail`).
 """
 
 from __future__ import annotations
@@ -44,19 +44,19 @@ class PinOnRail(NamedTuple):
     place
         (x + i·y), in the unit of the lengths.
     below, above
-        √(b − y) and √(b + y): how far a link of length b from A to the line is from its limits.
-        Signed at a change point; infinite where no such link is asked for.
+        √(b − y) and √(b + y): the distance of a link of length b, from A to the line, from its
+        limits. Signed at a change point; infinite if there is no such link.
     gap
-        What A is too far from the line by; 0 where it is not.
+        Length by which A is too far from the line; otherwise 0.
     base
         Coordinate of the link that carries the rail, in [rad].
     arm
-        From O to A in the frame of a `CrankRail`, else 0.
+        From O to A in the frame of a `CrankRail`, otherwise 0.
     lean
-        Of a `CrankRail` with a change point, dy/dψ by below and above, else 0: at the change point
-        both are 0, and it is not.
+        dy/dψ/(below·above) of a `CrankRail` with a change point, otherwise 0: at the change point
+        dy/dψ and the product are 0, but lean is not.
     status
-        Of the link, as far as the rail decides it: not whether it stands across the line.
+        Status of the link as far as the rail decides it, except whether it stands across the line.
 
     """
 
@@ -71,7 +71,7 @@ class PinOnRail(NamedTuple):
 
 
 class Rail(Protocol):
-    """What a dyad asks of a rail."""
+    """The interface of a rail to a dyad."""
 
     def at(self, known: State, /) -> PinOnRail:
         """Return the pin in the frame of the rail."""
@@ -91,37 +91,37 @@ class Rail(Protocol):
         """Return the pin's acceleration in that frame, and that of the frame, in [rad/s²]."""
 
     def climb(self, sight: PinOnRail, rise: float, speeds: State, /) -> float:
-        """Return the rate of y, the rise, by below and above."""
+        """Return ẏ/(below·above); ``rise`` is ẏ."""
 
     def across(
         self, sight: PinOnRail, pull: complex, link_rate: float, speeds: State, changes: State, /
     ) -> float:
-        """Return ÿ + y·λ̇², of a link at the rate λ̇, by below and above."""
+        """Return (ÿ + y·λ̇²)/(below·above) for a link at the rate λ̇."""
 
 
 class CrankRail:
     """
-    A rail on a link to which the link of A is pinned at O.
+    A rail on a link to which the link of pin A is pinned at O.
 
     With a = OA at the angle ψ to the rail, O at (f, e) in the frame of the rail, and a link of
-    length b from A to the line, the link stands across the line where b ∓ y = 0. There, with η =
-    π/4 − ψ/2, of the two forms the one of smaller terms is taken::
+    length b from A to the line, the link stands across the line if b ∓ y = 0. There the form with
+    the smaller terms is used, with η = π/4 − ψ/2::
 
         b − y = (b − e − a) + 2a·sin²η        b + y = (b + e − a) + 2a·cos²η
 
-    The brackets are constants of the linkage. Where one is zero, the root has the sign of its sine
-    or cosine, and passes the change point with it; so does dy/dψ = a·cos ψ = 2a·sin η·cos η.
+    The brackets are constants of the linkage. If one is zero, the root has the sign of its sine or
+    cosine, and passes the change point with it; so does dy/dψ = a·cos ψ = 2a·sin η·cos η.
 
     Parameters
     ----------
     arm
-        OA in the frame of the rail, where the difference of the two coordinates is 0.
+        OA in the frame of the rail, if the difference of the two coordinates is 0.
     pivot
         O in the frame of the rail.
     link
-        b; infinite where no link is asked for.
+        b; infinite if there is no link.
     arms
-        Indices, among the coordinates, of the angles of the link of A and of that with the rail.
+        Indices, among the coordinates, of the angles of the link of A and of the rail's link.
 
     """
 
@@ -143,7 +143,7 @@ class CrankRail:
         self._below, self._above = below, above
         self._root_length = math.sqrt(2.0 * a)
         self._changes_over = not (below and above)
-        # Of `across`: sums that cancel of a short crank beside a long link.
+        # For `across`: these sums would cancel for a short crank beside a long link.
         self._products = (
             (0.0, 0.0)
             if link == inf
@@ -181,7 +181,7 @@ class CrankRail:
             return PinOnRail(place, 0.0, 0.0, gap, base, arm, 0.0, Status.OPEN)
         lean, status = 0.0, Status.CLOSED
         if self._changes_over:
-            # Of the rate, which is 0 where the root is; two forms of one zero would not cancel.
+            # ẏ and the root are 0 together: computed in two forms, the zeros would not cancel.
             arm = vector(2.0 * self._length * sine * cosine, arm.imag)
             lean = 1.0
             if self._above:
@@ -195,11 +195,11 @@ class CrankRail:
         return PinOnRail(place, below.root, above.root, 0.0, base, arm, lean, status)
 
     def _root(self, bracket: float, part: float, square: float, side: float) -> Root:
-        """Return the root of the link's length less what it has to reach."""
+        """Return the root of the link's length minus the distance it has to reach."""
         if bracket == 0.0:
             return reach(bracket, part, square)
         size = self._link + abs(side)
-        # The square has more roundings than the side: where it is as great, it is no better.
+        # The square has more rounding errors than the side: if as great, it is no better.
         shorter = 4.0 * (abs(bracket) + square) < size
         return root_of(
             where(shorter, bracket + square, self._link + side),
@@ -229,7 +229,7 @@ class CrankRail:
         return (1j * swing_change - swing * swing) * sight.arm, change
 
     def climb(self, sight: PinOnRail, rise: float, speeds: State) -> float:
-        """Return the rate of y, the rise, by below and above."""
+        """Return ẏ/(below·above); ``rise`` is ẏ."""
         if not self._changes_over:
             return rise / (sight.below * sight.above)
         first, second = self.arms
@@ -239,15 +239,16 @@ class CrankRail:
         self, sight: PinOnRail, _pull: complex, link_rate: float, speeds: State, changes: State
     ) -> float:
         """
-        Return ÿ + y·λ̇² by below and above.
+        Return (ÿ + y·λ̇²)/(below·above).
 
-        The two cancel at a change point. What remains of their ψ̇² is also::
+        Its two terms cancel at a change point. Their part with ψ̇² is also::
 
             (e·(b − y)² − y·(b − e − a)·(a + b − e))/w²
               = (e·(b + y)² − y·(b + e − a)·(a + b + e))/w²
 
-        where the brackets b ∓ e − a are constants of the linkage. Of the forms the one of smaller
-        terms is taken; with a change point the one whose bracket is 0, which no other does.
+        where the brackets b ∓ e − a are constants of the linkage. The form with the smaller terms
+        is used; with a change point, the form whose bracket is 0, the only one that does not
+        cancel.
         """
         first, second = self.arms
         swing = speeds.coordinates[first] - speeds.coordinates[second]
@@ -275,7 +276,7 @@ class CrankRail:
 
 
 class UnsignedRail(CrankRail):
-    """A `CrankRail` whose angle is known but for whole turns; as `UnsignedDiagonal`."""
+    """A `CrankRail` whose angle is known only modulo a turn; see `UnsignedDiagonal`."""
 
     __slots__ = ()
 
@@ -283,25 +284,25 @@ class UnsignedRail(CrankRail):
 
     def at(self, known: State) -> PinOnRail:
         """Return the pin in the frame of the rail."""
-        found = super().at(known)
-        lean = where((found.below < 0.0) != (found.above < 0.0), -found.lean, found.lean)
-        return found._replace(below=abs(found.below), above=abs(found.above), lean=lean)
+        signed = super().at(known)
+        lean = where((signed.below < 0.0) != (signed.above < 0.0), -signed.lean, signed.lean)
+        return signed._replace(below=abs(signed.below), above=abs(signed.above), lean=lean)
 
 
 class FreeRail:
     """
-    A rail and a pin, from their coordinates.
+    A rail and a pin, computed from their coordinates.
 
     Parameters
     ----------
     ends
         Indices of E and A among the pins.
     link
-        b, length of a link from A to the line; infinite where none is asked for.
+        b, length of a link from A to the line; infinite if there is none.
     arm
         Index, among the coordinates, of the angle of the link that carries the rail.
     unit
-        Direction of the line where that coordinate is 0.
+        Direction of the line at a coordinate of 0.
 
     """
 
@@ -355,12 +356,12 @@ class FreeRail:
         return (end - start) * back - apparent, change
 
     def climb(self, sight: PinOnRail, rise: float, _speeds: State) -> float:
-        """Return the rate of y, the rise, by below and above."""
+        """Return ẏ/(below·above); ``rise`` is ẏ."""
         return rise / (sight.below * sight.above)
 
     def across(
         self, sight: PinOnRail, pull: complex, link_rate: float, _speeds: State, _changes: State
     ) -> float:
-        """Return ÿ + y·λ̇² by below and above."""
+        """Return (ÿ + y·λ̇²)/(below·above)."""
         across = pull.imag + sight.place.imag * link_rate * link_rate
         return across / (sight.below * sight.above)

@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""When a sum that decides something is zero: what rounding does to lengths and to reaches."""
+"""Decisions by a sum that may be zero: the rounding errors of lengths and reaches."""
 
 from __future__ import annotations
 
@@ -26,7 +25,7 @@ from linkage_ros.kinematics.status import Status
 UNIT_ROUNDOFF = 2.0**-53
 
 SMALLEST = 2.0**-1020
-"""What is smaller is taken for zero: its inverse would not be a number any more."""
+"""Smaller numbers count as zero: their inverse would overflow."""
 
 ROUNDING = 16.0 * UNIT_ROUNDOFF
 """Bound of the error of a reach, relative to the size of its terms."""
@@ -36,8 +35,8 @@ def margin(*lengths: float) -> float:
     """
     Return a sum of signed lengths that is a constant of a linkage, correctly rounded.
 
-    Lengths come from files, in decimals: what cancels but for their rounding was meant to cancel,
-    and is 0.
+    Lengths come from files, in decimals: terms that cancel up to rounding were meant to cancel,
+    and their sum is 0.
     """
     total = fsum(lengths)
     return 0.0 if abs(total) <= 4.0 * UNIT_ROUNDOFF * fsum(map(abs, lengths)) else total
@@ -45,16 +44,16 @@ def margin(*lengths: float) -> float:
 
 class Root(NamedTuple):
     """
-    The root of a reach: how far a dyad is from its limit.
+    The root of a reach: the distance of a dyad from its limit.
 
     Attributes
     ----------
     root
         0 at the limit.
     missing
-        0 where the dyad closes, else what is missing of the sum.
+        0 if the dyad closes, otherwise the amount that the sum is short of 0.
     status
-        A toggle where the sum is zero but for its rounding error, open where it is negative.
+        A toggle if the sum is zero within its rounding error, open if it is negative.
 
     """
 
@@ -67,10 +66,10 @@ def reach(constant: float, part: float, square: float) -> Root:
     """
     Return the root of ``constant + part²``, given the square.
 
-    A dyad that folds or stretches does so where such a sum, its reach, goes to zero. The constant
-    is a bracket of the linkage; the part is signed by the half angle. Where the constant is zero,
-    the root is the part and has its sign. A sum within its own rounding error of zero is zero:
-    those are the last few floats on either side of a toggle, where the rate has no correct digit.
+    A dyad folds or stretches where such a sum, its reach, becomes zero. The constant is a bracket
+    of the linkage; the part is signed by the half angle. If the constant is zero, the root is the
+    part and has its sign. A sum within its own rounding error of zero counts as zero: these are
+    the last few floats on either side of a toggle, where the rate has no correct digit.
     """
     if constant == 0.0:
         return Root(part)
@@ -78,7 +77,7 @@ def reach(constant: float, part: float, square: float) -> Root:
 
 
 def root_of(total: float, size: float) -> Root:
-    """Return the root as `reach` does, of a sum whose terms are of a size."""
+    """Return the root as `reach` does, of a sum; ``size`` is the sum of its absolute terms."""
     rounding = ROUNDING * size
     if total > rounding:
         return Root(sqrt(total))
@@ -89,9 +88,9 @@ def root_of(total: float, size: float) -> Root:
 
 def passes_zero(part: float, half_angle: float) -> bool:
     """
-    Return whether the sine or cosine of a half angle is zero but for the rounding of the angle.
+    Return whether the sine or cosine of a half angle is zero up to the rounding of the angle.
 
-    An angle is rounded at its own size, and π is no double: at the double next to it the cosine of
+    An angle is rounded at its own size, and π is not a double: at the nearest double the cosine of
     the half angle is 6e-17.
     """
     size = abs(half_angle)

@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""Whether a loop closes, as an answer and not as an exception."""
+"""Whether a loop closes, as a result and not as an exception."""
 
 from __future__ import annotations
 
@@ -22,16 +21,16 @@ from enum import Enum
 
 class Status(Enum):
     """
-    What was found at one state of the inputs, from the best answer to the worst.
+    The result at one state of the inputs, from the best to the worst.
 
-    The status of a linkage is the worst of its dyads.
+    The status of a linkage is the worst status of its dyads.
 
     Attributes
     ----------
     has_pose
         Whether positions are valid.
     has_rates
-        Whether velocities and accelerations are valid, too.
+        Whether velocities and accelerations are valid too.
 
     """
 
@@ -40,22 +39,22 @@ class Status(Enum):
 
     CHANGE_POINT = 'change point'
     """
-    All links of a loop lie in one line, and its two assemblies meet.
+    All links of a loop are collinear, and its two assemblies meet.
 
-    Position and rates are valid: they are those of the motion that passes through.
+    Position and rates are valid: those of the motion that passes through.
     """
 
     LIMITED = 'limited'
-    """The loop closes with valid rates, but a joint is beyond the limits that the file names."""
+    """The loop closes with valid rates, but a joint is beyond its limits in the file."""
 
     TOGGLE = 'toggle'
     """The dyad is stretched or folded: the position is valid, its rate is not."""
 
     OPEN = 'open'
-    """The links do not reach each other; they miss by the gap."""
+    """The links do not reach each other; the gap is their distance."""
 
     INDETERMINATE = 'indeterminate'
-    """Two pins coincide, and with them every direction is a solution: no pose can be told."""
+    """Two pins coincide, so that every direction is a solution: the pose is undefined."""
 
     has_pose: bool
     has_rates: bool

@@ -14,12 +14,12 @@
 
 
 """
-One step of a solution, and what is handed from step to step.
+The steps of a solution, and the state that they pass on.
 
-A linkage is solved by a sequence of steps. Each starts from the coordinates and pins that are
-known so far and appends its own; velocities and accelerations are found by walking the same
-sequence again, with lists of the same layout. Coordinate 0 is the angle of the ground, always 0;
-the inputs follow, then what the steps append. Lengths are in the unit of the closure's scale.
+A linkage is solved by a sequence of steps. Each step starts from the known coordinates and pins
+and appends its own; velocities and accelerations are computed by the same sequence again, in lists
+of the same layout. Coordinate 0 is the angle of the ground, always 0; the inputs follow, then the
+coordinates that the steps append. Lengths are in the unit of the closure's scale.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from linkage_ros.kinematics.status import Status
 
 class State(NamedTuple):
     """
-    What is known so far; or the rates of it; or the accelerations.
+    The known coordinates and pins; or their rates; or their accelerations.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class State(NamedTuple):
 
 
 class Pose(Protocol):
-    """What a step found, and what its own rates start from."""
+    """The result of a step, from which its rates are computed."""
 
     @property
     def status(self) -> Status:
@@ -55,7 +55,7 @@ class Pose(Protocol):
 
     @property
     def gap(self) -> float:
-        """Return what it misses by where it does not close, else 0, in the unit of the lengths."""
+        """Return the closure error, or 0 if the step closes, in the unit of the lengths."""
 
 
 class Placed(NamedTuple):
@@ -69,13 +69,13 @@ PLACED = Placed()
 
 
 class Step(Protocol):
-    """A part of a linkage that follows from what is known before it."""
+    """A part of a linkage that is solved from the coordinates and pins before it."""
 
     def close(self, known: State, /) -> Pose:
-        """Append to what is known, or return a status that says why there is nothing."""
+        """Append to the known state; if that is impossible, return a status that says why."""
 
     def rates(self, pose: Any, known: State, speeds: State, /) -> Any:
-        """Append to the speeds; return what `accelerations` starts from."""
+        """Append to the rates; return the intermediate values that `accelerations` needs."""
 
     def accelerations(
         self, pose: Any, rates: Any, known: State, speeds: State, changes: State, /

@@ -13,11 +13,12 @@
 # limitations under the License.
 
 """
-A linkage as bodies and joints, and the Assur groups in which it is solved.
+The bodies and joints of a linkage, and the Assur groups in which it is solved.
 
-Inputs and dyads are found one after the other, from what is known outwards: a dyad is two links,
-joined to each other, and each to what is known. What is left when no dyad can be found and has
-as many unknowns as constraints is solved by iteration.
+Links that driven joints hold together are one body, whose shape the inputs determine. Two bodies
+that are joined to each other, and each to the known part, are a dyad (an Assur group of class II):
+both become known, and so on outwards from the ground. Where no dyad is left, the smallest set of
+bodies with as many unknowns as constraints is solved by iteration.
 """
 
 from __future__ import annotations
@@ -29,16 +30,14 @@ from itertools import combinations
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics.linkage import GROUND, Linkage, Point
 
-# A linkage as bodies and joints, in the groups and the order in which they are solved.
-
 
 @dataclass(frozen=True, slots=True)
 class Joint:
     """
     A pin ('R') or slider ('P') between two links.
 
-    ``name`` is that of the point or of the slider; ``link`` belongs to the group, ``to`` is the
-    link that it is joined to.
+    ``name`` is the name of the point or of the slider; ``link`` belongs to the group, ``to`` is
+    the link that it is joined to.
     """
 
     kind: str
@@ -49,7 +48,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Driven:
-    """An input that places ``joint.link`` once ``joint.to`` is known; ``index`` numbers it."""
+    """An input that places ``joint.link`` once ``joint.to`` is known; ``index`` is its number."""
 
     joint: Joint
     index: int
@@ -58,16 +57,17 @@ class Driven:
 @dataclass(frozen=True, slots=True)
 class Dyad:
     """
-    Two bodies joined to each other, and each to what is known.
+    Two bodies joined to each other, and each to the known part.
 
     Attributes
     ----------
     kind
-        RRR, RRP, RPR, PRP or RPP: the first body's outer joint, the inner one, the second's outer.
+        RRR, RRP, RPR, PRP or RPP: outer joint of the first body, inner joint, outer joint of the
+        second body.
     bodies
-        The links of each body; more than one where driven joints hold them together.
+        The links of each body; several if driven joints hold them together.
     outer
-        Joint of each body to what is known.
+        Joint of each body to the known part.
     inner
         Joint from the first body to the second.
 
@@ -81,7 +81,7 @@ class Dyad:
 
 @dataclass(frozen=True, slots=True)
 class Iterated:
-    """Links that no dyad covers; their joints are all those among them and to what is known."""
+    """Links that no dyad covers; their joints are those among them and to the known part."""
 
     links: tuple[str, ...]
 
@@ -97,11 +97,11 @@ class Structure:
     Attributes
     ----------
     links
-        The links and their points; a pin in a slot has a block of its own.
+        The links and their points; a pin in a slot has an additional block.
     blocks
         For each slider the link that slides.
     groups
-        In the order in which they are solved.
+        The groups in the order in which they are solved.
     joints
         All joints; a pin of three links is two.
 
@@ -114,32 +114,34 @@ class Structure:
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom, by Grübler's count, before the inputs take theirs."""
+        """Degrees of freedom by Grübler's count, with the inputs free."""
         return 3 * (len(self.links) - 1) - 2 * len(self.joints)
 
     def joints_of(self, group: Iterated) -> tuple[Joint, ...]:
         """
-        Return the joints that hold a group: among its links, and to what is known before it.
+        Return the joints that hold a group: among its links, and to the links known before it.
 
-        Each is told from a link of the group; what hangs on the group is known only later.
+        ``link`` of each joint belongs to the group. Joints to links solved later are left out.
         """
         known = {GROUND}
         for before in self.groups[: self.groups.index(group)]:
             known |= links_of(before)
-        found: list[Joint] = []
+        joints: list[Joint] = []
         pins: set[str] = set()
         for joint in self.joints:
             if joint.kind == 'P':
                 ends = {joint.link, joint.to}
                 if ends & set(group.links) and ends <= known | set(group.links):
-                    found.append(joint)
+                    joints.append(joint)
             elif joint.name not in pins:
                 pins.add(joint.name)
                 carriers = [link for link, points in self.links.items() if joint.name in points]
-                own = [link for link in carriers if link in group.links]
-                base = [*(link for link in carriers if link in known), *own]
-                found += [Joint('R', joint.name, link, base[0]) for link in own if link != base[0]]
-        return tuple(found)
+                held = [link for link in carriers if link in group.links]
+                base = [*(link for link in carriers if link in known), *held]
+                joints += [
+                    Joint('R', joint.name, link, base[0]) for link in held if link != base[0]
+                ]
+        return tuple(joints)
 
 
 def links_of(group: Group) -> set[str]:
@@ -151,18 +153,11 @@ def links_of(group: Group) -> set[str]:
     return set(group.links)
 
 
-# The sequence in which a linkage is solved, found from which link is joined to which.
-#
-# Links that driven joints hold together are one body whose shape the inputs know. What is joined
-# to the known part by its own joint, and with another such body by one more, is a dyad (an Assur
-# group of class II): both become known, and so on. Where no dyad is left, the smallest set of
-# bodies with as many unknowns as constraints is solved by iteration.
-
 _BLOCK = 'block of '
-"""With the name of a slider, that of the block which a pin in a slot stands for."""
+"""Prefix of the name of a slider: the block of a pin in a slot."""
 
 _LARGEST_GROUP = 8
-"""Bodies of a group that is searched for by trial; a larger one is solved as a whole."""
+"""Most bodies of a group that is searched for by trial; a larger group is solved as a whole."""
 
 
 def assur_groups(linkage: Linkage) -> Structure:
@@ -172,7 +167,7 @@ def assur_groups(linkage: Linkage) -> Structure:
     Raises
     ------
     DefinitionError
-        Where a link is free, held twice over, or joined to nothing that leads to the ground.
+        If a link is free, over-constrained, or not joined to the ground.
 
     """
     links: dict[str, Mapping[str, Point]] = dict(linkage.links)
@@ -231,7 +226,7 @@ def _check_connected(
 
 
 class _Search:
-    """The search for the next group, with what is known so far."""
+    """The search for the next group, given the known links."""
 
     def __init__(
         self,
@@ -250,7 +245,7 @@ class _Search:
         self._bodies = self._merged()
 
     def groups(self) -> Iterator[Group]:
-        """Return group after group until all is known."""
+        """Yield group after group until all links are known."""
         yield from self._learn((GROUND,))
         while unknown := [body for body in self._bodies if body[0] not in self._rank]:
             dyad = self._next_dyad(unknown)
@@ -274,7 +269,7 @@ class _Search:
         return Joint('R', pin, given.child, given.parent)
 
     def _merged(self) -> list[tuple[str, ...]]:
-        """Return the links, those that driven joints hold together as one."""
+        """Return the bodies; links that driven joints hold together are one."""
         body_of: dict[str, tuple[str, ...]] = {link: (link,) for link in self._links}
         for index, drive in enumerate(self._drives):
             one, other = body_of[drive.link], body_of[drive.to]
@@ -290,7 +285,7 @@ class _Search:
         return sorted(set(body_of.values()), key=lambda body: self._order[body[0]])
 
     def _learn(self, body: tuple[str, ...], first: str = GROUND) -> Iterator[Driven]:
-        """Take a body, from its first known link on, by its driven joints."""
+        """Mark the links of a body as known, by its driven joints from the first known one."""
         self._rank.setdefault(first, len(self._rank))
         body = next(known for known in self._bodies if first in known)
         learnt = True
@@ -306,22 +301,22 @@ class _Search:
                     learnt = True
 
     def _outer(self, body: tuple[str, ...]) -> list[Joint]:
-        """Return the joints of a body to what is known."""
+        """Return the joints of a body to the known part."""
         pins: dict[str, Joint] = {}
         for link in body:
             for point in self._links[link]:
                 carriers = [k for k in self._rank if point in self._links[k]]
                 if carriers:
                     pins.setdefault(point, Joint('R', point, link, carriers[0]))
-        found = list(pins.values())
+        joints = list(pins.values())
         for joint in self._sliders.values():
             for one, other in ((joint.link, joint.to), (joint.to, joint.link)):
                 if one in body and other in self._rank:
-                    found.append(Joint('P', joint.name, one, other))
-        return found
+                    joints.append(Joint('P', joint.name, one, other))
+        return joints
 
     def _inner(self, one: tuple[str, ...], other: tuple[str, ...]) -> list[Joint]:
-        """Return the joints between two bodies, but for pins that are known already."""
+        """Return the joints between two bodies, without pins that are known already."""
         known = {point for link in self._rank for point in self._links[link]}
         pins: dict[str, Joint] = {}
         for link in one:
@@ -329,13 +324,13 @@ class _Search:
                 for point in self._links[link]:
                     if point in self._links[to] and point not in known:
                         pins.setdefault(point, Joint('R', point, link, to))
-        found = list(pins.values())
+        joints = list(pins.values())
         for joint in self._sliders.values():
             if joint.link in one and joint.to in other:
-                found.append(Joint('P', joint.name, joint.link, joint.to))
+                joints.append(Joint('P', joint.name, joint.link, joint.to))
             if joint.link in other and joint.to in one:
-                found.append(Joint('P', joint.name, joint.to, joint.link))
-        return found
+                joints.append(Joint('P', joint.name, joint.to, joint.link))
+        return joints
 
     def _next_dyad(self, unknown: list[tuple[str, ...]]) -> Dyad | None:
         outer = {body: self._outer(body) for body in unknown}
@@ -368,7 +363,7 @@ class _Search:
         outer: tuple[Joint, Joint],
         inner: Joint,
     ) -> Dyad | None:
-        """Return a dyad with its bodies in order, or nothing where it takes an iteration."""
+        """Return a dyad with its bodies in order, or None if it needs iteration."""
         kind = outer[0].kind + inner.kind + outer[1].kind
         composite = len(bodies[0]) > 1 or len(bodies[1]) > 1
         if kind == 'PPP':
@@ -386,7 +381,7 @@ class _Search:
             # The body with the pin comes first.
             turn = outer[0].kind == 'P'
         else:
-            # The body on the link that is known later comes first, so that of the ground last.
+            # The body on the link that is known later comes first, so that on the ground last.
             ranks = [self._rank[joint.to] for joint in outer]
             turn = ranks[0] < ranks[1]
         if turn:
@@ -440,7 +435,7 @@ class _Search:
         constrained: Mapping[tuple[str, ...], int],
         between: Mapping[frozenset[tuple[str, ...]], list[Joint]],
     ) -> int:
-        """Count the degrees of freedom of bodies on what is known; a pin of three counts twice."""
+        """Count the degrees of freedom of bodies; a pin of three links counts twice."""
         joints = sum(constrained[body] for body in bodies)
         pins: dict[str, set[tuple[str, ...]]] = {}
         for one, other in combinations(bodies, 2):
@@ -454,12 +449,12 @@ class _Search:
 
 
 def _firsts(dyad: Dyad) -> tuple[str, str]:
-    """Return the link of each body that the dyad's outer joint holds."""
+    """Return the link of each body that has the dyad's outer joint."""
     return dyad.outer[0].link, dyad.outer[1].link
 
 
 def _key(body: tuple[str, ...], linkage: Linkage) -> str:
-    """Return the key by which the user has named a body: a link, or the slider of a slot."""
+    """Return the key of a body in the linkage file: a link, or the slider of a slot."""
     for link in body:
         if link in linkage.links:
             return f'links.{link}'

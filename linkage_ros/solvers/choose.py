@@ -12,21 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-The cheapest solver that proves an accuracy of the published positions, by a short timing here.
+The cheapest solver that is proven to reach an accuracy of positions, by a short timing.
 
-The closed form always qualifies: it is off by a few times what the rounding of the lengths alone
-makes of the answer. A table qualifies by its `proof`. Newton's method qualifies where the loops
-are those of one RRR dyad: after a last correction δ the angles are off by less than::
+The closed form always qualifies: its error is a few times the one that rounding the lengths alone
+causes. A table qualifies by `table_proof`. Newton's method qualifies for a single RRR dyad: after
+a last correction δ the error of the angles is less than::
 
     (1 + r)·δ²/(2·sin μ)      r the ratio of the two links, sin μ ≥ `LEAST_SINE`
 
-which is what is left of the second order of the loop (L. V. Kantorovich, 1948). In a chain, errors
-of one dyad grow in the next by what is not known beforehand, so there it is not chosen.
+which bounds the second order of the loop (L. V. Kantorovich, 1948). In a chain, errors of one dyad
+grow in the next by an unknown factor, so Newton's method is not chosen there.
 
-What is faster by less than a tenth is not faster: then the closed form stays. A timing is not
-repeatable, so that a recorded run says what was chosen, and its replay does not choose again.
+A solver must be faster by a tenth to replace the closed form. A timing is not repeatable: a
+recording stores the choice, and its replay does not choose again.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ from linkage_ros.solvers.solver import Choice, Solver
 from linkage_ros.solvers.table import TableClosure
 
 _LONGEST = 0.1
-"""Of the timing of one solver, in [s]."""
+"""Longest timing of one solver, in [s]."""
 
 _STATES = 32
 _ROUNDS = 25
@@ -56,25 +55,25 @@ _NAMES = {'closed_form': 'closed form', 'newton': "Newton's method", 'table': 't
 
 def choose(linkage: Linkage, accuracy: float) -> Closure:
     """
-    Return the closure that takes the least time of those that prove an accuracy.
+    Return the fastest closure of those that are proven to reach an accuracy.
 
     Parameters
     ----------
     linkage
         The linkage.
     accuracy
-        Of the published positions, in [rad] or [m].
+        Accuracy of the published positions, in [rad] or [m].
 
     """
     closed = Solver(Closure(linkage))
     able: dict[str, Solver] = {'closed_form': closed}
     against = {}
     for name, build in (('table', TableClosure), ('newton', _newton)):
-        found = _attempt(build, linkage, accuracy)
-        if isinstance(found, Solver):
-            able[name] = found
+        attempt = _attempt(build, linkage, accuracy)
+        if isinstance(attempt, Solver):
+            able[name] = attempt
         else:
-            against[name] = found
+            against[name] = attempt
     times = _times(closed, able)
     fastest = min(times, key=lambda name: times[name])
     if times[fastest] > _FASTER * times['closed_form']:
@@ -93,7 +92,7 @@ def choose(linkage: Linkage, accuracy: float) -> Closure:
 def _attempt(
     build: Callable[[Linkage, float], Solver], linkage: Linkage, accuracy: float
 ) -> Solver | str:
-    """Return a solver that proves an accuracy, or why there is none."""
+    """Return a solver that is proven to reach an accuracy, or the reason why there is none."""
     try:
         return build(linkage, accuracy)
     except DefinitionError as error:
@@ -101,16 +100,16 @@ def _attempt(
 
 
 def only_closed_form(linkage: Linkage, why: str) -> Closure:
-    """Return the closed form where nothing else would do, with the reason."""
+    """Return the closed form if no other solver is possible, with the reason."""
     closed = Solver(Closure(linkage))
     closed.choice = Choice('closed_form', {}, f'closed form: {why}')
     return closed
 
 
 def _newton(linkage: Linkage, accuracy: float) -> NewtonClosure:
-    """Return Newton's method with a tolerance that proves an accuracy; refuse where none does."""
-    found = NewtonClosure(linkage, accuracy)
-    groups = [g for g in found.structure.groups if isinstance(g, Dyad | Iterated)]
+    """Return Newton's method with a tolerance that proves an accuracy, or refuse."""
+    newton = NewtonClosure(linkage, accuracy)
+    groups = [g for g in newton.structure.groups if isinstance(g, Dyad | Iterated)]
     if len(groups) > 1 or not isinstance(groups[0], Dyad) or groups[0].kind != 'RRR':
         raise DefinitionError('accuracy', 'proven for one RRR dyad only', '')
     dyad = groups[0]
@@ -118,31 +117,31 @@ def _newton(linkage: Linkage, accuracy: float) -> NewtonClosure:
         raise DefinitionError('accuracy', 'not proven for links that change their length', '')
     lengths = []
     for link, outer in zip((dyad.inner.link, dyad.inner.to), dyad.outer, strict=True):
-        points = found.structure.links[link]
+        points = newton.structure.links[link]
         lengths.append(abs(complex(*points[dyad.inner.name]) - complex(*points[outer.name])))
     ratio = max(lengths) / min(lengths)
     if 2.0 * (1.0 + ratio) * accuracy > LEAST_SINE:
         raise DefinitionError('accuracy', 'not proven for so little of it', '')
-    return found
+    return newton
 
 
-def _proven(found: Solver) -> str:
-    if not isinstance(found, TableClosure):
+def _proven(solver: Solver) -> str:
+    if not isinstance(solver, TableClosure):
         return ''
-    return f' of {found.knots} knots, proven to {found.proven:.2g}'
+    return f' of {solver.knots} knots, proven to {solver.proven:.2g}'
 
 
 def _times(closed: Closure, able: dict[str, Solver]) -> dict[str, float]:
-    """Return the median time of a state, of each in [s], all in turn."""
+    """Return the median time of a state of each solver, in [s]; the solvers take turns."""
     states = _states(closed)
     spent: dict[str, list[float]] = {name: [] for name in able}
-    # As a tick closes the loops.
+    # Call each solver as a tick does.
     ways = {
-        name: found.compiled(0).fast if found.by_steps else found.position
-        for name, found in able.items()
+        name: solver.compiled(0).fast if solver.by_steps else solver.position
+        for name, solver in able.items()
     }
     for way in ways.values():
-        _time(way, states)  # what is worked out once is not timed
+        _time(way, states)  # work that is done only once is not timed
     for _ in range(_ROUNDS):
         for name, way in ways.items():
             if sum(spent[name]) * len(states) < _LONGEST:

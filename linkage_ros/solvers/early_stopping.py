@@ -12,8 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
-"""Links that no dyad covers, iterated to a tolerance from the curve of `Iteration`."""
+"""Newton's method on links that no dyad covers, stopped at a tolerance."""
 
 from __future__ import annotations
 
@@ -26,7 +25,7 @@ import numpy as np
 
 _STEPS = 8
 _SINGULAR = 1e-6
-"""Conditioning below which the links are iterated to the end."""
+"""Conditioning below which the method runs to full accuracy."""
 
 
 class _EarlyStopping(Iteration):
@@ -38,7 +37,7 @@ class _EarlyStopping(Iteration):
         self._tolerance = tolerance
 
     def close(self, known: State) -> IteratedPose:
-        """Append as `Iteration.close`; where the first steps do not contract, it does."""
+        """Append as `Iteration.close`, which is called if the first steps do not contract."""
         end = 1 + len(self._inputs)
         inputs = known.coordinates[1:end]
         start = self._start_at(inputs) if len(inputs) == 1 else None
@@ -67,14 +66,14 @@ class _EarlyStopping(Iteration):
 
 def early_stopping(step: Step, tolerance: float) -> Step:
     """
-    Return an iteration that ends where the last correction is below a tolerance.
+    Return an iteration that ends when the last correction is below a tolerance.
 
     Parameters
     ----------
     step
-        An `Iteration`, with which its branch is shared.
+        An `Iteration`; both share its branch.
     tolerance
-        In [rad], and in the unit of the lengths.
+        Bound of the last correction, in [rad] and in the unit of the lengths.
 
     """
     return _EarlyStopping(cast('Iteration', step), tolerance)

@@ -12,17 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The loop equations of a linkage, as polygons of vectors.
 
-A point of a link is walked to from the ground, or from a pin that is known, along arms and slides;
-two ways to one place are a loop. With the coordinates x of a closure every vector of it is::
+A point of a link is reached from the ground, or from a known pin, along arms and slides; two ways
+to one place form a loop. With the coordinates x of a closure, each vector of a loop is::
 
     c·e^{iφ}·s        φ = Σ ±x_j        s = 1, or the slide x_k
 
-and an equation says that the vectors of a loop come to 0. Each group of links, a dyad or links
-that are iterated, has as many of these as determine what it appends to the coordinates.
+and the vectors of a loop add up to 0. Each group, a dyad or links that are iterated, has as many
+of these equations as determine the coordinates that it appends.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from linkage_ros.kinematics.linkage import GROUND, Linkage
 from linkage_ros.kinematics.topology import Driven, Dyad, Iterated, Joint, Structure
 
 Turns = tuple[tuple[int, float], ...]
-"""Coordinates and their signs, which add up to an angle."""
+"""Coordinates and their signs, whose sum is an angle."""
 
 
 class Vector(NamedTuple):
@@ -46,11 +45,11 @@ class Vector(NamedTuple):
     factor
         c, in the unit of the closure's lengths.
     turns
-        Of φ.
+        Terms of φ.
     slide
-        Number of the coordinate s; −1 for 1.
+        Index of the coordinate s; −1 for 1.
     pin
-        Number of a pin whose place stands for e^{iφ}·s; −1 for none.
+        Index of a pin whose place replaces e^{iφ}·s; −1 for none.
 
     """
 
@@ -61,7 +60,7 @@ class Vector(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """An angle that a group keeps: Σ ±x_j + constant = 0, but for whole turns if it turns."""
+    """A constraint Σ ±x_j + constant = 0 of a group; modulo a turn if ``turning``."""
 
     terms: Turns
     constant: float
@@ -70,16 +69,16 @@ class Balance(NamedTuple):
 
 class Loops(NamedTuple):
     """
-    What a group of links is solved by.
+    The equations of a group of links.
 
     Attributes
     ----------
     coordinates, pins
-        Numbers of what it appends.
+        Indices of those that it appends.
     equations
-        Each a sum of vectors that is 0.
+        Sums of vectors, each equal to 0.
     balances
-        Angles and slides that it keeps; a dyad has none.
+        Constraints on angles and slides; a dyad has none.
 
     """
 
@@ -100,7 +99,7 @@ class LoopFinder:
     structure
         Its groups.
     known
-        All its links, as a closure knows them.
+        All its links, from a closure.
 
     """
 
@@ -115,7 +114,7 @@ class LoopFinder:
                 self._note_turned(group.joint, 1 + group.index)
 
     def find(self) -> list[Loops]:
-        """Return the loops of every group but those that are driven, in the order of solution."""
+        """Return the loops of every group that is not driven, in the order of solution."""
         return [
             self._dyad(group) if isinstance(group, Dyad) else self._iterated(group)
             for group in self._structure.groups
@@ -123,7 +122,7 @@ class LoopFinder:
         ]
 
     def turns(self, coordinate: int) -> Turns:
-        """Return a coordinate as a sum of those that are inputs or belong to a group."""
+        """Return a coordinate as a sum of inputs and coordinates of groups."""
         if not coordinate:
             return ()
         if coordinate not in self._turned:
@@ -132,7 +131,7 @@ class LoopFinder:
         return (*self.turns(arm), turn)
 
     def difference(self, one: int, other: int) -> Turns:
-        """Return one coordinate less another as `turns` does."""
+        """Return the difference of two coordinates as `turns` does."""
         return (*self.turns(one), *((k, -sign) for k, sign in self.turns(other)))
 
     def _note_turned(self, joint: Joint, index: int) -> None:
@@ -148,7 +147,7 @@ class LoopFinder:
             for joint in (dyad.inner, *dyad.outer)
             if joint.kind == 'P'
         ]
-        # Of RPR both links have one angle; of PRP and RPP they turn with what carries them.
+        # In RPR both links have one angle; in PRP and RPP they turn with the links they slide on.
         angles = [self._known.angles[joint.link].coordinate for joint in dyad.outer]
         angles = angles[: 2 - len(slides)]
         return Loops(tuple(sorted(angles + slides)), (), (self._equation(dyad.inner),))
@@ -191,7 +190,7 @@ class LoopFinder:
         slider, slide = self._sliders[joint.name], self._known.slides[joint.name]
         direction = complex(*slider.direction)
         direction /= abs(direction)
-        # The joint of a dyad may be told from either end.
+        # The joint of a dyad may be given from either end.
         block, rail = self._known.blocks[joint.name], slider.along
         line = self._known.angles[rail]
         start = points[rail][slider.through] + slide.constant * direction
@@ -223,7 +222,7 @@ def _negative(vectors: list[Vector]) -> list[Vector]:
 
 
 def _merged(vectors: list[Vector]) -> tuple[Vector, ...]:
-    """Add up what turns and slides alike."""
+    """Add up the vectors with the same angle and slide."""
     sums: dict[tuple[Turns, int, int], complex] = {}
     for factor, turns, slide, pin in vectors:
         key = (tuple(sorted(turns)), slide, pin)

@@ -12,28 +12,27 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-Newton's method on the loops of each dyad in turn, in the place of their closed form.
+Newton's method on the loop of each dyad, instead of the closed form.
 
 A dyad's two unknowns p and q, angles or slides, close one loop of vectors, F(p, q) = 0, which is
 two real equations. With × for the z component of the cross product::
 
     F_p·δp + F_q·δq = −F      δp = F_q × F/(F_p × F_q)      δq = F × F_p/(F_p × F_q)
 
-until both corrections are below the tolerance, in [rad] or [m]: the error that is left is of the
-size of their square. Rates and accelerations solve the same equations for the change of F while p
-and q, or their rates, are held. F_p × F_q is 0 where the dyad folds or stretches, and its sign is
-that of the assembly. The closed form gives the state where the sign is not the one that the closed
-form has nearby (near a toggle or a change point), where the method does not converge, and where
+until both corrections are below the tolerance, in [rad] or [m]; the remaining error has the size
+of their square. Rates and accelerations solve the same equations for the change of F while p and
+q, or their rates, are held. F_p × F_q is 0 where the dyad folds or stretches, and its sign is that
+of the assembly. The closed form gives the state instead where the sign differs from that of the
+closed form nearby (near a toggle or a change point), where the method does not converge, and where
 the loops do not close. Groups that no dyad covers are iterated in any case, here to the tolerance.
 
-The method starts from the closed form at a knot, carried forward by the rates there. Knots lie 256
-to a turn of an input, or to the unit of length, and a state takes the nearest. A knot counts only
-if the loops close there and at its neighbours in the same assembly, so that no change point lies
-between a state and its knot. Knots are computed when they are asked for and depend on nothing
-else, so a state depends on the inputs alone. The method may also start from its last state
-(``warm``); then a state depends, within the tolerance, on those before it.
+The method starts from the closed form at a knot, extrapolated by the rates there. An input has 256
+knots to a turn, or to the unit of length, and a state uses the nearest. A knot is valid only if
+the loops close there and at its neighbours in the same assembly, so that no change point lies
+between a state and its knot. Knots are computed on demand and depend on nothing else, so a state
+depends on the inputs alone. The method may also start from its last state (``warm``); then a state
+depends, within the tolerance, on the states before it.
 """
 
 from __future__ import annotations
@@ -64,7 +63,7 @@ if TYPE_CHECKING:
 
 _PER_TURN = 256
 _MOST = 2**16
-"""Knots that are kept; beyond it they are worked out again."""
+"""Number of knots that are kept; beyond it they are computed again."""
 
 
 class Knot(NamedTuple):
@@ -74,13 +73,13 @@ class Knot(NamedTuple):
     Attributes
     ----------
     inputs
-        As coordinates.
+        Values of the inputs, as coordinates.
     coordinates
-        All of them.
+        All coordinates.
     slopes
         For each input the derivatives of all coordinates.
     signs
-        For each dyad its assembly: +1 or −1.
+        Assembly of each dyad: +1 or −1.
 
     """
 
@@ -99,9 +98,9 @@ class Knots:
     closed
         The linkage in closed form.
     orientations
-        Returns for given coordinates of a closed position how each dyad is oriented: a sign.
+        Returns the orientation (a sign) of each dyad at the coordinates of a closed position.
     repeats
-        Whether everything is the same again after two turns of an input.
+        Whether everything repeats after two turns of an input.
 
     """
 
@@ -124,7 +123,7 @@ class Knots:
         self._signs: dict[tuple[int, ...], tuple[float, ...] | None] = {}
 
     def near(self, inputs: Sequence[float]) -> tuple[Knot | None, list[float]]:
-        """Return the knot nearest to some inputs, given as coordinates, and how far these are."""
+        """Return the knot nearest to inputs, given as coordinates, and their offsets from it."""
         numbers, offsets = [], []
         for value, spacing, period in zip(inputs, self._spacing, self._period, strict=True):
             number = round(value / spacing)
@@ -163,7 +162,7 @@ class Knots:
         return Knot(tuple(coordinates[1:][:count]), coordinates, tuple(slopes), signs)
 
     def _signs_at(self, key: tuple[int, ...]) -> tuple[float, ...] | None:
-        """Return the assembly of each dyad, or nothing where a loop is not closed."""
+        """Return the assembly of each dyad, or None if a loop is not closed."""
         if key not in self._signs:
             position = self._closed.position(*self._given(key))
             closed = position.status in (Status.CLOSED, Status.LIMITED)
@@ -178,7 +177,7 @@ class Knots:
 
 
 _STEPS = 12
-"""Of Newton's method; a cold start takes up to ten."""
+"""Largest number of Newton steps; a cold start takes up to ten."""
 
 LEAST_SINE = 0.05
 """Sine of the angle between F_p and F_q below which the dyad is too near to folding."""
@@ -188,16 +187,16 @@ _ROUNDING = 16.0 * UNIT_ROUNDOFF
 
 class NewtonDyad:
     """
-    A dyad.
+    Newton's method on one dyad.
 
     Parameters
     ----------
     loops
         Its loop.
     tolerance
-        What corrections of an angle are below at the end, in [rad].
+        Bound of the last correction of an angle, in [rad].
     slide_tolerance
-        Likewise of a slide, in the unit of the lengths.
+        Bound of the last correction of a slide, in the unit of the lengths.
 
     """
 
@@ -228,16 +227,16 @@ class NewtonDyad:
 
     def close(self, x: list[float], pins: list[complex], p: float, q: float, sign: float) -> bool:
         """
-        Append p and q to the coordinates, or say that there is nothing that could be.
+        Append p and q to the coordinates, or return False if there is no solution.
 
         Parameters
         ----------
         x, pins
-            What is known; of pins what iterations have placed.
+            Known coordinates, and the pins that iterations have placed.
         p, q
-            Where to start.
+            The start.
         sign
-            Of F_p × F_q.
+            Required sign of F_p × F_q.
 
         """
         known = self._constant
@@ -295,7 +294,7 @@ class NewtonDyad:
     def rates(
         self, x: list[float], pins: list[complex], v: list[float], speeds: list[complex]
     ) -> None:
-        """Append the rates of p and q, given those of what is known."""
+        """Append the rates of p and q, given those of the known coordinates."""
         v += (0.0, 0.0)
         drift = 0j
         for factor, arm in self._arms:
@@ -311,7 +310,7 @@ class NewtonDyad:
         a: list[float],
         pulls: list[complex],
     ) -> None:
-        """Append the accelerations of p and q, given those of what is known."""
+        """Append the accelerations of p and q, given those of the known coordinates."""
         a += (0.0, 0.0)
         drift = 0j
         for factor, arm in self._arms:
@@ -329,17 +328,17 @@ class NewtonDyad:
     def _slopes(self, x: list[float]) -> tuple[complex, complex]:
         """Return F_p and F_q."""
         first = self._first
-        found = [0j, 0j]
+        slopes = [0j, 0j]
         for factor, turns, slide, _ in self._new:
             unit = factor * rect(1.0, sum([sign * x[k] for k, sign in turns]))
             if slide >= first:
-                found[slide - first] += unit
+                slopes[slide - first] += unit
             if slide >= 0:
                 unit *= x[slide]
             for k, sign in turns:
                 if k >= first:
-                    found[k - first] += sign * 1j * unit
-        return found[0], found[1]
+                    slopes[k - first] += sign * 1j * unit
+        return slopes[0], slopes[1]
 
 
 def _value(vector: Vector, x: list[float], pins: list[complex]) -> complex:
@@ -381,7 +380,7 @@ def _acceleration(
 
 
 PLACING = (FixedPoint, PointOnLink, PointOnRail)
-"""Steps that place a pin and find no coordinate."""
+"""Steps that place a pin and add no coordinate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -405,7 +404,7 @@ _CLOSED = Status.CLOSED
 
 
 class _Found(list[Any]):
-    """Poses of a state that Newton's method has found: of steps that are not its own."""
+    """Poses of a state that Newton's method solved, one for each step that is not a dyad."""
 
 
 _NO_POSES = _Found()
@@ -420,15 +419,15 @@ class NewtonClosure(Solver):
     linkage
         The linkage.
     tolerance
-        What the last corrections are below, in [rad] or [m].
+        Bound of the last corrections, in [rad] or [m].
     warm
-        Where to start: from the last state; if false, from the pose of the file each time; if not
-        said, from the nearest knot, so that a state depends on its inputs alone.
+        True: start from the last state. False: start from the pose of the file each time. None:
+        start from the nearest knot, so that a state depends on its inputs alone.
 
     Attributes
     ----------
     exact_states
-        How many states were left to the closed form so far.
+        Number of states that the closed form has solved so far.
 
     """
 
@@ -502,7 +501,7 @@ class NewtonClosure(Solver):
         position
             A closed position.
         *rates
-            Of the driven joints, in [rad/s] or [m/s].
+            Rates of the driven joints, in [rad/s] or [m/s].
 
         """
         state, poses = position.state, position.poses
@@ -514,13 +513,13 @@ class NewtonClosure(Solver):
         x, pins = state
         speeds = State(v, [])
         others = iter(poses)
-        found = []
+        part_rates = []
         for part in self._plan:
             if isinstance(part, NewtonDyad):
                 part.rates(x, pins, v, speeds.pins)
             else:
-                found.append(part.rates(next(others, PLACED), state, speeds))
-        return Velocity(self._joints(v), speeds, found, self)
+                part_rates.append(part.rates(next(others, PLACED), state, speeds))
+        return Velocity(self._joints(v), speeds, part_rates, self)
 
     def acceleration(
         self, position: Position, velocity: Velocity, *accelerations: float
@@ -531,9 +530,9 @@ class NewtonClosure(Solver):
         Parameters
         ----------
         position, velocity
-            As this closure has found them.
+            Results of this closure.
         *accelerations
-            Of the driven joints, in [rad/s²] or [m/s²].
+            Accelerations of the driven joints, in [rad/s²] or [m/s²].
 
         """
         state, poses = position.state, position.poses
@@ -554,7 +553,7 @@ class NewtonClosure(Solver):
         return Acceleration(self._joints(a), changes, self)
 
     def placed(self, position: Position) -> Position:
-        """Return a position that knows angles, slides and pins of all links."""
+        """Return a position with the angles, slides and pins of all links."""
         if not isinstance(position.poses, _Found):
             return position
         if self._iterates:
@@ -566,7 +565,7 @@ class NewtonClosure(Solver):
         return replace(position, state=state)
 
     def _exact(self, inputs: tuple[float, ...]) -> Position:
-        """Return the state in closed form, from which the next one starts."""
+        """Return the state in closed form; with ``warm`` it is the next start."""
         self.exact_states += 1
         position = self.closed.position(*inputs)
         if self._warm and position.status is _CLOSED:
@@ -574,7 +573,7 @@ class NewtonClosure(Solver):
         return position
 
     def _planned(self, tolerance: float) -> tuple[tuple[NewtonDyad | Step, ...], bool]:
-        """Return the dyads and the other steps, in order, and whether something is iterated."""
+        """Return the dyads and other steps, in order, and whether any group is iterated."""
         finder = LoopFinder(self.linkage, self.structure, self._known)
         loops = iter(finder.find())
         groups = self.structure.groups
@@ -582,7 +581,7 @@ class NewtonClosure(Solver):
         plan: list[NewtonDyad | Step] = []
         for step, group in zip(self.steps, self.step_groups, strict=True):
             if isinstance(step, PLACING):
-                # Where nothing is iterated, no loop asks for a pin.
+                # Without an iterated group no loop needs a pin.
                 if iterates:
                     plan.append(step)
             elif isinstance(step, RelativeAngle):

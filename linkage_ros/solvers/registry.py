@@ -12,9 +12,8 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-The solvers that a scene can name; each is imported only where a scene names it.
+The solvers that a scene can name; each is imported only if a scene names it.
 
 A module has ``PARAMETERS``, the type of its parameters (see `linkage_ros.files.parameters`), and
 ``build(parameters, linkage) -> Closure``.
@@ -44,5 +43,5 @@ PARAMETERS = ClosedFormParameters
 
 
 def build(_parameters: ClosedFormParameters, linkage: Linkage) -> Closure:
-    """Build the closed form, which a scene gets too where it names no solver."""
+    """Build the closed form, which is also used if a scene names no solver."""
     return Closure(linkage)

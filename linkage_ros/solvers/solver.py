@@ -12,12 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-A linkage whose loops are closed by another way than the closed form, and all else by that.
+A linkage whose loops are closed by another solver than the closed form.
 
-What a tick asks for, `position`, `velocity` and `acceleration`, comes from the other way; ranges,
-nearness, points and drawings from the closed form at the same inputs.
+The solver gives the results of a tick, `position`, `velocity` and `acceleration`; the closed form
+gives ranges, singularity margins, points and drawings at the same inputs.
 """
 
 from __future__ import annotations
@@ -45,14 +44,14 @@ if TYPE_CHECKING:
 
 class Choice(NamedTuple):
     """
-    What was chosen where a scene asks for an accuracy.
+    The solver chosen for a scene that specifies an accuracy.
 
     Attributes
     ----------
     solver, parameters
-        As the scene could have said them.
+        As the scene could have named them.
     why
-        In words.
+        The reason, in words.
 
     """
 
@@ -63,7 +62,7 @@ class Choice(NamedTuple):
 
 class Solver(Closure):
     """
-    A closure that may close its loops by another way; as it stands, by the closed form.
+    A closure that subclasses solve differently; itself, it uses the closed form.
 
     Parameters
     ----------
@@ -73,14 +72,14 @@ class Solver(Closure):
     Attributes
     ----------
     closed
-        As given.
+        The closed form.
     choice
-        Why it is this one, where the scene has not said.
+        The reason for this solver, if the scene named none.
 
     """
 
     def __init__(self, closed: Closure) -> None:
-        # Not built once more: an iterated linkage is followed through a turn for it.
+        # Not built again: for an iterated linkage that would follow a whole turn.
         vars(self).update(vars(closed))
         self._keep_limits()
         self.closed = closed
@@ -94,7 +93,7 @@ class Solver(Closure):
         derivatives: int = 2,
         out: Batch | None = None,
     ) -> Batch:
-        """Solve many states as `Closure.solve`; another way takes one after the other."""
+        """Solve many states as `Closure.solve`; other solvers solve them one by one."""
         batch = self.closed.solve(
             *inputs, rates=rates, accelerations=accelerations, derivatives=derivatives, out=out
         )
@@ -126,11 +125,11 @@ class Solver(Closure):
         return batch
 
     def exact(self, position: Position) -> Position:
-        """Return what the closed form has at the inputs of a position."""
+        """Return the position of the closed form at the same inputs."""
         return self.closed.position(*position.inputs)
 
     def placed(self, position: Position) -> Position:
-        """Return a position that knows angles, slides and pins of all links."""
+        """Return a position with the angles, slides and pins of all links."""
         return self.exact(position)
 
     def points(self, position: Position) -> dict[tuple[str, str], complex]:
@@ -157,26 +156,26 @@ class Solver(Closure):
 
     @cached_property
     def input_ranges(self) -> tuple[InputRange, ...]:
-        """Where the single input can go, in [rad] or [m]; of several inputs, none."""
+        """Return the ranges of a single input, in [rad] or [m]; none for several inputs."""
         return self.closed.input_ranges
 
     @cached_property
     def singular_inputs(self) -> tuple[SingularInput, ...]:
-        """Where a single input meets toggles and change points; of several inputs, none."""
+        """Return the toggles and change points of a single input; none for several inputs."""
         return self.closed.singular_inputs
 
     @cached_property
     def closing_ranges(self) -> tuple[InputRange, ...]:
-        """Where the single input closes every loop, whatever its limits; of several, none."""
+        """Return where a single input closes every loop, ignoring limits; none for several."""
         return self.closed.closing_ranges
 
     def singularity_margin(self, position: Position) -> SingularityMargin:
-        """Return how near trouble a closed position is."""
+        """Return the singularity margin of a closed position."""
         return self.closed.singularity_margin(self.exact(position))
 
 
 def _rows(values: Any, driven: int, count: int) -> list[list[float]]:
-    """Return for each driven joint its values, one a state; a single one needs no list."""
+    """Return the values of each driven joint, one for each state; a single joint needs no list."""
     import numpy as np  # local import: the batch alone needs it
 
     if driven == 1 and not isinstance(values, list | tuple) and np.ndim(values) < 2:

@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-A table over the range of the single input, interpolated, in the place of the closed form.
+A table over the range of a single input, interpolated, instead of the closed form.
 
-Between two knots that are h apart, a published joint f is taken for a polynomial in t =
+Between two knots at a distance h, a published joint f is approximated by a polynomial in t =
 (x − x_k)/h from 0 to 1: with ``linear`` the chord, with ``hermite`` the cubic that has the closed
 form's values f and derivatives f' at both ends (G. Birkhoff and A. Priver, J. Math. and Phys. 46,
 1967)::
@@ -25,10 +24,10 @@ form's values f and derivatives f' at both ends (G. Birkhoff and A. Priver, J. M
     cubic    |f − p| ≤ h⁴/384·max|f''''|     |f' − p'| ≤ √3·h³/216·max|f''''|
                                              |f'' − p''| ≤ h²/12·max|f''''|
 
-Rates and accelerations are the polynomial's own derivatives: a tolerance is one of the positions.
-`proof` bounds the derivatives over the whole range; so where a tolerance is given and no knots, it
-is met everywhere, or the table is refused. Beyond its range a table knows nothing: there, and at
-the ends, the states are those of the closed form.
+Rates and accelerations are derivatives of the polynomial; the tolerance is that of the positions.
+`table_proof` bounds the derivatives over the whole range; so if a tolerance is given instead of
+knots, it is met everywhere, or the table is refused. Beyond the range of the table, and at its
+ends, the states are those of the closed form.
 """
 
 from __future__ import annotations
@@ -56,14 +55,14 @@ if TYPE_CHECKING:
 
 Order = Literal['linear', 'hermite']
 ORDERS: dict[Order, int] = {'linear': 1, 'hermite': 3}
-"""Degree of the polynomials."""
+"""Degree of the polynomials by order."""
 
 _CLOSED = Status.CLOSED
 _TURN_ROUNDED = 2.4492935982947064e-16
-"""2π less the double `tau`."""
+"""2π minus the double `tau`."""
 
 _FARTHEST = 2.0**40
-"""In [rad]: what turns farther has lost the digits that matter here."""
+"""In [rad]: larger angles have lost the digits that matter here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +90,7 @@ def build(parameters: TableParameters, linkage: Linkage) -> TableClosure:
 
 
 class _Place(NamedTuple):
-    """Where a position lies in a table: its cell's coefficients, what part of it, cells by x."""
+    """A position in the table: coefficients of its cell, fraction of the cell, cells by x."""
 
     coefficients: tuple[float, ...]
     part: float
@@ -99,7 +98,7 @@ class _Place(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """An interval of the table: the number of its first cell, and cells by the unit of input."""
+    """An interval of the table: the index of its first cell, and cells by the unit of input."""
 
     low: float
     high: float
@@ -109,38 +108,37 @@ class _Part(NamedTuple):
 
 class TableClosure(Solver):
     """
-    A linkage whose joints stand in a table.
+    A linkage whose joints are interpolated in a table.
 
     Parameters
     ----------
     linkage
         A linkage of one input.
     tolerance
-        What positions are off by at most, in [rad] or [m]: the knots are as many as prove it.
+        Bound of the error of positions, in [rad] or [m]; the number of knots follows from it.
     knots
-        Or how many cells there are to each range of the input.
+        Alternatively the number of cells in each range of the input.
     order
-        What is between the knots.
+        The interpolation between the knots.
     span
-        The range that the table covers, in [rad] or [m]; all that the input can reach, if not
-        said.
+        The range that the table covers, in [rad] or [m]; by default all that the input can reach.
 
     Attributes
     ----------
     knots
-        How many cells there are to each range.
+        Number of cells in each range.
     memory
-        Of the table, in [bytes].
+        Size of the table, in [bytes].
     build_time
-        How long it took, with the proof, in [s].
+        Time to build it, including the proof, in [s].
     proven, proven_rate
         Bounds of the error of positions, in [rad] or [m], and of their derivatives by the input;
-        infinite where knots were given.
+        infinite if knots were given.
 
     Raises
     ------
     DefinitionError
-        Where there are several inputs; where the tolerance cannot be proven.
+        If there are several inputs, or the tolerance cannot be proven.
 
     """
 
@@ -235,10 +233,11 @@ class TableClosure(Solver):
 
     def residual(self, position: Position) -> float:
         """
-        Return what is left open by a closed position, in [m].
+        Return the closure error of a closed position, in [m].
 
-        A table knows joints and no links. So it is how far its joints are from those of the closed
-        form, for one that turns at the end of the longest link, and what that leaves open.
+        A table has joints but no links. The error is therefore the distance of its joints from
+        those of the closed form (an angle at the length of the longest link), plus the error of
+        the closed form.
         """
         exact = self.exact(position)
         joints = zip(position.joints, exact.joints, self.turning, strict=True)
@@ -264,7 +263,7 @@ class TableClosure(Solver):
         position
             A closed position.
         *rates
-            Of the driven joint, in [rad/s] or [m/s].
+            Rate of the driven joint, in [rad/s] or [m/s].
 
         """
         if position.state.pins is not self._no_pins:
@@ -291,9 +290,9 @@ class TableClosure(Solver):
         Parameters
         ----------
         position, velocity
-            As this closure has found them.
+            Results of this closure.
         *accelerations
-            Of the driven joint, in [rad/s²] or [m/s²].
+            Acceleration of the driven joint, in [rad/s²] or [m/s²].
 
         """
         if position.state.pins is not self._no_pins:
@@ -313,9 +312,9 @@ class TableClosure(Solver):
         return Acceleration(joints, State([0.0, given], self._no_pins), self)
 
     def _elsewhere(self, x: float) -> tuple[_Part | None, float]:
-        """Return the part of the table in which an input lies, if one does, and where in it."""
+        """Return the part of the table that holds an input, or None, and the input within it."""
         if self._period and abs(x) < _FARTHEST:
-            # The true turn is longer than the double by what is taken off here.
+            # The exact turn is longer than the double, which this corrects.
             at = fmod(x, self._period)
             at -= (x - at) / tau * _TURN_ROUNDED
             at += self._period if at < 0.0 else 0.0
@@ -328,7 +327,7 @@ class TableClosure(Solver):
     def _intervals(
         self, span: tuple[float, float] | None
     ) -> tuple[float, list[tuple[float, float]]]:
-        """Return the period, if there is one, and the ranges of the input."""
+        """Return the period, or 0, and the ranges of the input."""
         if span is not None:
             low, high = span
             if not low < high:
@@ -344,13 +343,13 @@ class TableClosure(Solver):
     def _table(self, low: float, high: float) -> NDArray[np.float64]:
         """Return the polynomials, of shape (cells, joints, degree + 1)."""
         x = np.linspace(low, high, self.knots + 1)
-        found = self.closed.solve(x, rates=1.0, derivatives=1)
-        assert found.velocities is not None
+        solved = self.closed.solve(x, rates=1.0, derivatives=1)
+        assert solved.velocities is not None
         h = (high - low) / self.knots
-        f, slopes = found.positions, h * found.velocities
+        f, slopes = solved.positions, h * solved.velocities
         step = np.diff(f, axis=1)
         turning = np.array(self.turning)[:, None]
-        # The closed form knows an angle but for whole turns.
+        # The closed form gives angles modulo a turn.
         expected = np.nan_to_num(0.5 * (slopes[:, 1:] + slopes[:, :-1]))
         step -= np.where(turning, tau * np.round((step - expected) / tau), 0.0)
         table = np.empty((self.knots, len(f), self._degree + 1))
@@ -358,7 +357,7 @@ class TableClosure(Solver):
         if self._degree == 1:
             table[:, :, 1] = step.T
             return table
-        # A toggle at an end has no slope: the chord's.
+        # A toggle at an end has no slope; use that of the chord.
         begin = np.where(np.isfinite(slopes[:, :-1]), slopes[:, :-1], step)
         end = np.where(np.isfinite(slopes[:, 1:]), slopes[:, 1:], step)
         table[:, :, 1] = begin.T

@@ -14,16 +14,16 @@
 
 
 """
-How many knots a table needs, so that a tolerance is met at every input: a proof.
+A proof of how many knots a table needs to meet a tolerance at every input.
 
 The error of a polynomial between knots follows from a bound of the second or fourth derivative
-over the range (see `table`). The range is cut into cells, each as small as it takes to enclose the
-loops' solution over all of it (see `validated_enclosure`), and to bound its derivatives by about
-their values in its middle. At the ends of the cells, and at the knots of a table, the closed
-form's values are enclosed likewise, within the cells on both sides: so the solutions of
-neighbouring cells are one, the closed form is on it and on no other assembly, and the errors of
-its values and slopes are known and counted. The proof rests on IEEE 754 arithmetic, on sines of
-numpy that are good to 4 units in the last place, and on nothing that was sampled.
+over the range (see `table`). The range is cut into cells, small enough to enclose the solution of
+the loops over each cell (see `validated_enclosure`), and to bound its derivatives closely by their
+values at its middle. The closed form is enclosed likewise at the ends of the cells and at the
+knots, within the cells on both sides: so the solutions of neighbouring cells are the same, the
+closed form is on this solution and on no other assembly, and the errors of its values and slopes
+are bounded. The proof rests on IEEE 754 arithmetic, and on numpy's sines being accurate to 4 units
+in the last place; it does not rest on samples.
 """
 
 from __future__ import annotations
@@ -53,14 +53,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 _NEAR = 0.01
-"""In [rad]: what fails nearer to a toggle than this fails because of it."""
+"""In [rad]: a failure nearer to a toggle than this is caused by the toggle."""
 
 _NARROWER = 'write solver: closed_form, or a span: [low, high] that keeps away from it'
 
 
 class TableRequest(NamedTuple):
     """
-    What is to be proven.
+    The table to be proven.
 
     Attributes
     ----------
@@ -71,9 +71,9 @@ class TableRequest(NamedTuple):
     joints
         Its published joints, each as factor·(Σ ±x_j) + constant.
     tolerance
-        In [rad] or [m].
+        Bound of the error, in [rad] or [m].
     order
-        Between the knots: 'linear' or 'hermite'.
+        Interpolation between the knots: 'linear' or 'hermite'.
 
     """
 
@@ -85,7 +85,7 @@ class TableRequest(NamedTuple):
 
 
 def refuse_trouble(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> None:
-    """Refuse where a toggle or a change point lies in a range: there is no bound."""
+    """Refuse a range with a toggle or a change point, where no bound exists."""
     for low, high in ranges:
         for singular in request.closed.singular_inputs:
             middle = 0.5 * (low + high)
@@ -94,7 +94,7 @@ def refuse_trouble(request: TableRequest, ranges: Sequence[tuple[float, float]])
 
 
 def place(request: TableRequest, value: float) -> str:
-    """Return a value of the input as a user reads it."""
+    """Return a value of the input as text for a user."""
     if request.closed.linkage.inputs[0].slider:
         return f'{value:.6g} m'
     where = f'{degrees(remainder(value, tau)):.4g}°'
@@ -117,39 +117,39 @@ MOST_KNOTS = 2**20
 _FEWEST_KNOTS = 4
 _FIRST_CELLS = 16
 _SMALLEST_CELL = 2.0**-18
-"""Of the range: where that is too large to prove anything, there is a toggle, or next to one."""
+"""Fraction of the range: if this is too large to prove anything, a toggle is there or near."""
 
 _MOST_CELLS = 2**14
 _PLENTY = 2**10
-"""Of cells: for each so many twice as many knots cost less than cells that spare them."""
+"""Cells: for each so many, twice as many knots cost less than the cells that spare them."""
 
 _BLOCK = 4096
 _TIGHT = 1.1
-"""A bound that exceeds the middle's by no more than this is not worth smaller cells."""
+"""A bound within this factor of the value at the middle needs no smaller cells."""
 
 _ERRORS = {'linear': (2, 2.0 / 8.0), 'hermite': (4, 24.0 / 384.0)}
-"""For each order the Taylor coefficient that the error goes with, and the factor."""
+"""For each order the Taylor coefficient that determines the error, and its factor."""
 
 _ROUNDING = 2.0**-49
 
 
 class _Bounds(NamedTuple):
     """
-    What holds over each cell of a range.
+    The bounds over each cell of a range.
 
     Attributes
     ----------
     low, high
         The cell, in the coordinate of the input.
     proven
-        Whether anything does.
+        Whether the bounds are proven.
     bound, middle
-        Of the joints' Taylor coefficient: a bound over the cell, and what it is in the middle.
+        Of the joints' Taylor coefficient: a bound over the cell, and its value at the middle.
     slope
         A bound of the joints' first derivative.
     unknowns, boxes
-        Of all groups, (cells, unknowns): what the closed form has in the middle, and how far from
-        it there is no other solution.
+        For all groups, (cells, unknowns): the closed form at the middle, and the distance within
+        which there is no other solution.
 
     """
 
@@ -163,7 +163,7 @@ class _Bounds(NamedTuple):
     boxes: Array
 
     def chosen(self, cells: Any) -> _Bounds:
-        """Return those of some cells, in their order."""
+        """Return the bounds of some cells, in their order."""
         return _Bounds(*(field[cells] for field in self))
 
 
@@ -173,7 +173,7 @@ def _joined(parts: Sequence[_Bounds]) -> _Bounds:
 
 
 class RangeProof:
-    """A range of the input, cut into cells that are as small as it takes."""
+    """A range of the input, cut into cells that are as small as necessary."""
 
     def __init__(self, request: TableRequest, low: float, high: float) -> None:
         self._request = request
@@ -185,8 +185,8 @@ class RangeProof:
         self._bounds = self._refined()
 
     def knots(self) -> int:
-        """Return how many the derivatives ask for."""
-        # The table tells whole turns apart by the mean slope of a cell.
+        """Return the number of knots that the derivatives require."""
+        # The mean slope of a cell determines the whole turns of the table.
         least = self._span * float(self._bounds.slope.max()) / (0.5 * pi)
         count = self._needed(float(self._bounds.bound.max()))
         while count < least:
@@ -195,14 +195,14 @@ class RangeProof:
 
     def errors(self, knots: int) -> tuple[float, float]:
         """
-        Return what positions and their derivatives are off by, with so many knots.
+        Return the errors of positions and of their derivatives, for a number of knots.
 
-        That is interpolation; what values and slopes at the knots are off by, times what the
-        polynomials make of that; and what their evaluation is rounded by.
+        They are the error of interpolation, the errors of values and slopes at the knots
+        multiplied by the effect of the polynomials on them, and the rounding of the evaluation.
         """
         x = np.linspace(*self._ends, knots + 1)
-        found = self._request.closed.solve(x, rates=1.0, derivatives=1)
-        assert found.velocities is not None
+        solved = self._request.closed.solve(x, rates=1.0, derivatives=1)
+        assert solved.velocities is not None
         value = slope = 0.0
         for begin in range(0, knots + 1, _BLOCK):
             block = slice(begin, begin + _BLOCK)
@@ -210,12 +210,12 @@ class RangeProof:
             enclosed = self._linked(self._bounds, at)
             for k, (turns, factor, constant) in enumerate(self._request.joints):
                 joint = _joint(turns, factor, enclosed.jets, 0)
-                off = found.positions[k, block] - joint.center - constant
+                off = solved.positions[k, block] - joint.center - constant
                 if self._request.closed.turning[k]:
                     off = np.remainder(off + pi, 2.0 * pi) - pi
                 value = max(value, float((np.abs(off) + joint.radius).max()))
                 joint = times(_joint(turns, factor, enclosed.jets, 1), 1.0 / self._unit)
-                off = found.velocities[k, block] - joint.center
+                off = solved.velocities[k, block] - joint.center
                 slope = max(slope, float((np.abs(off) + joint.radius).max()))
         bounds = self._bounds
         h = self._span / knots
@@ -227,12 +227,12 @@ class RangeProof:
         else:
             rate += h * bound
         farthest = max(map(abs, self._ends)) / self._unit
-        sizes = pi + farthest * float(bounds.slope.max()) + float(np.abs(found.positions).max())
+        sizes = pi + farthest * float(bounds.slope.max()) + float(np.abs(solved.positions).max())
         rounding = _ROUNDING * sizes
         return position + rounding, (rate + rounding / h) / self._unit
 
     def _refined(self) -> _Bounds:
-        """Return bounds over cells no larger than they may be."""
+        """Return bounds over cells that are small enough."""
         low, high = self._ends
         edges = np.linspace(low / self._unit, high / self._unit, _FIRST_CELLS + 1)
         done = self._over(edges[:-1], edges[1:])
@@ -244,7 +244,7 @@ class RangeProof:
                 if width < _SMALLEST_CELL * self._span or len(split) > _MOST_CELLS:
                     self._refuse(0.5 * (done.low[where] + done.high[where]))
             else:
-                # What the middles ask for is asked for in any case: no cell need be tighter.
+                # The middles require these knots in any case: no cell need be tighter.
                 knots = self._needed(float(done.middle.max()))
                 allowed = self._allowed(knots << min(len(split) // _PLENTY, 8))
                 split = (done.bound > allowed) & (done.bound > _TIGHT * done.middle)
@@ -267,13 +267,13 @@ class RangeProof:
         return knots
 
     def _allowed(self, knots: int) -> float:
-        """Return what the Taylor coefficient may be."""
+        """Return the largest Taylor coefficient that is allowed for a number of knots."""
         share = 0.95 * self._request.tolerance
         return float(share / (self._factor * (self._span / knots) ** self._power))
 
     def _over(self, low: Array, high: Array) -> _Bounds:
-        """Return the bounds over some cells, given in the coordinate of the input."""
-        found = []
+        """Return the bounds over cells, given in the coordinate of the input."""
+        bounds = []
         for begin in range(0, len(low), _BLOCK):
             block = slice(begin, begin + _BLOCK)
             ends = low[block] * self._unit, high[block] * self._unit
@@ -286,7 +286,7 @@ class RangeProof:
                 for k in (self._power, 1)
             )
             count = len(low[block])
-            found.append(
+            bounds.append(
                 _Bounds(
                     low[block],
                     high[block],
@@ -298,13 +298,13 @@ class RangeProof:
                     np.concatenate([group.box for group in enclosed.groups], axis=1),
                 )
             )
-        return _joined(found)
+        return _joined(bounds)
 
     def _enclosed(self, low: Array, high: Array, order: int) -> Enclosure:
         """Enclose cells, given in [rad] or [m]."""
         middle = 0.5 * (low + high)
         coordinates, pins = self._closed_form.at(middle)
-        # Wide enough to hold its ends, whatever was rounded.
+        # Wide enough to hold its ends in spite of rounding.
         half = 0.5 * (high - low) / self._unit + _ROUNDING * np.abs(middle / self._unit)
         cells = Cells(middle / self._unit, half, coordinates, pins)
         with np.errstate(all='ignore'):
@@ -315,15 +315,15 @@ class RangeProof:
         return enclosed._replace(proven=enclosed.proven & finite)
 
     def _linked(self, bounds: _Bounds, x: Array) -> Enclosure:
-        """Enclose points; refuse if there is one that is not the solution of the cells about."""
-        found = self._enclosed(x, x, 1)
+        """Enclose points; refuse if one is not the solution of the cells around it."""
+        enclosure = self._enclosed(x, x, 1)
         middle, radius, turning = (
-            np.concatenate([getattr(group, name) for group in found.groups], axis=-1)
+            np.concatenate([getattr(group, name) for group in enclosure.groups], axis=-1)
             for name in ('middle', 'radius', 'turning')
         )
         at = x / self._unit
         last = np.searchsorted(bounds.low, at, 'right') - 1
-        linked = found.proven.copy()
+        linked = enclosure.proven.copy()
         for cell in (last, np.where(bounds.low[last] == at, np.maximum(last - 1, 0), last)):
             off = middle - bounds.unknowns[cell]
             off = np.where(turning, np.remainder(off + pi, 2.0 * pi) - pi, off)
@@ -331,7 +331,7 @@ class RangeProof:
             linked &= held.all(axis=1)
         if not linked.all():
             self._refuse(float(at[~linked][0]))
-        return found
+        return enclosure
 
     def _refuse(self, at: float) -> NoReturn:
         raise refusal(
@@ -341,18 +341,18 @@ class RangeProof:
 
 def _joint(turns: Turns, factor: float, jets: Mapping[int, Jet], order: int) -> Disc:
     """Return a Taylor coefficient of a published joint, without its constant."""
-    found = times(total([times(jets[k][order], sign) for k, sign in turns]), factor)
-    return Disc(np.real(found.center), found.radius)
+    coefficient = times(total([times(jets[k][order], sign) for k, sign in turns]), factor)
+    return Disc(np.real(coefficient.center), coefficient.radius)
 
 
 def _largest(values: Sequence[Any], count: int) -> Array:
-    """Return the largest of each cell."""
-    found: Array = np.max([np.broadcast_to(value, (count,)) for value in values], axis=0)
-    return found
+    """Return the largest value of each cell."""
+    largest: Array = np.max([np.broadcast_to(value, (count,)) for value in values], axis=0)
+    return largest
 
 
 class _ClosedForm:
-    """Coordinates and pins of the closed form, at many values of the input."""
+    """Coordinates and pins of the closed form at many values of the input."""
 
     def __init__(self, request: TableRequest) -> None:
         self._numbers = [k for group in request.groups for k in group.coordinates]
@@ -361,9 +361,9 @@ class _ClosedForm:
         self._solver = Solver(request.closed, width, self._wanted)
 
     def at(self, x: Array) -> tuple[Array, NDArray[np.complex128]]:
-        """Return them, each in its row, at values in [rad] or [m]."""
-        found = self._solver.solve([x], derivatives=0).positions
-        numbers, parts = np.split(found, [len(self._numbers)])
+        """Return coordinates and pins, a row for each, at values in [rad] or [m]."""
+        rows = self._solver.solve([x], derivatives=0).positions
+        numbers, parts = np.split(rows, [len(self._numbers)])
         coordinates = np.zeros((max(self._numbers) + 1, len(x)))
         coordinates[self._numbers] = numbers
         pins = np.zeros((max(self._pins, default=-1) + 1, len(x)), np.complex128)
@@ -380,16 +380,16 @@ class _ClosedForm:
 
 class Proven(NamedTuple):
     """
-    What is proven.
+    The result of the proof.
 
     Attributes
     ----------
     knots
-        How many cells there are to each range.
+        Number of cells in each range.
     position
-        What positions are off by at most, in [rad] or [m].
+        Bound of the error of positions, in [rad] or [m].
     rate
-        And their derivatives by the input.
+        Bound of the error of their derivatives by the input.
 
     """
 
@@ -400,28 +400,28 @@ class Proven(NamedTuple):
 
 def knots_for(request: TableRequest, ranges: Sequence[tuple[float, float]]) -> Proven:
     """
-    Return how many cells each range of the input needs, and what is proven of the error then.
+    Return the number of cells that each range of the input needs, and the proven errors.
 
     Parameters
     ----------
     request
-        What is to be proven.
+        The table to be proven.
     ranges
-        Of the input, in [rad] or [m].
+        Ranges of the input, in [rad] or [m].
 
     Raises
     ------
     DefinitionError
-        Where a toggle or a change point is in the way, or it takes more than `MOST_KNOTS`.
+        If a range holds a toggle or a change point, or the proof takes more than `MOST_KNOTS`.
 
     """
     refuse_trouble(request, ranges)
-    found = [RangeProof(request, low, high) for low, high in ranges]
-    knots = max(one.knots() for one in found)
+    proofs = [RangeProof(request, low, high) for low, high in ranges]
+    knots = max(one.knots() for one in proofs)
     while True:
         if knots > MOST_KNOTS:
             raise refusal(request, f'takes more than {MOST_KNOTS} knots', 'ask for less')
-        position, rate = map(max, zip(*(one.errors(knots) for one in found), strict=True))
+        position, rate = map(max, zip(*(one.errors(knots) for one in proofs), strict=True))
         if position <= request.tolerance:
             return Proven(knots, position, rate)
         if position > 2.0 * request.tolerance:

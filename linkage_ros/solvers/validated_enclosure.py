@@ -14,22 +14,22 @@
 
 
 """
-The joints of a linkage and their derivatives over cells of its input, enclosed for certain.
+Rigorous enclosures of the joints of a linkage and their derivatives, over cells of its input.
 
-Numbers are discs: a centre, real or complex, and a radius that bounds how far the number may be
-from it, rounding of the centre included (circular arithmetic: I. Gargantini and P. Henrici, Numer.
-Math. 18, 1972). Everything is an array over the cells of a range; overflow apart, each bound holds
-for certain.
+Numbers are discs: a centre, real or complex, and a radius that bounds the distance of the number
+from it, including the rounding of the centre (circular arithmetic: I. Gargantini and P. Henrici,
+Numer. Math. 18, 1972). All are arrays over the cells of a range; apart from overflow, each bound
+is rigorous.
 
 Over a cell, an interval T of the input with the middle t, the loop equations F(T, y) = 0 of a
-group of links are shown to have one solution y within ρ of the closed form's at t, by the operator
-of Krawczyk (R. Krawczyk, Computing 4, 1969): with Y near F_y⁻¹ it is so where::
+group of links are proven to have exactly one solution y within ρ of the closed form at t, by the
+operator of Krawczyk (R. Krawczyk, Computing 4, 1969). With Y near F_y⁻¹ the condition is::
 
     |Y·F(T, y(t))| + |1 − Y·F_y(T, y(t) ± ρ)|·ρ < ρ
 
 All Taylor coefficients of y by the input follow from F_y·y_k = −(F_k with y_k = 0), as discs that
-hold them over the whole cell. Groups are taken in the order of solution, each with the discs of
-those before it.
+hold them over the whole cell. Groups are enclosed in the order of solution, each with the discs of
+the groups before it.
 """
 
 from __future__ import annotations
@@ -42,24 +42,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 _ROUNDING = 2.0**-50
-"""Above what a centre is off by, of its size: a product of complex numbers, a sine of numpy's."""
+"""Relative bound of a centre's error: a product of complex numbers, a sine of numpy."""
 
 _LEAST = 2.0**-1020
-"""Above what a product is off by where it underflows."""
+"""Bound of the error of a product that underflows."""
 
 _UP = 1.0 + 2.0**-48
-"""What makes up for the rounding of a radius."""
+"""Factor that covers the rounding of a radius."""
 
 
 class Disc(NamedTuple):
-    """Numbers, each within a radius of a centre."""
+    """Numbers within a radius of a centre."""
 
     center: Any
     radius: Any
 
     @property
     def size(self) -> Any:
-        """Return a bound of the absolute values."""
+        """Return a bound of the absolute value."""
         return (np.abs(self.center) + self.radius) * _UP
 
 
@@ -84,7 +84,7 @@ def product(one: Disc, other: Disc) -> Disc:
 
 
 def times(disc: Disc, factor: complex) -> Disc:
-    """Return the product with a number that is a double."""
+    """Return the product with an exact number."""
     size = abs(factor)
     radius = disc.radius * size * _UP + _ROUNDING * size * np.abs(disc.center) + _LEAST
     return Disc(disc.center * factor, radius)
@@ -92,16 +92,16 @@ def times(disc: Disc, factor: complex) -> Disc:
 
 def facing(angle: Jet) -> Jet:
     """
-    Return e^{iφ}: of order k it is i/k·Σ j·φ_j·e_(k−j).
+    Return e^{iφ}; its coefficient of order k is i/k·Σ j·φ_j·e_(k−j).
 
-    An arc is no shorter than its chord, so that the radius of an angle is one of its direction.
+    An arc is no shorter than its chord, so the radius of an angle is also one of its direction.
     """
     center = np.exp(1j * np.asarray(angle[0].center))
-    found = [Disc(center, angle[0].radius * _UP + _ROUNDING)]
+    jet = [Disc(center, angle[0].radius * _UP + _ROUNDING)]
     for k in range(1, len(angle)):
-        parts = [times(product(angle[j], found[k - j]), 1j * j) for j in range(1, k + 1)]
-        found.append(times(total(parts), 1.0 / k))
-    return found
+        parts = [times(product(angle[j], jet[k - j]), 1j * j) for j in range(1, k + 1)]
+        jet.append(times(total(parts), 1.0 / k))
+    return jet
 
 
 def jet_product(one: Jet, other: Jet) -> Jet:
@@ -113,24 +113,24 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _LEAST_BOX = 2.0**-44
-"""Of an unknown's size, or of 1: a narrower box could not be told from its rounding."""
+"""Relative to the size of an unknown, or to 1: a narrower box would be lost in its rounding."""
 
 _UP_MATRIX = 1.0 + 2.0**-40
-"""What makes up for the rounding of bounds that are worked out in matrices."""
+"""Factor that covers the rounding of bounds that are computed by matrices."""
 
 
 class Cells(NamedTuple):
     """
-    Cells of the input, in the coordinate of the input, and the closed form in their middles.
+    Cells of the input, in the coordinate of the input, and the closed form at their middles.
 
     Attributes
     ----------
     middle, half
-        Of each cell.
+        Middle and half width of each cell.
     coordinates
-        A row for each coordinate, NaN where the loops do not close.
+        A row for each coordinate, NaN if the loops do not close.
     pins
-        Likewise, of what iterations have placed.
+        Likewise for the pins that iterations have placed.
 
     """
 
@@ -142,16 +142,16 @@ class Cells(NamedTuple):
 
 class Unknowns(NamedTuple):
     """
-    The solution of a group over each cell, an array (cells, unknowns) each.
+    The solution of a group over each cell; arrays of shape (cells, unknowns).
 
     Attributes
     ----------
     middle
-        What the closed form has.
+        Values of the closed form.
     box
-        ρ: so near to it there is no other solution.
+        ρ: within this distance there is no other solution.
     radius
-        And so near to it is the one that there is.
+        Within this distance there is the solution.
     turning
         For each unknown whether it is an angle.
 
@@ -165,12 +165,12 @@ class Unknowns(NamedTuple):
 
 class Enclosure(NamedTuple):
     """
-    What holds over each cell.
+    The enclosure of each cell.
 
     Attributes
     ----------
     proven
-        Whether there is one solution.
+        Whether there is exactly one solution.
     jets
         For each coordinate its Taylor coefficients by the coordinate of the input.
     groups
@@ -192,9 +192,9 @@ def enclose(groups: Sequence[Loops], cells: Cells, order: int) -> Enclosure:
     groups
         The loops of a linkage of one input.
     cells
-        Where.
+        The cells.
     order
-        Up to which.
+        Largest order of the Taylor coefficients.
 
     """
     zero = [ZERO] * (order + 1)
@@ -202,17 +202,17 @@ def enclose(groups: Sequence[Loops], cells: Cells, order: int) -> Enclosure:
     jets: dict[int, Jet] = {0: zero, 1: given}
     pins: dict[int, Jet] = {}
     proven: Mask = np.asarray(np.isfinite(cells.coordinates).all(axis=0))
-    found = []
+    solved = []
     for loops in groups:
         group = _Group(loops, cells, jets, pins)
         unknowns, held = group.find(order)
         proven &= held
-        found.append(unknowns)
-    return Enclosure(proven, jets, found)
+        solved.append(unknowns)
+    return Enclosure(proven, jets, solved)
 
 
 class _Group:
-    """A group of links, with what is known before it."""
+    """A group of links, and the jets known before it."""
 
     def __init__(
         self, loops: Loops, cells: Cells, jets: dict[int, Jet], pins: dict[int, Jet]
@@ -236,11 +236,11 @@ class _Group:
         inverse, regular = _inverse(slopes)
         step, spread = self._step(0, inverse)
         first = np.abs(step) + spread
-        # A pin of the ground that a group places stands still but for its rounding.
+        # A pin on the ground that a group places moves only by rounding.
         box = 2.0 * first + _LEAST_BOX * (1.0 + np.abs(middle))
         radius, held = self._within(box, first, inverse)
         if not held.all():
-            # Where an unknown stands still, its box may be narrower than what others do to it.
+            # The box of an unknown that does not move may be too narrow for the others' effect.
             box = np.where(held[:, None], box, np.maximum(box, 1.5 * radius))
             radius, held = self._within(box, first, inverse)
         proven = regular & held
@@ -262,21 +262,21 @@ class _Group:
         return Unknowns(middle, box, radius, self._turning), proven
 
     def _within(self, box: Array, first: Array, inverse: Array) -> tuple[Array, Mask]:
-        """Return how far from the middle a solution is, and where it is so within the box."""
+        """Return the distance of a solution from the middle, and where it is within the box."""
         self._set(0, self._middle, box)
         radius: Array = (first + _image(self._loss(inverse), box)) * _UP_MATRIX
         held: Mask = np.asarray((radius < box).all(axis=1))
         return radius, held
 
     def _step(self, order: int, inverse: Array) -> tuple[Array, Array]:
-        """Return −Y·F of an order: middles and radii."""
+        """Return −Y·F at an order: middles and radii."""
         errors, spread = self._errors(order)
         n = errors.shape[1]
         radius = _image(np.abs(inverse), spread + n * _ROUNDING * np.abs(errors))
         return -_image(inverse, errors), radius * _UP_MATRIX
 
     def _loss(self, inverse: Array) -> Array:
-        """Return a bound of |1 − Y·F_y| over the unknowns as they are set."""
+        """Return a bound of |1 − Y·F_y| over the current unknowns."""
         slopes, spread = self._slopes()
         n = slopes.shape[1]
         size = np.abs(inverse)
@@ -297,20 +297,20 @@ class _Group:
             jet[order] = Disc(place, radius[:, column] + radius[:, column + 1])
 
     def _errors(self, order: int) -> tuple[Array, Array]:
-        """Return what the equations come to at an order: middles and radii, (cells, equations)."""
+        """Return the values of the equations at an order: middles, radii, (cells, equations)."""
         middles, radii = [], []
         for equation in self._loops.equations:
-            found = total([self._jet(vector, order)[order] for vector in equation])
-            middles += [np.real(found.center), np.imag(found.center)]
-            radii += [found.radius, found.radius]
+            residual = total([self._jet(vector, order)[order] for vector in equation])
+            middles += [np.real(residual.center), np.imag(residual.center)]
+            radii += [residual.radius, residual.radius]
         for terms, constant, turning in self._loops.balances:
             parts = [times(self._jets[k][order], sign) for k, sign in terms]
-            found = total([*parts, Disc(constant if order == 0 else 0.0, 0.0)])
-            center = np.real(found.center)
+            residual = total([*parts, Disc(constant if order == 0 else 0.0, 0.0)])
+            center = np.real(residual.center)
             if turning and order == 0:
                 center = np.remainder(center + np.pi, 2.0 * np.pi) - np.pi
             middles.append(center)
-            radii.append(found.radius + 4.0 * _ROUNDING)
+            radii.append(residual.radius + 4.0 * _ROUNDING)
         shape = (self._count,)
         return (
             np.stack([np.broadcast_to(one, shape) for one in middles], axis=1),
@@ -360,25 +360,25 @@ class _Group:
         if pin in pins:
             column = len(coordinates) + 2 * pins.index(pin)
             return [(column, Disc(factor, 0.0)), (column + 1, Disc(1j * factor, 0.0))]
-        found: list[tuple[int, Disc]] = []
+        slopes: list[tuple[int, Disc]] = []
         whole = self._jet(vector, 0)[0]
         for k, sign in turns:
             if k in coordinates:
-                found.append((coordinates.index(k), times(whole, sign * 1j)))
+                slopes.append((coordinates.index(k), times(whole, sign * 1j)))
         if slide in coordinates:
             unit = self._jet(vector._replace(slide=-1), 0)[0]
-            found.append((coordinates.index(slide), unit))
-        return found
+            slopes.append((coordinates.index(slide), unit))
+        return slopes
 
 
 def _image(matrix: Array, vector: Array) -> Array:
     """Return the products of matrices and vectors, cell by cell."""
-    found: Array = np.einsum('cij,cj->ci', matrix, vector)
-    return found
+    image: Array = np.einsum('cij,cj->ci', matrix, vector)
+    return image
 
 
 def _inverse(matrices: Array) -> tuple[Array, Mask]:
-    """Return the inverse of each, and which have one."""
+    """Return the inverse of each matrix, and which matrices have one."""
     regular: Mask = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     safe = np.where(regular[:, None, None], matrices, np.eye(matrices.shape[1]))
     regular &= np.abs(np.linalg.det(safe)) > 0.0

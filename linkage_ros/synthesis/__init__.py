@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Design: from what a four-bar shall do to its links."""
+"""Synthesis: the links of a four-bar from its wanted motion."""

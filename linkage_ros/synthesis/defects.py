@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-The defects that make a solution on paper useless, and what a user needs of a design.
+The defects that make a design useless in practice, and the requirements on a design.
 
-Every design is searched for the defects. Their names are those of the textbooks (R. L. Norton,
+Every design is checked for the defects. Their names are those of the textbooks (R. L. Norton,
 Design of Machinery, ch. 5; J. M. McCarthy and G. S. Soh, Geometric Design of Linkages, ch. 4):
 branch, circuit and order.
 """
@@ -48,11 +47,11 @@ import numpy as np
 
 _IN_LINE = 1e-5
 """Below this transmission angle coupler and rocker are in line, in [rad]; near a toggle the angle
-is as the root of the rounding of the lengths."""
+is the root of the rounding error of the lengths."""
 
 
 class Defect(NamedTuple):
-    """Why a linkage does not do on the bench what it does on paper: a name, and a sentence."""
+    """A reason why a linkage cannot move as designed: a name, and a sentence."""
 
     name: str
     text: str
@@ -60,28 +59,28 @@ class Defect(NamedTuple):
 
 class Assessment(NamedTuple):
     """
-    What a design is worth.
+    The analysis of a design.
 
     Attributes
     ----------
     met
-        How each position is met.
+        The result of each position.
     kind
-        After Grashof.
+        Type after Grashof.
     turns
         Whether the crank turns fully.
     defects
-        What is wrong, the worst first; empty where nothing is.
+        The defects, the worst first.
     travel
         Crank angles at the first and the last position, with the turns between them, in [rad];
-        None where the crank does not get from one to the other.
+        None if the crank cannot move from one to the other.
     transmission, at
-        The least angle between coupler and rocker over the travel, acute, and the crank angle
-        where it is, in [rad]; where there is no travel, over the positions.
+        The least acute angle between coupler and rocker over the travel, and its crank angle, in
+        [rad]; without a travel, over the positions.
     full_transmission
-        The least over a full turn, in [rad]; None where the crank does not turn fully.
+        The least over a full turn, in [rad]; None if the crank does not turn fully.
     link_ratio
-        Longest link to shortest.
+        Ratio of the longest link to the shortest.
 
     """
 
@@ -97,29 +96,29 @@ class Assessment(NamedTuple):
 
 
 def assess(design: Design) -> Assessment:
-    """Assess a design; its positions are analysed again, by `proof.prove`."""
+    """Assess a design; its positions are solved again, by `proof.prove`."""
     four_bar = design.four_bar
     o2, o4 = four_bar.pivots
-    # From the angle of the crank's frame to the direction of the vector O2→A off the ground line.
+    # From the angle of the crank's frame to the direction of O2→A relative to the ground line.
     zero = phase(four_bar.crank) - phase(o4 - o2)
     lengths = np.array(four_bar.lengths)
     directions = np.array([wanted.crank for wanted in design.wanted]) + zero
-    # With a single change point two turns are not the same: what is proved is the way it goes.
+    # With a single change point two turns may differ: the actual turns are proven.
     turns = tau * np.round((lifted(lengths, directions) - directions) / tau)
     moved = [
         one._replace(crank=one.crank + float(by))
         for one, by in zip(design.wanted, turns, strict=True)
     ]
     met = prove(design._replace(wanted=tuple(moved)))
-    found = course(lengths, directions, np.array([one.side == 'left' for one in met]))
-    defects = _defects(design, met, found)
+    path = course(lengths, directions, np.array([one.side == 'left' for one in met]))
+    defects = _defects(design, met, path)
     if defects:
         travel = None
-        # At one position after the other; there is no way between them.
-        ends = found.directions, found.directions
+        # Only at the positions; there is no way between them.
+        ends = path.directions, path.directions
     else:
         travel = moved[0].crank, moved[-1].crank
-        ends = found.directions[:1], found.directions[-1:]
+        ends = path.directions[:1], path.directions[-1:]
     angles, places = least_transmission(lengths, *ends)
     least, at = min(zip(angles.tolist(), (places - zero).tolist(), strict=True))
     if travel and least < _IN_LINE:
@@ -131,15 +130,15 @@ def assess(design: Design) -> Assessment:
             ),
         )
     full = None
-    if found.turns:
+    if path.turns:
         full = float(least_transmission(lengths, np.array(0.0), np.array(pi))[0])
     ratio = max(four_bar.lengths) / min(four_bar.lengths)
     kind = four_bar_type(*four_bar.lengths)
-    return Assessment(met, kind, bool(found.turns), defects, travel, least, at, full, ratio)
+    return Assessment(met, kind, bool(path.turns), defects, travel, least, at, full, ratio)
 
 
-def _defects(design: Design, met: tuple[Met, ...], found: Course) -> tuple[Defect, ...]:
-    """Name what keeps the linkage from its positions; one that cannot be assembled hides all."""
+def _defects(design: Design, met: tuple[Met, ...], path: Course) -> tuple[Defect, ...]:
+    """Return the defects of a linkage; one that cannot be assembled hides all others."""
     missed = [(number, one.gap) for number, one in enumerate(met, 1) if not one.closed]
     if missed:
         worst = max(gap for _, gap in missed)
@@ -150,13 +149,13 @@ def _defects(design: Design, met: tuple[Met, ...], found: Course) -> tuple[Defec
                 f'miss each other by up to {worst:.3g} m',
             ),
         )
-    if not found.one_circuit:
-        return (_circuit(met, found),)
+    if not path.one_circuit:
+        return (_circuit(met, path),)
     defects = []
-    if not found.one_branch:
+    if not path.one_branch:
         defects.append(_branch(design, met))
-    if not found.in_order:
-        defects.append(_order(design, found))
+    if not path.in_order:
+        defects.append(_order(design, path))
     return tuple(defects)
 
 
@@ -183,21 +182,21 @@ def _branch(design: Design, met: tuple[Met, ...]) -> Defect:
     )
 
 
-def _circuit(met: tuple[Met, ...], found: Course) -> Defect:
-    if found.turns:
+def _circuit(met: tuple[Met, ...], path: Course) -> Defect:
+    if path.turns:
         where = _sides(met)
     else:
-        upper = np.sin(found.directions) >= 0.0
+        upper = np.sin(path.directions) >= 0.0
         one, other = (_positions(np.flatnonzero(upper == end) + 1) for end in (True, False))
         where = f'the crank moves in two ranges, with {one} in one and {other} in the other'
     return Defect('circuit', f'{where}; only taking it apart leads from one to the other')
 
 
-def _order(design: Design, found: Course) -> Defect:
-    directions: Array = found.directions - found.directions[0]
-    visited = np.argsort(np.mod(directions, tau) if found.turns else directions)
-    said = ', '.join(f'{i + 1} ({_degrees(design.wanted[i].crank)})' for i in visited)
-    return Defect('order', f'a crank that goes one way comes by the positions as {said}')
+def _order(design: Design, path: Course) -> Defect:
+    directions: Array = path.directions - path.directions[0]
+    visited = np.argsort(np.mod(directions, tau) if path.turns else directions)
+    visits = ', '.join(f'{i + 1} ({_degrees(design.wanted[i].crank)})' for i in visited)
+    return Defect('order', f'a crank that goes one way comes by the positions as {visits}')
 
 
 def _sides(met: tuple[Met, ...]) -> str:
@@ -219,7 +218,7 @@ def _degrees(angle: float) -> str:
     return f'{degrees(angle):.6g}°'
 
 
-# For each word the ends of Barker's codes that it stands for.
+# For each word the ends of Barker's codes that match it.
 _KINDS = {
     'crank-rocker': ('CRR',),
     'rocker-crank': ('RRC',),
@@ -231,8 +230,8 @@ _KINDS = {
 _TURNING = ('crank-rocker', 'double-crank', 'drag-link', 'turning')
 _WORDS = (*_KINDS, 'grashof', 'non-grashof', 'turning')
 
-# Barker's codes by the shortest link where some link turns fully, by the longest where none does,
-# by the shortest at a change point. Of equal links, as in a parallelogram, none is asked for.
+# Barker's codes by the shortest link if some link turns fully, by the longest if none does, by the
+# shortest at a change point. No word selects equal links, as in a parallelogram.
 _CODES = (
     ('GCRR', 'GRCR', 'GRRC', 'GCCC'),
     ('RRR2', 'RRR3', 'RRR4', 'RRR1'),
@@ -240,25 +239,25 @@ _CODES = (
 )
 
 _FAR = 10.0
-"""What a defect counts for beside a miss of a number by a part of it."""
+"""Weight of a defect, relative to a number that misses its requirement by its own size."""
 
 
 class Needs(NamedTuple):
     """
-    What a design must have.
+    The requirements on a design.
 
     Attributes
     ----------
     kind
-        A word for what links turn, one of crank-rocker, rocker-crank, double-crank or drag-link,
+        A word for the links that turn: crank-rocker, rocker-crank, double-crank or drag-link,
         double-rocker, triple-rocker, grashof, non-grashof, turning (the crank turns fully); '' for
         any.
     transmission
-        The transmission angle over the travel is nowhere below this, in [rad].
+        Lower bound of the transmission angle over the travel, in [rad].
     link_ratio
-        Longest link to shortest, at most.
+        Upper bound of the ratio of the longest link to the shortest.
     usable
-        Whether it must be without defects.
+        Whether it must have no defects.
 
     """
 
@@ -274,12 +273,12 @@ class Needs(NamedTuple):
 
     def check(self) -> None:
         """
-        Refuse what cannot be needed.
+        Refuse requirements that no design can meet.
 
         Raises
         ------
         SynthesisError
-            With the nearest word.
+            With the most similar word.
 
         """
         if not 0.0 <= self.transmission <= 0.5 * pi:
@@ -301,47 +300,47 @@ class Needs(NamedTuple):
 
 
 def misses(assessment: Assessment, needs: Needs) -> tuple[str, ...]:
-    """Return in a few words each what a design lacks; nothing where it has all."""
+    """Return the unmet requirements of a design, in a few words each."""
     return tuple(text for text, _ in _missed(assessment, needs))
 
 
 def distance(assessment: Assessment, needs: Needs) -> float:
-    """Return by how much a design misses what is needed, to order them; 0 where it does not."""
+    """Return the weighted sum of unmet requirements, to sort designs; 0 if all are met."""
     return sum(much for _, much in _missed(assessment, needs))
 
 
 def _missed(assessment: Assessment, needs: Needs) -> list[tuple[str, float]]:
-    found: list[tuple[str, float]] = []
+    missed: list[tuple[str, float]] = []
     if needs.usable:
-        found += [(f'{defect.name} defect', _FAR) for defect in assessment.defects]
+        missed += [(f'{defect.name} defect', _FAR) for defect in assessment.defects]
     if needs.kind and not _is(assessment, needs.kind):
-        found.append((f'a {assessment.kind.name}, no {needs.kind}', 1.0))
+        missed.append((f'a {assessment.kind.name}, no {needs.kind}', 1.0))
     if assessment.transmission < needs.transmission:
         angle, wanted = degrees(assessment.transmission), degrees(needs.transmission)
         text = f'a transmission angle of {angle:.4g}°, not {wanted:.4g}°'
-        found.append((text, 1.0 - angle / wanted))
+        missed.append((text, 1.0 - angle / wanted))
     if assessment.link_ratio > needs.link_ratio:
-        found.append(
+        missed.append(
             (
                 f'a link ratio of {assessment.link_ratio:.4g}, not {needs.link_ratio:.4g}',
                 log(assessment.link_ratio / needs.link_ratio),
             )
         )
-    return found
+    return missed
 
 
 def distances(lengths: Array, transmission: Array, needs: Needs) -> Array:
     """
-    Return for many four-bars without defects what `distance` returns for one.
+    Return `distance` for many four-bars without defects.
 
     Parameters
     ----------
     lengths
-        Of crank, coupler, rocker and ground, above 0; (…, 4).
+        Lengths of crank, coupler, rocker and ground, above 0; (…, 4).
     transmission
         The least angle over the travel, in [rad]; (…).
     needs
-        What is needed.
+        The requirements.
 
     """
     total = np.zeros(transmission.shape)
@@ -366,8 +365,8 @@ def _are(lengths: Array, kind: str) -> Flags:
     row = np.where(excess > 0.0, 0, np.where(excess < 0.0, 1, 2))
     link = np.where(excess < 0.0, lengths.argmax(-1), lengths.argmin(-1))
     meant = np.array([[_stands_for(kind, code) for code in codes] for codes in _CODES])
-    found: Flags = meant[row, link]
-    return found
+    matches: Flags = meant[row, link]
+    return matches
 
 
 def _stands_for(kind: str, code: str) -> bool:

@@ -12,13 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-A four-bar that was designed: its pins, link by link, and what it was wanted for.
+A designed four-bar: its pins, link by link, and the wanted positions.
 
-Each link has the frame that the wanted values are in: the crank's angle is the one that was asked
-for, also where the crank's pin does not lie on the x axis of its frame (a free zero), or lies
-behind the pivot (a negative length, a link that points the other way).
+Each link has the frame of the wanted values: the crank's angle is the wanted one, even if the
+crank's pin does not lie on the x axis of its frame (a free zero), or lies behind the pivot (a
+negative length, a link that points the other way).
 """
 
 from __future__ import annotations
@@ -44,12 +43,12 @@ Assembly = Literal['left', 'right']
 @dataclass(frozen=True, slots=True)
 class FourBar:
     """
-    A four-bar with pivots where they stand; all places in [m].
+    A four-bar with its pivots; all places in [m].
 
     Attributes
     ----------
     pivots
-        Of crank and rocker, O2 and O4, in the ground's frame.
+        Pivots of crank and rocker, O2 and O4, in the frame of the ground.
     crank
         The crank's pin A in the crank's frame, whose origin is O2.
     coupler
@@ -59,7 +58,7 @@ class FourBar:
     side
         The side of A→O4 on which B lies.
     traced
-        A point P of the coupler, in its frame; None where none matters.
+        A point P of the coupler, in its frame, or None.
 
     """
 
@@ -82,21 +81,21 @@ class FourBar:
         side: Assembly = 'left',
     ) -> FourBar:
         """
-        Return a four-bar whose ground lies on the x axis, its crank pivot in the origin.
+        Return a four-bar whose ground lies on the x axis, with the crank pivot at the origin.
 
         Parameters
         ----------
         a, c
-            Lengths of crank and rocker; negative ones are links that point the other way.
+            Lengths of crank and rocker; a link of negative length points the other way.
         b, d
             Lengths of coupler and ground, above 0.
         alpha, beta
-            Where the pins of crank and rocker lie in their frames, in [rad] from the x axis.
+            Directions of the pins of crank and rocker in their frames, in [rad] from the x axis.
         side
-            Of the assembly.
+            The assembly.
 
         """
-        # A turn by nothing is left out: rect would put -0.0 or a rounding into the file.
+        # Without a turn, rect is avoided: it could write -0.0 or rounded digits into the file.
         crank = rect(a, alpha) if alpha else complex(a, 0.0)
         rocker = rect(c, beta) if beta else complex(c, 0.0)
         return cls((0j, complex(d, 0.0)), crank, (0j, complex(b, 0.0)), rocker, side)
@@ -109,12 +108,12 @@ class FourBar:
 
     def linkage(self, start: float | None = None) -> Linkage:
         """
-        Return it as any other linkage.
+        Return the design as a linkage.
 
         Parameters
         ----------
         start
-            Crank angle that it begins with, in [rad]; none where nothing is said.
+            Crank angle of the start, in [rad], or None.
 
         """
         (o2, o4), (a, b) = self.pivots, self.coupler
@@ -142,18 +141,18 @@ class FourBar:
 
 class Wanted(NamedTuple):
     """
-    One position that was asked for.
+    One wanted position.
 
     Attributes
     ----------
     crank
-        The crank's angle there, given or found, in [rad].
+        The crank's angle, given or computed, in [rad].
     rocker
-        The rocker's angle, in [rad]; None where it was not asked for.
+        The rocker's angle, in [rad], or None.
     coupler
-        The coupler's angle to the ground, in [rad]; None where it was not asked for.
+        The coupler's angle to the ground, in [rad], or None.
     place
-        Where the traced point shall be, in the ground's frame, in [m]; None likewise.
+        Place of the traced point in the frame of the ground, in [m], or None.
 
     """
 
@@ -164,7 +163,7 @@ class Wanted(NamedTuple):
 
 
 class Design(NamedTuple):
-    """A four-bar and the positions that it was designed for, in the order asked for."""
+    """A four-bar and the positions that it was designed for, in the wanted order."""
 
     four_bar: FourBar
     wanted: tuple[Wanted, ...]

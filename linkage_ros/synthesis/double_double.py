@@ -12,16 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
-Sums of two doubles, by arrays: twenty bits more than a double where terms cancel, and above.
+Double-double arithmetic on arrays, with twenty bits or more beyond a double if terms cancel.
 
 A number is a pair (high, low) of arrays, low at most half a unit in the last place of high. Sums
 and products follow T. J. Dekker, A floating-point technique for extending the available precision,
 Numerische Mathematik 18 (1971), and D. E. Knuth, The Art of Computer Programming 2, 4.2.2. Sine
-and cosine are taken from a table, at the nearest of 2048 parts of a turn; what is left is at most
-1.6e-3 rad, so that its series may be summed in doubles: their error is 2⁻⁷⁰ of them. They are
-also the same on every machine, which a library's are not.
+and cosine come from a table of 2048 parts of a turn; the rest is at most 1.6e-3 rad, so that its
+series can be summed in doubles, with a relative error of 2⁻⁷⁰. Unlike those of a library, they are
+the same on every machine.
 """
 
 from __future__ import annotations
@@ -101,8 +100,8 @@ def sine_cosine(angle: Twofold) -> tuple[Twofold, Twofold]:
 
 
 def _reduced(angle: Twofold) -> tuple[NDArray[np.intp], Array, Array]:
-    """Return the nearest part of a turn, and what the angle has over it."""
-    # The first two have so few bits that their products with a part are exact.
+    """Return the nearest part of a turn, and the angle beyond it."""
+    # The first two parts have so few bits that their products with an integer are exact.
     first, second, third = _part_of_a_turn()
     parts = np.rint(angle[0] * (1.0 / first))
     rest, low = two_sum(angle[0] - parts * first, -parts * second)
@@ -135,12 +134,12 @@ def _normal(high: Array, low: Array) -> Twofold:
 @cache
 def _part_of_a_turn() -> tuple[float, float, float]:
     """Return the 2048th part of a turn as a sum of three doubles, the first two of 33 bits."""
-    rest, found = 2 * _PI // _PARTS, []
+    rest, parts = 2 * _PI // _PARTS, []
     for _ in range(2):
         cut = rest.bit_length() - 33
-        found.append((rest >> cut << cut) / (1 << _BITS))
+        parts.append((rest >> cut << cut) / (1 << _BITS))
         rest &= (1 << cut) - 1
-    return found[0], found[1], rest / (1 << _BITS)
+    return parts[0], parts[1], rest / (1 << _BITS)
 
 
 @cache
@@ -151,7 +150,7 @@ def _table() -> tuple[Array, Array, Array, Array]:
     for _ in range(_PARTS // 8):
         x, y = eighth[-1]
         eighth.append(((x * cosine - y * sine) >> _BITS, (x * sine + y * cosine) >> _BITS))
-    # By symmetry, so that the multiples of a quarter are exact.
+    # By symmetry, so that multiples of a quarter turn are exact.
     turned = eighth + [(y, x) for x, y in eighth[-2:0:-1]]
     quarter = turned
     for _ in range(3):
@@ -172,7 +171,7 @@ def _twofold(numbers: list[int]) -> Twofold:
 
 
 def _small_turn(angle: int) -> tuple[int, int]:
-    """Return cosine and sine by their series, all of them times 2¹⁹²."""
+    """Return cosine and sine by their series, times 2¹⁹²."""
     sums, term = [0, 0, 0, 0], 1 << _BITS
     for power in range(24):
         sums[power % 4] += term

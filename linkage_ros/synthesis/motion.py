@@ -14,22 +14,22 @@
 
 
 """
-Motion generation: a four-bar whose coupler takes three poses.
+Motion generation: a four-bar whose coupler passes three poses.
 
-Any two points of the coupler can be its pins, and any two of the ground its pivots: the poses give
-the other end of each link. A pin A of the coupler has three places in the ground, P + e^{iθ}·a for
-the poses (P, θ); the circle through them has the fixed pivot in its centre. Seen from the coupler
-the fixed pivot O has three places, e^{−iθ}·(O − P), and the moving pivot is in the centre of these
-(L. Burmester, Lehrbuch der Kinematik, 1888).
+Any two points of the coupler can be its pins, and any two of the ground its pivots: the poses
+determine the other end of each link. A pin A of the coupler has three places in the ground,
+P + e^{iθ}·a for the poses (P, θ); the centre of the circle through them is the fixed pivot. In the
+frame of the coupler the fixed pivot O has three places, e^{−iθ}·(O − P), and the moving pivot is
+the centre of these (L. Burmester, Lehrbuch der Kinematik, 1888).
 
 The circle through three places A₁, A₂, A₃, with the chords u = A₂ − A₁ and v = A₃ − A₁, has its
-centre at the place that is as far from A₂ and from A₃ as from A₁, ::
+centre at the same distance from A₁, A₂ and A₃, ::
 
     c = A₁ + i·(u·v² − v·u²)/(2·(u × v)).
 
-It is computed to 20 bits more than a double has: for places near a line, or near each other, u × v
-keeps little of u and v. How it follows a small move of the places comes from |Aᵢ − c|² = r². With
-n = A − c and g = n·dA, of each place, u·dc = g₂ − g₁ and v·dc = g₃ − g₁; so that ::
+It is computed with 20 bits more than a double: for places near a line, or near each other, u × v
+keeps few digits of u and v. Its change with a small move of the places follows from |Aᵢ − c|² =
+r². With n = A − c and g = n·dA, of each place, u·dc = g₂ − g₁ and v·dc = g₃ − g₁; so that ::
 
     dc = i·((v − u)·g₁ − v·g₂ + u·g₃)/(u × v).
 """
@@ -52,11 +52,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 SAME = 1e-12
-"""Angles nearer than this are the same, in [rad], and places so near in parts of the motion."""
+"""Angles nearer than this count as equal, in [rad], and places, relative to the motion."""
 
 
 class Pose(NamedTuple):
-    """Where the coupler shall be: the origin of its frame, in [m], and its angle, in [rad]."""
+    """A wanted pose of the coupler: the origin of its frame, in [m], and its angle, in [rad]."""
 
     place: complex
     angle: float
@@ -111,12 +111,12 @@ def columns(poses: Sequence[Pose]) -> tuple[Complex, Array]:
 
 
 def finite(place: complex) -> bool:
-    """Return whether both coordinates are numbers."""
+    """Return whether both coordinates are finite."""
     return isfinite(place.real) and isfinite(place.imag)
 
 
 def said(place: complex) -> str:
-    """Return a place as a human reads it."""
+    """Return a place as text for a user."""
     return f'({place.real:.6g}, {place.imag:.6g}) m'
 
 
@@ -126,16 +126,16 @@ Place: TypeAlias = tuple[Twofold, Twofold]
 
 class Circle(NamedTuple):
     """
-    A circle; inf or nan where the places lie on a line, or two of them are the same.
+    A circle; inf or NaN if the places lie on a line, or two of them are equal.
 
     Attributes
     ----------
     centre
-        (…).
+        Centre, (…).
     spokes
         From the centre to the places, (…, 3).
     chords
-        Between the places, each opposite to its own: A₃ − A₂, A₁ − A₃ and A₂ − A₁, (…, 3).
+        Between the places, each opposite to its place: A₃ − A₂, A₁ − A₃ and A₂ − A₁, (…, 3).
     pull
         dc/dg of each place, as above, (…, 3).
 
@@ -170,14 +170,14 @@ def sensitivity(found: Circle, own: Complex, shared: Complex) -> Array:
     """
     Return Σ|x·∂c/∂x| + ``abs(c)`` of the centre c over all inputs x; (…).
 
-    Times 2⁻⁵³ it is what rounding the inputs alone can make of the centre.
+    Times 2⁻⁵³ it bounds the error of the centre that rounding the inputs alone causes.
 
     Parameters
     ----------
     found
         The circle.
     own
-        x·∂A/∂x of each place by the inputs that move it alone, (…, 3, k).
+        x·∂A/∂x of each place by the inputs that move only this place, (…, 3, k).
     shared
         x·∂A/∂x of each place by the inputs that move all three, (…, 3, m).
 
@@ -192,9 +192,9 @@ def sensitivity(found: Circle, own: Complex, shared: Complex) -> Array:
 
 def number(place: Place) -> Complex:
     """Return a place as the nearest complex number."""
-    found = np.empty(place[0][0].shape, np.complex128)
-    found.real, found.imag = place[0][0], place[1][0]
-    return found
+    complex_place = np.empty(place[0][0].shape, np.complex128)
+    complex_place.real, complex_place.imag = place[0][0], place[1][0]
+    return complex_place
 
 
 def _at(places: Place, index: int) -> Place:
@@ -207,26 +207,26 @@ def _minus(one: Place, other: Place) -> Place:
 
 
 TRUSTED = 2.0
-"""Units of roundoff times sensitivity that the error of a pivot stays within: one for the rounding
-of what is given, and one for what is worked out here, which measured is a third of that."""
+"""Bound of a pivot's error, in units of roundoff times sensitivity: one for the rounding of the
+inputs, and one for the computation, whose measured error is a third of that."""
 
 
 class Links(NamedTuple):
     """
-    Links that lead from fixed pivots to moving ones; any number of them at once.
+    Links from fixed pivots to moving ones; any number of them at once.
 
     Attributes
     ----------
     pivots
-        The pivots that were found, (…), in [m]: fixed ones in the ground's frame, moving ones in
-        the coupler's. Infinite or nan where there is none.
+        The computed pivots, (…), in [m]: fixed ones in the frame of the ground, moving ones in
+        that of the coupler. Infinite or NaN if there is none.
     arms
-        From the fixed pivot to the moving one in the ground's frame, at each pose, (…, 3).
+        From the fixed pivot to the moving one in the frame of the ground, at each pose, (…, 3).
     sensitivity
         Σ|x ∂p/∂x| + ``abs(p)`` of each pivot p over poses and given pivot x; (…). Times 2⁻⁵³ it
-        is what rounding these alone can make of the pivot.
+        bounds the error of the pivot that rounding these alone causes.
     chords
-        Between the places that the given pivot has, each opposite to its own, (…, 3).
+        Between the places of the given pivot, each opposite to its place, (…, 3).
 
     """
 
@@ -242,7 +242,7 @@ class Links(NamedTuple):
 
     @property
     def digits(self) -> Array:
-        """Return how many digits of each pivot, on the scale of its link, can be trusted; (…)."""
+        """Return the number of reliable digits of each pivot, on the scale of its link; (…)."""
         with np.errstate(all='ignore'):
             lost = TRUSTED * UNIT_ROUNDOFF * self.sensitivity / self.lengths
             digits: Array = np.clip(np.nan_to_num(-np.log10(lost), nan=0.0), 0.0, 16.0)
@@ -251,49 +251,49 @@ class Links(NamedTuple):
 
 def fixed_pivots(places: Complex, angles: Array, moving: ArrayLike) -> Links:
     """
-    Return the links that carry moving pivots (…) through poses (…, 3); nothing is raised.
+    Return the links that carry moving pivots (…) through poses (…, 3), without raising errors.
 
     Parameters
     ----------
     places, angles
-        Of the coupler, in [m] and [rad].
+        Places and angles of the coupler, in [m] and [rad].
     moving
-        In the coupler's frame, in [m].
+        Pivots in the frame of the coupler, in [m].
 
     """
     point = np.asarray(moving, np.complex128)[..., None]
     sine, cosine = sine_cosine(_twofold(angles))
     x, y = _turned(_twofold(point.real), _twofold(point.imag), cosine, sine)
-    found = circle((plus(_twofold(places.real), x), plus(_twofold(places.imag), y)))
+    circles = circle((plus(_twofold(places.real), x), plus(_twofold(places.imag), y)))
     turn = cosine[0] + 1j * sine[0]
     own = np.stack(_every(places.real, 1j * places.imag, 1j * angles * turn * point), -1)
     shared = np.stack(_every(turn * point.real, 1j * turn * point.imag), -1)
-    return Links(found.centre, found.spokes, sensitivity(found, own, shared), found.chords)
+    return Links(circles.centre, circles.spokes, sensitivity(circles, own, shared), circles.chords)
 
 
 def moving_pivots(places: Complex, angles: Array, fixed: ArrayLike) -> Links:
     """
-    Return the links that lead from fixed pivots (…) to poses (…, 3); nothing is raised.
+    Return the links that lead from fixed pivots (…) to poses (…, 3), without raising errors.
 
     Parameters
     ----------
     places, angles
-        Of the coupler, in [m] and [rad].
+        Places and angles of the coupler, in [m] and [rad].
     fixed
-        In the ground's frame, in [m].
+        Pivots in the frame of the ground, in [m].
 
     """
     point = np.asarray(fixed, np.complex128)[..., None]
     sine, cosine = sine_cosine(_twofold(-angles))
     x = minus(_twofold(point.real), _twofold(places.real))
     y = minus(_twofold(point.imag), _twofold(places.imag))
-    found = circle(_turned(x, y, cosine, sine))
+    circles = circle(_turned(x, y, cosine, sine))
     turn = cosine[0] + 1j * sine[0]
     about = -1j * angles * turn * (x[0] + 1j * y[0])
     own = np.stack(_every(-turn * places.real, -1j * turn * places.imag, about), -1)
     shared = np.stack(_every(turn * point.real, 1j * turn * point.imag), -1)
-    arms = -np.conj(turn) * found.spokes
-    return Links(found.centre, arms, sensitivity(found, own, shared), found.chords)
+    arms = -np.conj(turn) * circles.spokes
+    return Links(circles.centre, arms, sensitivity(circles, own, shared), circles.chords)
 
 
 def _turned(x: Twofold, y: Twofold, cosine: Twofold, sine: Twofold) -> tuple[Twofold, Twofold]:
@@ -313,27 +313,27 @@ def _every(*numbers: ArrayLike) -> list[Any]:
 
 
 _LONGEST = 1e9
-"""In chords: a link beyond it is an infinite one but for rounding."""
+"""In chords: the length of a longer link is indistinguishable from infinite."""
 
 _NEAR = 1e-3
-"""Places nearer than this, in parts of the motion, are at the pole rather than on a line."""
+"""Places nearer than this, relative to the motion, are at the pole rather than on a line."""
 
 
 def from_moving_pivots(poses: Sequence[Pose], a: complex, b: complex) -> tuple[Design, Links]:
     """
-    Design the four-bar whose coupler has its pins in two given points.
+    Design the four-bar whose coupler has its pins at two given points.
 
     Parameters
     ----------
     poses
-        Three.
+        Three poses.
     a, b
-        The pins of crank and rocker, in the coupler's frame, in [m].
+        The pins of crank and rocker, in the frame of the coupler, in [m].
 
     Raises
     ------
     SynthesisError
-        Where no link carries one of the pins through its places, or the ground has no length.
+        If no link carries one of the pins through its places, or the ground has no length.
 
     """
     check_task(poses, {'A': a, 'B': b})
@@ -347,19 +347,19 @@ def from_moving_pivots(poses: Sequence[Pose], a: complex, b: complex) -> tuple[D
 
 def from_fixed_pivots(poses: Sequence[Pose], o2: complex, o4: complex) -> tuple[Design, Links]:
     """
-    Design the four-bar that stands on two given places.
+    Design the four-bar whose fixed pivots are two given places.
 
     Parameters
     ----------
     poses
-        Three.
+        Three poses.
     o2, o4
-        The pivots of crank and rocker, in the ground's frame, in [m].
+        The pivots of crank and rocker, in the frame of the ground, in [m].
 
     Raises
     ------
     SynthesisError
-        Where no link leads from one of the pivots to the coupler, or the coupler has no length.
+        If no link leads from one of the pivots to the coupler, or the coupler has no length.
 
     """
     check_task(poses, {'O2': o2, 'O4': o4})
@@ -386,7 +386,7 @@ def _design(poses: Sequence[Pose], links: Links, fixed: Complex, moving: Complex
 def _check_link(
     poses: Sequence[Pose], name: str, links: Links, index: int, kind: str, far: float
 ) -> None:
-    """Refuse a pivot from which no link of one length leads to its other end."""
+    """Refuse a pivot from which no link of constant length leads to its other end."""
     chords = np.abs(links.chords[index])
     longest = float(chords.max())
     resting = [
@@ -428,7 +428,7 @@ def _check_link(
 
 
 def _check_distance(links: Links, names: str, kind: str, link: str) -> None:
-    """Refuse two links that meet in the pivot that was found."""
+    """Refuse two links that meet in the computed pivot."""
     one, other = (complex(pivot) for pivot in links.pivots)
     size = TRUSTED * float(links.sensitivity.sum()) + 4.0 * float(links.lengths.max())
     if abs(one - other) <= UNIT_ROUNDOFF * size:

@@ -14,20 +14,20 @@
 
 
 """
-The proof of a design: every position that was asked for, analysed again on both assemblies.
+Analysis of a design: every wanted position is solved again on both assemblies.
 
-The course of a four-bar through its positions is their branch, circuit, order and transmission
-angle.
+The course of a four-bar through its positions describes their branch, circuit, order and
+transmission angle.
 
-A four-bar has two assemblies. Where the crank turns fully they never meet, and each is a circuit:
-what lies on the other can be reached only by taking the linkage apart. Else the crank moves
-between toggles, in one range where no link turns fully, in two where one does; in a range both
-assemblies join at the toggles, so that they are two branches of one circuit (T. R. Chase and J. A.
-Mirth, Circuits and branches of single-degree-of-freedom planar linkages, Journal of Mechanical
-Design 115 (1993) 223-230). Circuits touch where a linkage can fold flat: at a change point.
+A four-bar has two assemblies. If the crank turns fully they never meet, and each is a circuit: the
+other can be reached only by taking the linkage apart. Otherwise the crank moves between toggles,
+in one range if no link turns fully, in two if one does; in a range both assemblies join at the
+toggles, so that they are two branches of one circuit (T. R. Chase and J. A. Mirth, Circuits and
+branches of single-degree-of-freedom planar linkages, Journal of Mechanical Design 115 (1993)
+223-230). Circuits touch where a linkage can fold flat: at a change point.
 
-The functions of the course take any number of linkages at once. Directions of the crank are those
-of the vector O2→A less that of O2→O4, in [rad].
+The functions of the course take any number of linkages at once. A direction of the crank is that
+of the vector O2→A minus that of O2→O4, in [rad].
 """
 
 from __future__ import annotations
@@ -50,18 +50,18 @@ Flags = NDArray[np.bool_]
 _TURN = 2.0 * np.pi
 
 _SAME = 1e-9
-"""Crank angles nearer than this are the same, in [rad]."""
+"""Crank angles nearer than this count as equal, in [rad]."""
 
 
 class Mobility(NamedTuple):
     """
-    Where four-bars can go.
+    The mobility of four-bars.
 
     Attributes
     ----------
     excess
-        How much the shortest and the longest link are together shorter than the others; above 0
-        where some link turns fully, 0 where the linkage can fold flat; (…).
+        Sum of the other two links minus the sum of the shortest and the longest; above 0 if some
+        link turns fully, 0 if the linkage can fold flat; (…).
     turns
         Whether the crank turns fully; (…).
 
@@ -73,7 +73,7 @@ class Mobility(NamedTuple):
 
 class Course(NamedTuple):
     """
-    How four-bars go through their positions.
+    The way of four-bars through their positions.
 
     Attributes
     ----------
@@ -86,8 +86,8 @@ class Course(NamedTuple):
     in_order
         Whether the crank visits them in their order, going one way, for one turn at most; (…).
     directions
-        Of the crank at each position, with the turns between them: the first as given, and the
-        shorter way where both ways are in order; (…, n). Of no meaning where none is.
+        Directions of the crank at each position, with the turns between them: the first as given,
+        and the shorter way if both ways are in order; (…, n). Meaningless if none is.
 
     """
 
@@ -99,41 +99,41 @@ class Course(NamedTuple):
 
     @property
     def usable(self) -> Flags:
-        """Return whether a crank that goes one way moves through all positions, in order."""
+        """Return whether a crank in one direction moves through all positions, in order."""
         return self.one_branch & self.one_circuit & self.in_order
 
 
 def mobility(lengths: Array) -> Mobility:
-    """Return where four-bars of crank, coupler, rocker and ground can go, lengths of (…, 4)."""
+    """Return the mobility of four-bars, from lengths of crank, coupler, rocker, ground, (…, 4)."""
     ordered = np.sort(lengths, -1)
     shortest = ordered[..., 0]
     excess = (ordered[..., 1] - shortest) - (ordered[..., 3] - ordered[..., 2])
     rounding = _rounding(lengths)
     excess = np.where(np.abs(excess) <= rounding, 0.0, excess)
     beside = np.minimum(lengths[..., 0], lengths[..., 3])
-    # The crank turns against the ground where one of the two is shortest. Of two shortest links
-    # only a change point is made, and there it may be either.
+    # The crank turns fully if crank or ground is shortest. Two shortest links occur only at a
+    # change point, and there either may turn.
     return Mobility(excess, (excess >= 0.0) & (beside - shortest <= rounding))
 
 
 def course(lengths: Array, directions: Array, left: Flags) -> Course:
     """
-    Return how four-bars go through their positions.
+    Return the course of four-bars through their positions.
 
     Parameters
     ----------
     lengths
         Of crank, coupler, rocker and ground, above 0; (…, 4).
     directions
-        Of the crank at each position, in [rad]; (…, n).
+        Directions of the crank at each position, in [rad]; (…, n).
     left
-        Whether the position is met on the left assembly; (…, n).
+        Whether the position is on the left assembly; (…, n).
 
     """
     excess, turns = mobility(lengths)
     one_branch = (left == left[..., :1]).all(-1)
-    # Where a link other than crank or ground turns fully, the crank stays on one side of the
-    # ground line.
+    # If a link other than crank or ground turns fully, the crank stays on one side of the ground
+    # line.
     upper = np.sin(directions) >= 0.0
     one_side = (upper == upper[..., :1]).all(-1)
     one_circuit = np.where(turns, one_branch, one_side) | (excess <= 0.0)
@@ -154,8 +154,8 @@ def _lifted(lengths: Array, directions: Array, turns: Flags) -> tuple[Array, Fla
     round_steps = np.where((length_ahead <= length_back)[..., None], ahead, -back)
     in_turn = np.minimum(length_ahead, length_back) <= _TURN + _SAME
 
-    # One range that lies about the direction in which the linkage closes, 0 or π; or two, one on
-    # each side of the ground line.
+    # One range around the direction in which the linkage closes, 0 or π; or two, one on each side
+    # of the ground line.
     a, b, c, d = (lengths[..., i] for i in range(4))
     about_pi = np.abs(b - c) - np.abs(d - a) > _rounding(lengths)
     wrapped = directions - _TURN * np.round(directions / _TURN)
@@ -170,13 +170,13 @@ def _lifted(lengths: Array, directions: Array, turns: Flags) -> tuple[Array, Fla
 
 
 def _rounding(lengths: Array) -> Array:
-    """Return what a sum of four lengths may be off by, as `diagonal.margin` has it."""
+    """Return the rounding error of a sum of four lengths, as in `rounding.margin`."""
     total: Array = 4.0 * UNIT_ROUNDOFF * lengths.sum(-1)
     return total
 
 
 def _ahead(by: Array) -> Array:
-    """Return how far a crank turns ahead for differences of directions."""
+    """Return the forward rotation of a crank for differences of directions."""
     ahead = np.mod(by, _TURN)
     return np.where(ahead > _TURN - _SAME, ahead - _TURN, ahead)
 
@@ -194,7 +194,7 @@ def transmission(lengths: Array, direction: Array) -> Array:
     lengths
         Of crank, coupler, rocker and ground; (…, 4).
     direction
-        Of the crank, in [rad]; (…).
+        Direction of the crank, in [rad]; (…).
 
     """
     a, b, c, d = (lengths[..., i] for i in range(4))
@@ -203,7 +203,7 @@ def transmission(lengths: Array, direction: Array) -> Array:
     below = ((d - a) - (b - c)) * ((d - a) + (b - c)) + swing * np.sin(half) ** 2
     above = ((b + c) - (a + d)) * ((b + c) + (a + d)) + swing * np.cos(half) ** 2
     below, above = np.maximum(below, 0.0), np.maximum(above, 0.0)
-    # Of μ and its supplement the acute one, without a difference from π.
+    # The acute one of μ and its supplement, without a difference from π.
     acute: Array = 2.0 * np.arctan2(
         np.sqrt(np.minimum(below, above)), np.sqrt(np.maximum(below, above))
     )
@@ -212,9 +212,9 @@ def transmission(lengths: Array, direction: Array) -> Array:
 
 def least_transmission(lengths: Array, start: Array, end: Array) -> tuple[Array, Array]:
     """
-    Return the least transmission angle of a travel, in [rad], and the direction where it is.
+    Return the least transmission angle of a travel, in [rad], and its direction of the crank.
 
-    Between two passes of the ground line, at direction 0 or π, the distance s goes one way, and
+    Between two passes of the ground line, at direction 0 or π, the distance s is monotonic, and
     the angle with it; so the least is at one of the ends or of these.
 
     Parameters
@@ -222,7 +222,7 @@ def least_transmission(lengths: Array, start: Array, end: Array) -> tuple[Array,
     lengths
         Of crank, coupler, rocker and ground; (…, 4).
     start, end
-        Directions of the crank, in [rad], at most a turn from each other; (…).
+        Directions of the crank, in [rad], at most a turn apart; (…).
 
     """
     low, high = np.minimum(start, end), np.maximum(start, end)
@@ -240,30 +240,30 @@ def least_transmission(lengths: Array, start: Array, end: Array) -> tuple[Array,
 SIDES: tuple[Assembly, Assembly] = ('left', 'right')
 
 SAME = 1e-9
-"""What angles may differ by and be the same, in [rad]; the lengths' own error is far below."""
+"""Angles nearer than this count as equal, in [rad]; the lengths' error is far below."""
 
 _MARKEDLY = 2.0
-"""An assembly is better where the other's error is this many times its own: at a toggle, where
-the two meet, and in a design that only comes near, it is the smaller of two errors otherwise."""
+"""An assembly is better if the error of the other is this many times larger. At a toggle, where
+the two meet, and in an approximate design, it would otherwise be the smaller of two errors."""
 
 
 class Met(NamedTuple):
     """
-    How a position is met.
+    A position of a design, compared with the wanted one.
 
     Attributes
     ----------
     side
-        The assembly that meets it: the side of A→O4 on which B lies.
+        The assembly: the side of A→O4 on which B lies.
     angle
-        What the rocker, or the coupler, has over the angle that was asked for, in [rad]; 0 where
-        none was. Of both, the one that is farther off.
+        Error of the angle of rocker or coupler, in [rad]; 0 if none was wanted. If both were
+        wanted, the larger error.
     distance
-        How far the traced point is from its place, in [m]; 0 where none was asked for.
+        Distance of the traced point from its wanted place, in [m]; 0 if none was wanted.
     status
-        Whether the loop closes there; where it does not, nothing is met.
+        Whether the loop closes there; if not, the position is not met.
     gap
-        What the links miss each other by where it does not, in [m].
+        Distance by which the links miss each other if it does not close, in [m].
 
     """
 
@@ -275,27 +275,27 @@ class Met(NamedTuple):
 
     @property
     def closed(self) -> bool:
-        """Whether the position exists at all."""
+        """Whether the position exists."""
         return self.status.has_pose
 
 
 def prove(design: Design) -> tuple[Met, ...]:
     """
-    Return for each position on which assembly it is met, and with what errors.
+    Return for each position the assembly that meets it, with its errors.
 
-    The linkage is closed as a node closes it. A position that both assemblies meet as well is met
-    on the design's own.
+    The linkage is closed as in a node. If both assemblies meet a position equally well, that of
+    the design is returned.
     """
-    own = design.four_bar.side
-    found = []
+    side = design.four_bar.side
+    results = []
     for left, right in zip(*proofs(design), strict=True):
-        better = _better(left, right, sum(design.four_bar.lengths)) or own
-        found.append(left if better == 'left' else right)
-    return tuple(found)
+        better = _better(left, right, sum(design.four_bar.lengths)) or side
+        results.append(left if better == 'left' else right)
+    return tuple(results)
 
 
 def assembled(design: Design) -> Design:
-    """Return a design on the assembly that meets most of its positions; of two, the first's."""
+    """Return a design on the assembly that meets most positions; on a tie, that of the first."""
     size = sum(design.four_bar.lengths)
     left, right = proofs(design)
     better = [_better(one, other, size) for one, other in zip(left, right, strict=True)]
@@ -309,7 +309,7 @@ def assembled(design: Design) -> Design:
 
 
 def proofs(design: Design) -> tuple[tuple[Met, ...], tuple[Met, ...]]:
-    """Return how every position is met on the left, and on the right assembly."""
+    """Return the result of every position on the left, and on the right assembly."""
     left, right = (
         tuple(_met(closure, side, wanted) for wanted in design.wanted)
         for side, closure in ((side, closure_of(design, side)) for side in SIDES)
@@ -318,7 +318,7 @@ def proofs(design: Design) -> tuple[tuple[Met, ...], tuple[Met, ...]]:
 
 
 def closure_of(design: Design, side: Assembly) -> Closure:
-    """Return a design on one assembly, ready to be solved."""
+    """Return the closure of a design on one assembly."""
     return Closure(replace(design.four_bar, side=side).linkage())
 
 
@@ -340,9 +340,9 @@ def _met(closure: Closure, side: Assembly, wanted: Wanted) -> Met:
 
 def closed_position(closure: Closure, crank: float) -> Position:
     """
-    Close the loop; what is beyond an end of the range by rounding only is at that end.
+    Close the loop; a crank beyond an end of the range only by rounding is set to that end.
 
-    A design may be wanted right at a toggle, where the last digit of its lengths decides.
+    A design may be wanted at a toggle, where the last digit of its lengths decides.
     """
     position = closure.position(crank)
     if position.status is Status.OPEN:
@@ -354,7 +354,7 @@ def closed_position(closure: Closure, crank: float) -> Position:
 
 
 def _better(left: Met, right: Met, size: float) -> Assembly | None:
-    """Return the assembly that meets a position markedly better, if one does."""
+    """Return the assembly that meets a position markedly better, or None."""
     one, other = _error(left, size), _error(right, size)
     if other > _MARKEDLY * one + SAME * size:
         return 'left'
@@ -362,5 +362,5 @@ def _better(left: Met, right: Met, size: float) -> Assembly | None:
 
 
 def _error(met: Met, size: float) -> float:
-    """Return an error of any kind as a length, for links of a total length."""
+    """Return the error as a length, for links of a total length."""
     return abs(met.angle) * size + met.distance if met.closed else inf

@@ -13,14 +13,14 @@
 # limitations under the License.
 
 """
-A search over random candidates: here, or by the workers of a Dask scheduler.
+A search over random candidates, in this process or on the workers of a Dask scheduler.
 
-Candidates come in chunks. Each chunk draws from a generator of its own, seeded by the study's seed
-and the chunk's number, and results are ordered by score, then by place in the study. So the result
-depends neither on the number of workers nor on which of them is first. (To the last bit where they
-have the same processor and the same numpy; elsewhere as far as its exp and sin agree.)
+Candidates come in chunks. Each chunk has its own random generator, seeded by the study's seed and
+the chunk's number, and results are ordered by score, then by place in the study. So the result
+depends neither on the number of workers nor on their order. (It is equal to the last bit on the
+same processor and numpy; elsewhere as far as their exp and sin agree.)
 
-Dask itself starts the work of a worker that died again. Whatever it cannot mend ends in one error.
+Dask itself repeats the work of a worker that died. Any other failure ends in one error.
 """
 
 from __future__ import annotations
@@ -41,16 +41,14 @@ from linkage_ros.errors import LinkageError
 import numpy as np
 from numpy.typing import NDArray
 
-# Libraries that only some kinds of synthesis need, and what to install where one is missing.
-
 
 def scipy_optimize() -> Any:
-    """Return scipy.optimize, for all that is fitted."""
+    """Return scipy.optimize, for fits."""
     return _library('scipy.optimize', 'design')
 
 
 def distributed() -> Any:
-    """Return dask.distributed, for studies that outgrow one machine."""
+    """Return dask.distributed, for studies on several machines."""
     return _library('distributed', 'dask')
 
 
@@ -67,32 +65,32 @@ Part = TypeVar('Part')
 Result = TypeVar('Result')
 
 _AHEAD = 3
-"""Tasks under way for each thread of the workers: no thread waits, and no queue grows."""
+"""Tasks in progress for each thread of the workers: no thread waits, and no queue grows."""
 
 _PATIENCE = 10.0
-"""Seconds until a scheduler that does not answer is none, and between two looks at workers from
-which nothing comes."""
+"""Seconds to wait for the answer of a scheduler, and between two checks of workers that return
+nothing."""
 
 
 def results_of(
     work: Callable[[Part], Result], parts: Callable[[int], Iterator[Part]], address: str
 ) -> Generator[tuple[Part, Result], None, None]:
     """
-    Give parts and what they come to, in the order in which they come.
+    Yield parts and their results, in the order in which they arrive.
 
     Parameters
     ----------
     work
         Takes a part; it goes to the workers by pickle.
     parts
-        Takes the number of threads that the workers have, and gives parts as they are asked for.
+        Takes the number of threads of the workers, and yields parts on demand.
     address
-        Of the scheduler.
+        Address of the scheduler.
 
     Raises
     ------
     LinkageError
-        Where the scheduler or its workers cannot do it. What the work raises comes as it is.
+        If the scheduler or its workers fail. Errors of the work are raised unchanged.
 
     """
     with _client(address) as client:
@@ -104,8 +102,8 @@ def results_of(
             room = _AHEAD * _threads(address, client) - len(running)
             for part in islice(waiting, max(room, 0)):
                 task = client.submit(work, part, pure=False)
-                # A future of the standard library's: waiting for it can be given up. Those of
-                # Client.get_executor() end in a TypeError where a worker was lost.
+                # A future of the standard library: a wait for it can be cancelled. Those of
+                # Client.get_executor() end in a TypeError if a worker was lost.
                 result = client.gather(task, asynchronous=True)
                 running[asyncio.run_coroutine_threadsafe(result, loop)] = part
             if not running:
@@ -117,7 +115,7 @@ def results_of(
 @contextmanager
 def _client(address: str) -> Iterator[Any]:
     dask = distributed()
-    # What it logs when a connection is lost, with traceback, ends in an error here.
+    # Its log of a lost connection, with traceback, becomes an error here.
     log = getLogger('distributed.client')
     level = log.level
     log.setLevel(CRITICAL)
@@ -130,34 +128,34 @@ def _client(address: str) -> Iterator[Any]:
 
 
 def _knock(address: str) -> None:
-    """Refuse an address that is not a scheduler's; a client would wait for one that is silent."""
+    """Refuse an address without a scheduler; a client would wait for a silent one."""
     dask = distributed()
 
     async def identity() -> Any:
         secrets = dask.Security().get_connection_args('client')
         async with dask.rpc(address, timeout=_PATIENCE, connection_args=secrets) as server:
-            # Longer than to connect, so that who does not listen is not called silent.
+            # Longer than the connection timeout, to tell a closed port from a silent server.
             return await asyncio.wait_for(server.identity(), 1.5 * _PATIENCE)
 
     try:
-        # In a thread of its own: who calls may have a loop that is running.
+        # In a separate thread: the caller may have a running event loop.
         with ThreadPoolExecutor(1) as thread:
-            found = thread.submit(asyncio.run, identity()).result()
-    # An address without host or port, or of an unknown kind, has an error of its own each.
+            identified = thread.submit(asyncio.run, identity()).result()
+    # An address without host or port, or of an unknown kind, raises one of these errors.
     except (OSError, asyncio.TimeoutError, ValueError, TypeError, AssertionError) as error:
         raise LinkageError(
             address,
             f'no Dask scheduler answers here ({str(error) or "it is silent"})',
             'start one by `dask scheduler`, and give the address that it prints',
         ) from error
-    if found['type'] != 'Scheduler':
+    if identified['type'] != 'Scheduler':
         raise LinkageError(
-            address, f'is a Dask {found["type"]}', 'give the address of the scheduler'
+            address, f'is a Dask {identified["type"]}', 'give the address of the scheduler'
         )
 
 
 def _check_workers(address: str, client: Any) -> None:
-    """Refuse workers that have another version of this package, or none."""
+    """Refuse workers without this package or with another version of it."""
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except asyncio.TimeoutError:
@@ -217,23 +215,23 @@ def _lost(address: str) -> LinkageError:
 Array = NDArray[np.float64]
 
 CHUNK = 16384
-"""Candidates that are drawn and scored at once."""
+"""Number of candidates drawn and scored at once."""
 
 _MOST_CHUNKS = 16
-"""In a task: of a cheap problem one chunk takes no longer than to send it away."""
+"""Chunks in a task: for a cheap problem one chunk takes no longer than sending it."""
 
 _FEWEST_TASKS = 16
-"""For each thread, before they grow: the last thread shall not be long behind the others."""
+"""Tasks for each thread before they grow, so that the last thread does not finish far behind."""
 
 
 class Problem(Protocol):
-    """What is searched for; it goes to workers by pickle, and keeps no state."""
+    """A search problem; it goes to workers by pickle, and has no state."""
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
         """Draw candidates, (count, n)."""
 
     def score(self, candidates: Array) -> Array:
-        """Return what candidates (count, n) are worth, (count,): less is better, inf is none."""
+        """Return the scores of candidates (count, n), (count,): less is better, inf is invalid."""
 
 
 class Found(NamedTuple):
@@ -244,7 +242,7 @@ class Found(NamedTuple):
 
 
 class _Best(NamedTuple):
-    """Candidates in order: scores (k,), places in the study (k,), and numbers (k, n)."""
+    """Candidates in order: scores (k,), indices in the study (k,), and values (k, n)."""
 
     scores: Array
     places: NDArray[np.int64]
@@ -252,7 +250,7 @@ class _Best(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """A part of a study: the candidates from one place, at which a chunk begins, to another."""
+    """A part of a study: a range of candidates that begins with a chunk."""
 
     first: int
     last: int
@@ -275,20 +273,20 @@ def search(
     problem
         Draws and scores candidates.
     seed
-        Of the study, 0 or above.
+        Seed of the study, 0 or above.
     count
-        Candidates to draw.
+        Number of candidates to draw.
     keep
-        Candidates to return; fewer where fewer have a score below infinity.
+        Number of candidates to return; fewer if fewer have a finite score.
     progress
-        Is told how many candidates are done, and of how many.
+        Called with the number of candidates that are done, and their total.
     address
-        Of a Dask scheduler, such as ``tcp://host:8786``; '' to search in this process.
+        Address of a Dask scheduler, such as ``tcp://host:8786``; '' to search in this process.
 
     Raises
     ------
     LinkageError
-        Where the scheduler or its workers cannot do it.
+        If the scheduler or its workers fail.
 
     """
     work = partial(_best, problem, seed, keep)
@@ -299,8 +297,8 @@ def search(
     )
     best, done = None, 0
     with closing(results):
-        for part, found in results:
-            best = found if best is None else _merged((best, found), keep)
+        for part, chunk_best in results:
+            best = chunk_best if best is None else _merged((best, chunk_best), keep)
             done += part.last - part.first
             if progress is not None:
                 progress(done, count)
@@ -322,7 +320,7 @@ def _tasks(count: int, threads: int) -> Iterator[_Part]:
 
 
 def _best(problem: Problem, seed: int, keep: int, part: _Part) -> _Best:
-    """Return the best candidates of a part, which may be of many chunks."""
+    """Return the best candidates of a part, which may have several chunks."""
     best = None
     for first in range(part.first, part.last, CHUNK):
         generator = np.random.default_rng([seed, first // CHUNK])
@@ -330,14 +328,14 @@ def _best(problem: Problem, seed: int, keep: int, part: _Part) -> _Best:
         scores = np.asarray(problem.score(candidates), np.float64)
         possible = np.flatnonzero(scores < np.inf)
         chosen = possible[np.argsort(scores[possible], kind='stable')[:keep]]
-        found = _Best(scores[chosen], first + chosen, candidates[chosen])
-        best = found if best is None else _merged((best, found), keep)
+        chunk_best = _Best(scores[chosen], first + chosen, candidates[chosen])
+        best = chunk_best if best is None else _merged((best, chunk_best), keep)
     if best is None:
         raise ValueError(f'{part} is empty')
     return best
 
 
-def _merged(found: tuple[_Best, ...], keep: int) -> _Best:
-    scores, places, candidates = (np.concatenate(each) for each in zip(*found, strict=True))
+def _merged(parts: tuple[_Best, ...], keep: int) -> _Best:
+    scores, places, candidates = (np.concatenate(each) for each in zip(*parts, strict=True))
     order = np.lexsort((places, scores))[:keep]
     return _Best(scores[order], places[order], candidates[order])

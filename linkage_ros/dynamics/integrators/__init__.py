@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How a state of one freedom is carried on by a step of time, one method a file."""
+"""Integration methods for one degree of freedom, one method a file."""

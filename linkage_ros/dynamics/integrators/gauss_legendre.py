@@ -16,15 +16,15 @@
 """
 Gauss's collocation with three stages: of order 6, implicit, and symmetric in time.
 
-Being symmetric, it keeps the energy of a motion that can be run backwards, as that of an undamped
-linkage, to within a bound for ever, rounding apart (E. Hairer, C. Lubich, G. Wanner, Geometric
+Because it is symmetric, it keeps the energy of a reversible motion, such as that of an undamped
+linkage, within a bound for ever, apart from rounding (E. Hairer, C. Lubich, G. Wanner, Geometric
 Numerical Integration, 2nd ed., 2006, II.1.3, XI.3). With the accelerations A of the stages::
 
     q_i = q + h·c_i·w + h²·Σ ā_ij·A_j        w_i = w + h·Σ a_ij·A_j        A_i = a(q_i, w_i)
     q₁  = q + h·w     + h²·Σ b̄_j·A_j         w₁  = w + h·Σ b_j·A_j
 
-where ā = a·a and b̄_j = b_j·(1 − c_j). The stages are iterated until they no longer change but by
-rounding, which is what keeps the energy to rounding too (E. Hairer, R. McLachlan, A. Razakarivony,
+where ā = a·a and b̄_j = b_j·(1 − c_j). The stages are iterated until only rounding changes them,
+which keeps the energy to rounding too (E. Hairer, R. McLachlan, A. Razakarivony,
 Achieving Brouwer's law with implicit Runge-Kutta methods, BIT 48, 2008).
 """
 
@@ -56,37 +56,37 @@ _LEVERS = tuple(b * (1.0 - c) for b, c in zip(WEIGHTS, NODES, strict=True))
 _STAGES = tuple(zip(NODES, _SQUARE, MATRIX, strict=True))
 
 _ITERATIONS = 20
-"""More than this is not convergence; a shorter step converges faster."""
+"""More iterations mean no convergence; a shorter step converges faster."""
 _ROUNDING = 2.0**-54
-"""What is no change any more, as a share of the accelerations."""
+"""Smaller changes count as none, relative to the accelerations."""
 _NOISE = 1e-12
-"""Changes that grow again are rounding where they are below this share, and divergence above."""
+"""Changes that grow again are rounding below this fraction, and divergence above it."""
 
 
 def step(
     field: Field, value: float, rate: float, acceleration: float, length: float
 ) -> tuple[float, float] | None:
-    """Carry a state on by a length of time, as `Step` says."""
-    found = [acceleration, acceleration, acceleration]
+    """Advance a state by a length of time, as `Step` specifies."""
+    stages = [acceleration, acceleration, acceleration]
     square = length * length
     before = 0.0
     for _ in range(_ITERATIONS):
         change = largest = 0.0
         for i, (c, (s1, s2, s3), (a1, a2, a3)) in enumerate(_STAGES):
-            # The stages before this one are those of this round already: it converges faster.
-            f1, f2, f3 = found
+            # Earlier stages already have this iteration's values, which converges faster.
+            f1, f2, f3 = stages
             at = value + (length * c * rate + square * (s1 * f1 + s2 * f2 + s3 * f3))
             new = field(at, rate + length * (a1 * f1 + a2 * f2 + a3 * f3))
             if new is None:
                 return None
-            change = max(change, abs(new - found[i]))
+            change = max(change, abs(new - stages[i]))
             largest = max(largest, abs(new))
-            found[i] = new
+            stages[i] = new
         grows = 0.0 < before <= change
         # Changes fall by one factor: the next would be change²/before.
         settled = change * change <= _ROUNDING * largest * before
         if settled or change == 0.0 or (grows and change <= _NOISE * largest):
-            f1, f2, f3 = found
+            f1, f2, f3 = stages
             b1, b2, b3 = WEIGHTS
             l1, l2, l3 = _LEVERS
             moved = length * rate + square * (l1 * f1 + l2 * f2 + l3 * f3)

@@ -16,16 +16,16 @@
 """
 The methods of integration, for one freedom: q' = w, w' = a(q, w).
 
-Each is a module, imported only where a scene names the method, with
+Each is a module, imported only if a scene names the method, with
 
 ``ORDER``
     The error of a motion falls with this power of the step.
 ``step``
     A `Step`.
 
-All work on the value q and its rate w, not on the momentum, so that what they are given is what is
-published. The step is fixed: an adaptive one would make the cost of a tick, and with it whether
-the tick is in time, depend on the motion.
+All use the value q and its rate w, not the momentum, so their state is what is published. The step
+is fixed: with an adaptive step the cost of a tick, and so whether it meets its deadline, would
+depend on the motion.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ METHODS = {
 """Name of each method, and the module that holds it."""
 
 Field = Callable[[float, float], float | None]
-"""a(q, w), in [rad/s²] or [m/s²]; None where there is no such motion."""
+"""a(q, w), in [rad/s²] or [m/s²]; None if there is no such motion."""
 
 Step = Callable[[Field, float, float, float, float], tuple[float, float] | None]
 """
-Takes a(q, w), q, w, a at these, and the length of the step in [s]; returns q and w at its end.
+Takes a(q, w), q, w, the acceleration there, and the step in [s]; returns q and w at its end.
 
-None where the step cannot be done: a stage lies where there is no motion, or does not converge.
+Returns None if a stage lies where there is no motion, or does not converge.
 """

@@ -17,7 +17,7 @@
 The classical Runge-Kutta method: four evaluations a step, of order 4.
 
 W. Kutta, Beitrag zur näherungsweisen Integration totaler Differentialgleichungen, Zeitschrift für
-Mathematik und Physik 46, 1901. Each stage starts from the slopes of the one before it alone.
+Mathematik und Physik 46, 1901. Each stage starts from the slopes of the previous one only.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from linkage_ros.dynamics.integrators.method import Field
 ORDER = 4
 
 NODES = (0.5, 0.5, 1.0)
-"""Of the second stage and those that follow, as shares of the step."""
+"""Nodes of the second and the following stages, as fractions of the step."""
 
 WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
@@ -35,17 +35,17 @@ WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 def step(
     field: Field, value: float, rate: float, acceleration: float, length: float
 ) -> tuple[float, float] | None:
-    """Carry a state on by a length of time, as `Step` says."""
+    """Advance a state by a length of time, as `Step` specifies."""
     slope, change = rate, acceleration
     first, *others = WEIGHTS
     mean_slope, mean_change = first * slope, first * change
     for node, weight in zip(NODES, others, strict=True):
         ahead = node * length
         slope, at = rate + ahead * change, value + ahead * slope
-        found = field(at, slope)
-        if found is None:
+        stage = field(at, slope)
+        if stage is None:
             return None
-        change = found
+        change = stage
         mean_slope += weight * slope
         mean_change += weight * change
     return value + length * mean_slope, rate + length * mean_change

@@ -14,10 +14,10 @@
 
 
 """
-Semi-implicit Euler: the rate first, and the value with the new rate.
+Semi-implicit Euler: first the rate, then the value with the new rate.
 
-One evaluation a step, and of order 1 only. Where the inertia is constant and no force depends on
-the rate it is symplectic, so that its energy errs but does not drift (E. Hairer, C. Lubich,
+One evaluation a step, and of order 1 only. If the inertia is constant and no force depends on the
+rate it is symplectic, so that its energy errs but does not drift (E. Hairer, C. Lubich,
 G. Wanner, Geometric Numerical Integration, 2nd ed., 2006, I.1.2).
 """
 
@@ -31,6 +31,6 @@ ORDER = 1
 def step(
     _field: Field, value: float, rate: float, acceleration: float, length: float
 ) -> tuple[float, float]:
-    """Carry a state on by a length of time, as `Step` says."""
+    """Advance a state by a length of time, as `Step` specifies."""
     rate += length * acceleration
     return value + length * rate, rate

@@ -39,8 +39,8 @@ _NOTES = (
 _CHECK = ('#include <float.h>', '#include <math.h>', '', '#if DBL_MANT_DIG < 53',
           '#error "double has fewer than 64 bits here"', '#endif')  # fmt: skip
 
-# Compilers make a product of a square, and other last digits than those of linkage_ros, which
-# calls pow().
+# Compilers replace a square by a product, whose last digits differ from linkage_ros, which calls
+# pow().
 _TWO = 'two'
 _DECLARED_TWO = (
     f'    const volatile double {_TWO} = 2.0;  /* pow() is called, as linkage_ros does */'
@@ -54,7 +54,7 @@ class C(Language):
     Parameters
     ----------
     name
-        What the names of the source begin with.
+        Prefix of the names of the source.
     header
         Whether the source is a header that is included, or a file that is compiled.
 
@@ -68,7 +68,7 @@ class C(Language):
         self._header = header
 
     def function(self, derivatives: int) -> str:
-        """Return the name of the function that gives so many derivatives."""
+        """Return the name of the function with so many derivatives."""
         return f'{self._name}_{super().function(derivatives)}'
 
     def call(self, operation: Operation, parts: list[str]) -> str:
@@ -78,7 +78,7 @@ class C(Language):
         return super().call(operation, parts)
 
     def assigned(self, name: str, text: str, truth: bool = False) -> str:
-        """Write a line that gives a name to a number, or to a truth."""
+        """Write a line that assigns a number, or a truth value, to a name."""
         return f'const {"int" if truth else "double"} {name} = {text};'
 
     def commented(self, line: str, text: str) -> str:
@@ -90,7 +90,7 @@ class C(Language):
         return f'isfinite({name})'
 
     def rounded(self, text: str) -> str:
-        """Write the nearest whole number."""
+        """Write the nearest integer."""
         return f'rint({text})'
 
     def status(self, name: str) -> str:
@@ -98,7 +98,7 @@ class C(Language):
         return f'{self._name.upper()}_{name}'
 
     def left(self, status: str) -> str:
-        """Write a line that returns a status, and no values."""
+        """Write a line that returns a status without values."""
         return f'return {status};'
 
     def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
@@ -133,7 +133,7 @@ class C(Language):
         if self._header:
             guard, once = f'{function.upper()}_H', f'{name.upper()}_STATUS'
             definition[0] = f'static inline {definition[0]}'
-            # Headers of one linkage with other derivatives have the statuses in common.
+            # Headers of one linkage with different derivatives share the statuses.
             listed = [f'#ifndef {once}', f'#define {once}', *listed, f'#endif  /* {once} */']
             lines = [
                 f'#ifndef {guard}', f'#define {guard}', '', *_CHECK, '', *listed, '', *definition,
@@ -142,13 +142,13 @@ class C(Language):
         else:
             declared = ['#ifdef __cplusplus', 'extern "C" {', '#endif', *listed, *signature[:-1]]
             declared += [f'{signature[-1]};', '#ifdef __cplusplus', '}', '#endif']
-            told = '/* What a caller declares: */'
-            lines = [*_CHECK, '', told, *declared, '', *definition]
+            heading = '/* What a caller declares: */'
+            lines = [*_CHECK, '', heading, *declared, '', *definition]
         return '\n'.join([*comment, '', *lines, ''])
 
 
 def _harmless(text: str) -> str:
-    """Return a text that neither ends a comment nor is a trigraph, whatever names are in it."""
+    """Return a text without ends of comments and trigraphs, whatever names it holds."""
     for odd in ('*/', '/*', '??'):
         text = text.replace(odd, ' '.join(odd))
     return text.replace('\\', '/')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A linkage as a module of JavaScript."""
+"""A linkage as a JavaScript module."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ function copysign(size, sign) {
 
 
 class JavaScript(Language):
-    """JavaScript as a module of ECMAScript 2015."""
+    """JavaScript as an ECMAScript 2015 module."""
 
     functions: ClassVar[dict[str, str]] = {
         '**': 'Math.pow',
@@ -50,7 +50,7 @@ class JavaScript(Language):
     infinity = 'Infinity'
 
     def assigned(self, name: str, text: str, truth: bool = False) -> str:
-        """Write a line that gives a name to a number, or to a truth."""
+        """Write a line that assigns a number, or a truth value, to a name."""
         return f'const {name} = {text};'
 
     def commented(self, line: str, text: str) -> str:
@@ -62,7 +62,7 @@ class JavaScript(Language):
         return f'Number.isFinite({name})'
 
     def rounded(self, text: str) -> str:
-        """Write the nearest whole number."""
+        """Write the nearest integer."""
         return f'Math.round({text})'
 
     def status(self, name: str) -> str:
@@ -70,7 +70,7 @@ class JavaScript(Language):
         return f'Status.{name}'
 
     def left(self, status: str) -> str:
-        """Write a line that returns a status, and no values."""
+        """Write a line that returns a status without values."""
         return f'return nothing({status});'
 
     def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A linkage, compiled for what is asked of it: a function that finds that and nothing else."""
+"""A compiled linkage: a function that computes the requested numbers and nothing else."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.results import LoopClosure
 
 _MOST_PATHS = 8
-"""So many a linkage has at most; where none holds, the plain steps answer."""
+"""Most paths of a linkage; where none is valid, the plain steps answer."""
 
 _TRIED = 64
-"""At so many states paths are looked for."""
+"""Number of states at which paths are searched for."""
 
 _TRIED_ITERATED = 2
-"""And of an iterated linkage, of which one state may take a tenth of a second."""
+"""The same for an iterated linkage, where one state may take a tenth of a second."""
 
 
 class Answer(NamedTuple):
     """
-    What a compiled linkage says of a state.
+    The result of a compiled linkage at a state.
 
     Attributes
     ----------
     status, gap
-        As of a `Position`.
+        As in `Position`.
     values
-        What was asked for, in groups; empty groups of what there is not.
+        The requested numbers, in groups; a group without a result is empty.
 
     """
 
@@ -60,35 +60,35 @@ class Answer(NamedTuple):
 
 class Compiled:
     """
-    A linkage that is asked for certain numbers.
+    A linkage compiled for certain numbers.
 
-    It answers to the last bit as the plain steps do: it is their arithmetic in a straight line.
-    Where that does not hold, at toggles, change points and where a loop is open, the plain steps
-    answer.
+    Its results equal those of the plain steps to the last bit: it is their arithmetic as
+    straight-line code. Where that is not valid, at toggles, change points and where a loop is
+    open, the plain steps answer.
 
     Parameters
     ----------
     closure
         The linkage.
     derivatives
-        What it is asked for: positions (0), velocities too (1), and accelerations (2).
+        0: positions; 1: velocities too; 2: accelerations too.
     wanted
-        Which numbers of these; all published joints if not given.
+        Selects the numbers; by default all published joints.
     within_limits
-        Whether a state with a joint beyond its limits is limited.
+        Whether a state with a joint beyond its limits has the status limited.
 
     Attributes
     ----------
     driven
-        How many inputs it has.
+        Number of inputs.
     derivatives, wanted
         As given.
     paths
-        The ways that the steps take where the linkage is closed. There is more than one where they
-        take different forms in different regions.
+        The paths of the steps where the linkage is closed; several if the steps take different
+        forms in different regions.
     fast
-        Takes the inputs, their rates and their accelerations, one after the other; returns the
-        values, or None where the plain steps must answer.
+        Takes the inputs, their rates and their accelerations, in this order; returns the values,
+        or None if the plain steps must answer.
 
     """
 
@@ -110,12 +110,12 @@ class Compiled:
         for inputs in _states(closure):
             self._follow(inputs)
         if not self.paths and (self.driven > 1 or closure.input_ranges):
-            # A search of its own, which takes longer.
+            # This starts an additional search, which takes longer.
             self._follow(usual_inputs(closure))
         self.fast: Callable[..., Values | None] = _first_of(self._functions)
 
     def _follow(self, inputs: tuple[float, ...]) -> None:
-        """Add the path that the steps take at a state, if it is closed and they take a new one."""
+        """Add the path that the steps take at a state, if it is closed and the path is new."""
         more = (1.25,) * self.driven * self.derivatives
         if len(self.paths) == _MOST_PATHS or any(
             function(*inputs, *more) is not None for function in self._functions
@@ -132,12 +132,12 @@ class Compiled:
 
     def body(self, leave: str) -> Body:
         """
-        Return its first path as lines of Python; they are written once.
+        Return the first path as lines of Python, which are written once.
 
         Parameters
         ----------
         leave
-            The statement that leaves the lines where the path does not hold.
+            The statement that leaves the lines if the path is not valid.
 
         """
         if leave not in self._bodies:
@@ -156,7 +156,7 @@ class Compiled:
         Raises
         ------
         ValueError
-            Where a rate or an acceleration is not finite.
+            If a rate or an acceleration is not finite.
 
         """
         values = self.fast(*numbers)
@@ -165,19 +165,19 @@ class Compiled:
         return self.plain(*numbers)
 
     def plain(self, *numbers: float) -> Answer:
-        """Return the answer of the plain steps."""
+        """Return the result of the plain steps."""
         given = list(zip(*[iter(numbers)] * self.driven, strict=True))
         motion = moved(self._closure, given, self._within_limits)
         status, gap = motion.position.status, motion.position.gap
-        found = tuple(tuple(group) for group in self.wanted(motion))
+        values = tuple(tuple(group) for group in self.wanted(motion))
         groups = len(self.paths[0].outputs) if self.paths else 1 + self.derivatives
-        return Answer(status, gap, (*found, *((),) * (groups - len(found))))
+        return Answer(status, gap, (*values, *((),) * (groups - len(values))))
 
 
 def _first_of(
     functions: Sequence[Callable[..., Values | None]],
 ) -> Callable[..., Values | None]:
-    """Return what tries functions in turn, until one has an answer."""
+    """Return a function that tries functions in turn, until one has a result."""
     if len(functions) == 1:
         return functions[0]
 
@@ -192,7 +192,7 @@ def _first_of(
 
 
 def _states(closure: LoopClosure) -> Iterator[tuple[float, ...]]:
-    """Yield inputs at which a linkage may be closed: its pose's, and others over its ranges."""
+    """Yield inputs at which a linkage may be closed: those of its pose, and some in its ranges."""
     linkage = closure.linkage
     if linkage.pose is not None:
         yield linkage.pose.inputs
@@ -207,6 +207,6 @@ def _states(closure: LoopClosure) -> Iterator[tuple[float, ...]]:
         else:
             low = low if low > -inf else (high - tau if high < inf else 0.0)
             high = high if high < inf else low + tau
-        # Not in a middle or at an end, where links may lie in one line.
+        # Not at the middle or an end, where links may be collinear.
         ways.append([low + (high - low) * (i + 1.0 / pi) / each for i in range(each)])
     yield from islice(product(*ways), count)

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-A path in the form in which arrays pass through it fastest.
+A path as numpy, in the form that is fastest for arrays.
 
-Each operation is a pass over an array. So constants are drawn together and signs taken in, sine
-and cosine of an angle come of one tangent, and a condition that the bounds of its numbers settle
-is not asked. Results may differ from those of the path in their last digits.
+Each operation is a pass over an array. Therefore constants are combined and signs merged, sine and
+cosine of an angle are computed from one tangent, and a condition that the bounds of its numbers
+decide is left out. Results may differ from those of the path in their last digits.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 import numpy as np
 
 Number = Any
-"""An operation, or a constant: a number, or whether a condition holds."""
+"""An operation, or a constant: a number or a truth value."""
 
 
 class Bounds(NamedTuple):
-    """Between which a number lies, but for its rounding."""
+    """The range of a number, up to its rounding."""
 
     low: float = -inf
     high: float = inf
@@ -59,19 +59,19 @@ _COMPARED: Final[dict[str, Callable[[float, float], bool]]] = {
 _TRUTHS: Final = frozenset((*_COMPARED, 'and', 'or', 'not'))
 
 _CLEAR: Final = 1e-9
-"""Numbers this far apart, as a part of themselves, are so however they are rounded."""
+"""Numbers with this relative distance are different however they are rounded."""
 
 
 def _tangent_is_close() -> bool:
     """
-    Return whether numpy's tangent is right to its last digit, here.
+    Return whether numpy's tangent is right to its last digit on this machine.
 
-    Of the vectorised ones some are 3 ulp off; sine and cosine, which take longer, never are.
+    Some vectorised tangents are 3 ulp off; sine and cosine, which take longer, never are.
     """
     angles = np.linspace(-1.5, 1.5, 1000)
     return all(
-        abs(found - exact) <= 2.5 * UNIT_ROUNDOFF * abs(exact)
-        for found, exact in zip(np.tan(angles).tolist(), map(tan, angles.tolist()), strict=True)
+        abs(tangent - exact) <= 2.5 * UNIT_ROUNDOFF * abs(exact)
+        for tangent, exact in zip(np.tan(angles).tolist(), map(tan, angles.tolist()), strict=True)
     )
 
 
@@ -80,12 +80,12 @@ _BY_TANGENT = _tangent_is_close()
 
 class ArrayForm:
     """
-    Writes operations anew.
+    Rewrites the operations of a path.
 
     Parameters
     ----------
     given
-        Rates and accelerations by name that are 0 or 1.
+        Rates and accelerations, by name, that are 0 or 1.
 
     """
 
@@ -96,7 +96,7 @@ class ArrayForm:
         self._written: dict[Operation, Number] = {}
 
     def number(self, root: Number) -> Number:
-        """Return an operation of a path in its new form, or a constant that it has become."""
+        """Return an operation of a path in its new form, or the constant that it reduces to."""
         if not isinstance(root, Operation):
             return root
         waiting = [root]
@@ -112,25 +112,25 @@ class ArrayForm:
         return self._written[root]
 
     def opposite(self, condition: Number) -> Number:
-        """Return the condition that one does not hold."""
+        """Return the negation of a condition."""
         return (not condition) if _constant(condition) else self._new('not', condition)
 
     def both(self, one: Number, other: Number) -> Number:
-        """Return the condition that two hold."""
+        """Return the conjunction of two conditions."""
         for first, second in ((one, other), (other, one)):
             if _constant(first):
                 return second if first else False
         return self._new('and', one, other)
 
     def either(self, one: Number, other: Number) -> Number:
-        """Return the condition that one of two holds."""
+        """Return the disjunction of two conditions."""
         for first, second in ((one, other), (other, one)):
             if _constant(first):
                 return True if first else second
         return self._new('or', one, other)
 
     def where(self, condition: Number, one: Number, other: Number) -> Number:
-        """Return the one number where a condition holds, the other where not."""
+        """Return ``one`` if a condition holds, otherwise ``other``."""
         if _constant(condition):
             return one if condition else other
         if one is other:
@@ -236,7 +236,7 @@ class ArrayForm:
         if _nothing(factor):
             return 0
         if divisor == 0.0:
-            # Off the way that the steps take.
+            # Only in branches that the steps do not take.
             return nan
         factor /= divisor
         if other is None:
@@ -246,7 +246,7 @@ class ArrayForm:
         return self._scaled(factor, self._new('/', one, other))
 
     def _scaled(self, factor: float, one: Number) -> Number:
-        """Return a factor times what has none."""
+        """Return a number without a constant factor, times a factor."""
         if one is None or factor == 1.0:
             return factor if one is None else one
         if factor == -1.0 and one.name == '-':
@@ -257,7 +257,7 @@ class ArrayForm:
         return self._new('*', factor, one, bounds=Bounds(min(ends), max(ends)))
 
     def _power(self, one: Number, power: int) -> Number:
-        """Return a whole power, as products."""
+        """Return an integer power, as products."""
         if power == 1:
             return one
         half = self._power(one, power // 2)
@@ -268,8 +268,8 @@ class ArrayForm:
         """
         Return the sine and the cosine of an angle.
 
-        The cosine is right to the last digit of 1, not of itself. numpy's tangent is vectorised
-        where its sine and cosine are not: it takes a tenth of them both.
+        The cosine is right to the last digit of 1, not of itself. numpy's tangent is vectorised,
+        its sine and cosine are not: the tangent takes a tenth of the time of both.
         """
         if not _BY_TANGENT:
             unit = Bounds(-1.0, 1.0)
@@ -315,13 +315,13 @@ class ArrayForm:
 
     def _new(self, name: str, *arguments: Number, bounds: Bounds = _ANY) -> Operation:
         key = (name, *(a.number if isinstance(a, Operation) else repr(a) for a in arguments))
-        found = self._known.get(key)
-        if found is None:
+        operation = self._known.get(key)
+        if operation is None:
             kind: Kind = 'truth' if name in _TRUTHS else 'real'
-            found = Operation(name, arguments, kind, len(self._known), None)
-            self._known[key] = found
-            self._bounds[found] = bounds
-        return found
+            operation = Operation(name, arguments, kind, len(self._known), None)
+            self._known[key] = operation
+            self._bounds[operation] = bounds
+        return operation
 
 
 def _constant(number: Number) -> bool:
@@ -329,12 +329,12 @@ def _constant(number: Number) -> bool:
 
 
 def _nothing(number: Number) -> bool:
-    """Return whether a number is the 0 of what is given, whose sign does not matter."""
+    """Return whether a number is a given 0, whose sign does not matter."""
     return isinstance(number, int) and number == 0
 
 
 def _split(number: Number) -> tuple[float, Number]:
-    """Return the constant factor of a number, and the rest, None where there is none."""
+    """Return the constant factor of a number, and the rest, or None if there is none."""
     if _constant(number):
         return number, None
     if number.name == '*' and _constant(number.arguments[0]):
@@ -344,25 +344,23 @@ def _split(number: Number) -> tuple[float, Number]:
 
 
 def _negated(number: Number) -> Number:
-    """Return what a number is the negative of, if it is one."""
+    """Return the operand of a negation, or None."""
     if not _constant(number) and number.name == '*' and number.arguments[0] == -1.0:
         return number.arguments[1]
     return None
 
 
 def _ordered(one: Operation, other: Operation) -> tuple[Number, Number]:
-    """Return two terms or factors in the one order in which they are written."""
+    """Return two terms or factors in their canonical order."""
     if _constant(one) or _constant(other):
         return (one, other) if _constant(one) else (other, one)
     return (one, other) if one.number <= other.number else (other, one)
 
 
 def _clear(less: float, more: float) -> bool:
-    """Return whether one number is less than another however both are rounded."""
+    """Return whether one number is less than another, however both are rounded."""
     return more - less > _CLEAR * max(abs(less), abs(more)) and less < inf and more > -inf
 
-
-# A path as numpy: one function that passes a block of states through buffers that it reuses.
 
 _FUNCTIONS: Final[dict[str, Any]] = {
     '+': np.add,
@@ -393,7 +391,7 @@ _FUNCTIONS: Final[dict[str, Any]] = {
 
 class BlockFunction:
     """
-    Numbers of a path, of many states at once.
+    Numbers of a path for many states at once, computed in blocks through reused buffers.
 
     Parameters
     ----------
@@ -402,16 +400,16 @@ class BlockFunction:
     arrays
         Those that are arrays; the others are numbers.
     roots
-        What it finds.
+        The numbers to compute.
     condition
-        Where that holds.
+        Where the numbers are valid.
 
     Attributes
     ----------
     rows, masks
-        How many rows of scratch it needs, and how many of truths.
+        Number of scratch rows of floats, and of truth values.
     source
-        As it is written.
+        The source of the function.
 
     """
 
@@ -442,22 +440,22 @@ class BlockFunction:
         self, given: Sequence[Array | float], out: Sequence[Array], rows: Array, masks: Mask
     ) -> Mask | None:
         """
-        Write what it finds of a block.
+        Compute the numbers of a block.
 
         Parameters
         ----------
         given
             The inputs.
         out
-            An array for each root; what it gets where the condition does not hold means nothing.
-            Nothing is written where it holds for less than half of the states.
+            An array for each root; its values are undefined where the condition does not hold.
+            Nothing is written if the condition holds for less than half of the states.
         rows, masks
-            Scratch, as long as the block.
+            Scratch arrays, as long as the block.
 
         Returns
         -------
         Mask | None
-            Where the condition holds, in the scratch; None where it always does.
+            Where the condition holds, as a scratch array; None if it always does.
 
         """
         holds: Mask | None = self._run(given, out, rows, masks)
@@ -465,7 +463,7 @@ class BlockFunction:
 
 
 class _Room:
-    """Names of buffers, which are given out and taken back."""
+    """A pool of buffer names."""
 
     def __init__(self, letter: str) -> None:
         self._letter = letter
@@ -473,14 +471,14 @@ class _Room:
         self.count = 0
 
     def take(self) -> str:
-        """Return one that is free."""
+        """Return a free name."""
         if self._free:
             return self._free.pop()
         self.count += 1
         return f'{self._letter}{self.count - 1}'
 
     def give_back(self, name: str) -> None:
-        """Take back what it has given out."""
+        """Return a name to the pool."""
         if name.startswith(self._letter):
             self._free.append(name)
 
@@ -513,11 +511,11 @@ class _Writer:
     def _text(self, number: Number) -> str:
         if isinstance(number, Operation):
             return self._names[number]
-        # A linkage may have numbers of numpy's, of which repr() tells the type.
+        # A linkage may hold numpy numbers, whose repr() includes the type.
         return repr(number if isinstance(number, bool) else float(number))
 
     def _write(self, root: Number) -> None:
-        """Write what a number needs that is not written yet, and itself."""
+        """Write a number, after the operations that it needs."""
         waiting = [(root, False)] if isinstance(root, Operation) else []
         while waiting:
             operation, ready = waiting.pop()
@@ -538,7 +536,7 @@ class _Writer:
             return
         texts = [self._text(argument) for argument in operation.arguments]
         if not any(operand in self._of_states for operand in operands):
-            # One number for all states.
+            # The same number for all states.
             self._names[operation] = f't{operation.number}'
             self.lines.append(
                 f't{operation.number} = {_FUNCTIONS[operation.name].__name__}({", ".join(texts)})'
@@ -555,7 +553,7 @@ class _Writer:
             )
 
     def _into(self, operation: Operation) -> str:
-        """Return the buffer that an operation goes to."""
+        """Return the buffer for the result of an operation."""
         wanted = self._wanted.get(operation)
         if wanted is None:
             wanted = (self.masks if operation.kind == 'truth' else self.rows).take()
@@ -563,7 +561,7 @@ class _Writer:
         return wanted
 
     def _done_with(self, operands: Sequence[Operation]) -> None:
-        """Count uses, and take back what has no more of them."""
+        """Count the uses of operands, and free the buffers of those that are no longer used."""
         for operand in operands:
             self._left[operand] -= 1
             if not self._left[operand]:
@@ -571,11 +569,11 @@ class _Writer:
                     room.give_back(self._names[operand])
 
     def _choose(self, operation: Operation, texts: Sequence[str]) -> None:
-        """Write a choice: the one number over the other, where a condition holds."""
+        """Write a choice: one number over the other where a condition holds."""
         condition, one, other = texts
         last = operation.arguments[2]
         if self._left.get(last) == 1 and operation not in self._wanted and other[0] == 'r':
-            # Nobody else needs the other number: it is written over where it stands.
+            # This is the last use of the other number: it is overwritten in place.
             into = self._names[operation] = other
             self._left[last] += 1
         else:

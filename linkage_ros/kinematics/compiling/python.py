@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A path as a Python function: a straight line of arithmetic."""
+"""A path, or a function of numbers, as straight-line Python code."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     'rect': cmath.rect,
     'abs': abs,
     'complex': complex,
-    # The root that abs() of a complex number gives; that of math.hypot() has other last digits.
+    # The root that abs() of a complex number gives; the last digits of math.hypot() differ.
     'hypot': lambda x, y: abs(complex(x, y)),
 }
 _ATTRIBUTES = frozenset(('real', 'imag'))
@@ -52,11 +52,11 @@ class Body(NamedTuple):
     Attributes
     ----------
     lines
-        They start from the inputs, by the names that these have in the path.
+        The lines; they use the inputs by their names in the path.
     outputs
-        The expressions of the outputs, in groups; they come after the lines.
+        The expressions of the outputs, in groups; they follow the lines.
     bound
-        What the lines and expressions name.
+        The names that the lines and expressions use, with their values.
 
     """
 
@@ -67,10 +67,10 @@ class Body(NamedTuple):
 
 def python_source(path: Path, name: str = 'solve') -> tuple[str, dict[str, Any]]:
     """
-    Return a path as the source of a Python function, and what it names.
+    Return a path as the source of a Python function, and the names that it uses.
 
-    The function takes the inputs and returns the outputs, in groups; None where the path does not
-    hold.
+    The function takes the inputs and returns the outputs, in groups; None if the path is not
+    valid.
     """
     lines, outputs, bound = python_body(path, 'return None')
     groups = [f'({", ".join(group)},)' if group else '()' for group in outputs]
@@ -89,7 +89,7 @@ def python_body(path: Path, leave: str) -> Body:
     path
         The path.
     leave
-        The statement that leaves the lines where the path does not hold.
+        The statement that leaves the lines if the path is not valid.
 
     """
     constants: dict[str, Any] = {}
@@ -134,7 +134,7 @@ def python_body(path: Path, leave: str) -> Body:
     for given in path.inputs:
         writer.name(given, given.name)
     if any(map(_of_inputs, conditions)):
-        # 0 of finite numbers, and NaN of all others; where the sum is too great, it is in doubt.
+        # 0 for finite numbers, otherwise NaN; a sum that overflows leaves the path, too.
         total = ' + '.join(given.name for given in path.inputs)
         writer.lines += [f'total = {total}', 'if total - total != 0.0:', f'    {leave}']
     for condition, held in path.decisions:
@@ -146,14 +146,14 @@ def python_body(path: Path, leave: str) -> Body:
 
 
 def python_function(path: Path) -> Callable[..., Values | None]:
-    """Return a path as a function of its inputs that returns its outputs; None as above."""
+    """Return a path as a function from its inputs to its outputs; None if it is not valid."""
     source, bound = python_source(path)
     solve: Callable[..., Values | None] = written(source, 'solve', bound)
     return solve
 
 
 def _of_inputs(condition: Operation) -> bool:
-    """Return whether a condition is that inputs are finite numbers."""
+    """Return whether a condition says that inputs are finite numbers."""
     return condition.name == 'finite' and all(one.is_input for one in condition.operands())
 
 
@@ -161,21 +161,18 @@ def _atom(text: str) -> str:
     return text if text.isidentifier() else f'({text})'
 
 
-# A function of numbers, made a straight line: without its loops, lists and calls.
-
-
 class StraightFunction(NamedTuple):
     """
-    A function as a straight line.
+    A function of numbers as straight-line code, without loops, lists and calls.
 
     Attributes
     ----------
     varying
         Takes the arguments and returns those results that depend on them.
     places
-        The numbers of these among all results.
+        The indices of these among all results.
     results
-        All results, with 0 in the place of those that vary.
+        All results, with 0 for those that vary.
 
     """
 
@@ -188,28 +185,28 @@ def straight(
     function: Callable[..., Sequence[float]], values: Sequence[complex]
 ) -> StraightFunction:
     """
-    Return a function as a straight line, which has the same bits.
+    Return a function as straight-line code, which gives the same bits.
 
     Parameters
     ----------
     function
-        Takes numbers and returns numbers. It decides nothing by them.
+        Takes numbers and returns numbers, and makes no decision by them.
     values
-        Arguments for which it is known to work, each real or complex as they all will be.
+        Arguments for which it works, each real or complex as in all later calls.
 
     """
     tape = Tape()
     given = [tape.given(f'x{i}', value) for i, value in enumerate(values)]
-    found = [number_of(number) for number in function(*given)]
+    results = [number_of(number) for number in function(*given)]
     if tape.decisions:
         raise ValueError('the function decides by its arguments, and has no straight line')
-    places = tuple(i for i, number in enumerate(found) if isinstance(number, Operation))
+    places = tuple(i for i, number in enumerate(results) if isinstance(number, Operation))
     inputs = tuple(one.operation for one in given)
-    line = python_function(Path(inputs, (), (tuple(found[i] for i in places),), tape))
+    line = python_function(Path(inputs, (), (tuple(results[i] for i in places),), tape))
 
     def varying(*arguments: Any) -> tuple[float, ...]:
         (group,) = line(*arguments) or ((),)
         return group
 
-    constants = tuple(0.0 if isinstance(number, Operation) else number for number in found)
+    constants = tuple(0.0 if isinstance(number, Operation) else number for number in results)
     return StraightFunction(varying, places, constants)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A linkage as a module of Python that needs nothing but `math`."""
+"""A linkage as a Python module that needs only `math`."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class PythonModule(Language):
     Parameters
     ----------
     derivatives
-        How many the function gives.
+        Number of derivatives that the function gives.
 
     """
 
@@ -58,7 +58,7 @@ class PythonModule(Language):
         if operation.name == '**':
             return f'(({parts[0]}) ** {parts[1]})'
         if operation.name == 'hypot':
-            # The root that C's hypot() gives; that of math.hypot() has other last digits.
+            # The root that C's hypot() gives; the last digits of math.hypot() differ.
             return f'abs(complex({parts[0]}, {parts[1]}))'
         return super().call(operation, parts)
 
@@ -67,11 +67,11 @@ class PythonModule(Language):
         return f'{one} if {condition} else {other}'
 
     def negated(self, condition: str) -> str:
-        """Write that a condition does not hold, which is also so of numbers that are none."""
+        """Write that a condition does not hold; this is true for NaN too."""
         return f'not {condition}' if condition.isidentifier() else f'not ({condition})'
 
     def block(self, condition: str, lines: Sequence[str]) -> list[str]:
-        """Write lines that are run where a condition holds."""
+        """Write lines that run if a condition holds."""
         return [f'if {condition}:', *(f'    {line}' for line in lines)]
 
     def wrapped(self, line: str) -> list[str]:
@@ -86,7 +86,7 @@ class PythonModule(Language):
         return super().wrapped(line)
 
     def assigned(self, name: str, text: str, truth: bool = False) -> str:
-        """Write a line that gives a name to a number, or to a truth."""
+        """Write a line that assigns a number, or a truth value, to a name."""
         return f'{name} = {text}'
 
     def commented(self, line: str, text: str) -> str:
@@ -98,7 +98,7 @@ class PythonModule(Language):
         return f'isfinite({name})'
 
     def rounded(self, text: str) -> str:
-        """Write the nearest whole number."""
+        """Write the nearest integer."""
         return f'round({text})'
 
     def status(self, name: str) -> str:
@@ -106,7 +106,7 @@ class PythonModule(Language):
         return name
 
     def left(self, status: str) -> str:
-        """Write a line that returns a status, and no values."""
+        """Write a line that returns a status without values."""
         return f'return ({", ".join([status, *["()"] * self._groups])})'
 
     def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-A path in real numbers alone, for languages and arrays that have no complex ones.
+A path in real numbers only, for languages and arrays without complex numbers.
 
-A complex number becomes its two parts, by the formulas of Python's own complex numbers: the bits
-are the same, but for the sign of a zero.
+A complex number becomes its two components, by the formulas of Python's complex numbers: the bits
+are the same, except for the sign of a zero.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ if TYPE_CHECKING:
 
 
 class _Parts(NamedTuple):
-    """The parts of a complex number along x and y."""
+    """The components of a complex number along x and y."""
 
     x: Any
     y: Any
 
 
 class Lowered(NamedTuple):
-    """A path in real numbers, and the fates beside it."""
+    """A path in real numbers, and its fates."""
 
     path: Path
     fates: tuple[Fate, ...]
@@ -60,17 +60,17 @@ class Lowered(NamedTuple):
 
 def lowered(path: Path, fates: tuple[Fate, ...] = (), by_squares: bool = False) -> Lowered:
     """
-    Return a path in real numbers alone; links that are iterated have none.
+    Return a path in real numbers only; paths with iterated links have no such form.
 
     Parameters
     ----------
     path
         The path.
     fates
-        What becomes of the linkage where its decisions fall otherwise.
+        The status of the linkage where each decision differs.
     by_squares
-        Whether lengths and quotients are found by squares, which arrays pass through fastest: the
-        last digits are others, and lengths below 1e-154 are lost.
+        Whether lengths and quotients are computed by squares, which is fastest for arrays: the
+        last digits differ, and lengths below 1e-154 are lost.
 
     """
     lower = Lowering(by_squares)
@@ -85,7 +85,7 @@ def lowered(path: Path, fates: tuple[Fate, ...] = (), by_squares: bool = False) 
 
 
 class Lowering:
-    """Writes the operations of one tape on another."""
+    """Rewrites the operations of one tape on another one."""
 
     def __init__(self, by_squares: bool = False) -> None:
         self.tape = Tape()
@@ -93,19 +93,19 @@ class Lowering:
         self._known: dict[Operation, Any] = {}
 
     def operation(self, root: Number) -> Any:
-        """Return a real number on the new tape, or a constant that it is or has become."""
-        found = self._number(root)
-        return found.operation if isinstance(found, Symbol) else found
+        """Return a real number on the new tape, or the constant that it reduces to."""
+        number = self._number(root)
+        return number.operation if isinstance(number, Symbol) else number
 
     def fate(self, fate: Fate) -> Fate:
-        """Return a fate by conditions on the new tape."""
+        """Return a fate with conditions on the new tape."""
         if isinstance(fate, Fork):
             held, failed = self.fate(fate.held), self.fate(fate.failed)
             return Fork(self.operation(fate.condition), held, failed)
         return fate
 
     def _number(self, root: Any) -> Any:
-        """Return a symbol, the parts of one, or a constant."""
+        """Return a symbol, its components, or a constant."""
         if isinstance(root, complex):
             return _Parts(root.real, root.imag)
         if not isinstance(root, Operation):
@@ -137,7 +137,7 @@ _MAKES_PARTS = frozenset(('facing', 'vector'))
 
 
 def _times(one: Any, other: Any) -> Any:
-    """Return a product; 0 where a constant is."""
+    """Return a product; 0 if one factor is a constant 0."""
     if not _constants(one, other) and (_zero(one) or _zero(other)):
         return 0.0
     return one * other
@@ -148,7 +148,7 @@ def _zero(number: Any) -> bool:
 
 
 def _constants(one: Any, other: Any) -> bool:
-    """Return whether both are constants, of which a zero has its right sign, too."""
+    """Return whether both are constants; then a zero has its correct sign too."""
     return isinstance(one, int | float) and isinstance(other, int | float)
 
 
@@ -240,26 +240,26 @@ _BY_SQUARES: dict[str, Callable[..., Any]] = {
 }
 
 
-# All ways that a linkage's position can take, as one tree of conditions in real numbers.
+# All paths of a linkage's position, as one tree of conditions in real numbers.
 #
-# A leaf says which status the linkage has there, and holds the numbers where it has any. The tree
-# follows the ways that are taken at closed states of the linkage, and the change points beside
-# them. Other ways that the conditions leave open are taken at no state, as far as is known: they
-# end in None, and what is written from the tree gives no numbers there.
+# A leaf gives the status of the linkage, and its numbers if there are any. The tree follows the
+# paths taken at closed states of the linkage, and the change points beside them. No state is known
+# to take one of the other paths: these end in None, and code generated from the tree gives no
+# numbers there.
 
 _MOST_SOLVED = 32
-"""So many leaves have numbers at most: change points of several dyads multiply."""
+"""Largest number of leaves with numbers: change points of several dyads multiply."""
 
 
 class Solved(NamedTuple):
-    """A leaf with numbers: in groups, as they were asked for."""
+    """A leaf with numbers, in the requested groups."""
 
     status: Status
     outputs: tuple[tuple[Number, ...], ...]
 
 
 class Branch(NamedTuple):
-    """A condition, what follows where it holds and where not, and which of these is usual."""
+    """A condition, the trees where it holds and where it fails, and the usual outcome."""
 
     condition: Operation
     held: Tree
@@ -277,9 +277,9 @@ class Program(NamedTuple):
     Attributes
     ----------
     inputs
-        The driven joints' values, then their rates and their accelerations, as far as asked for.
+        The values of the driven joints, then their rates and accelerations, if requested.
     tree
-        What is to be decided, and what is known then, for finite inputs.
+        The decisions and results for finite inputs.
 
     """
 
@@ -289,21 +289,21 @@ class Program(NamedTuple):
 
 def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:
     """
-    Return the tree of a linkage, whatever its limits.
+    Return the tree of a linkage, ignoring its limits.
 
     Parameters
     ----------
     closure
         The linkage.
     derivatives
-        What is worked out: positions (0), velocities too (1), and accelerations (2).
+        0: positions; 1: velocities too; 2: accelerations too.
     wanted
-        What the leaves hold.
+        Selects the numbers of the leaves.
 
     Raises
     ------
     DefinitionError
-        Where links are solved by iteration, or no state is found at which the linkage is closed.
+        If links are solved by iteration, or no closed state is found.
 
     """
     if iterated(closure):
@@ -332,16 +332,16 @@ def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:
 
 class _Growth:
     """
-    Runs the steps on symbols, once for each way.
+    Runs the steps on symbols, once for each path.
 
     Parameters
     ----------
     closure, wanted
-        As of `program`.
+        As in `program`.
     tape, given
-        What is written on, and the inputs, rates and accelerations on it.
+        The tape, and the inputs, rates and accelerations on it.
     taken
-        What is decided at closed states.
+        The decisions taken at closed states.
 
     """
 
@@ -361,7 +361,7 @@ class _Growth:
         self._solved = 0
 
     def below(self, decided: tuple[bool, ...]) -> Tree:
-        """Return what follows where the first decisions fall as is said."""
+        """Return the tree below the given first decisions."""
         tape, count = self._tape, len(decided)
         ahead = next((way for way in self._taken if way[:count] == decided), None)
         leaf = self._leaf(decided if ahead is None else ahead, count, ahead is not None)
@@ -377,7 +377,7 @@ class _Growth:
         return tree
 
     def _leaf(self, ahead: Sequence[bool], count: int, known: bool) -> Tree:
-        """Run the steps; the last of so many decisions is one that is made in another way."""
+        """Run the steps; the last of ``count`` decisions is the one that differs."""
         tape, closure = self._tape, self._closure
         tape.begin(ahead)
         known_state = closure.known(*self._given[0])

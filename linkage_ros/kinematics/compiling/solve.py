@@ -15,10 +15,10 @@
 """
 Many states of a linkage at once.
 
-They pass, block by block, through the paths of the linkage as numpy: what is between two passes
-stays in the cache, and memory does not grow with the states beyond what is returned. Which status
-a state has that leaves a path is told by the fates beside the path; where only the plain steps
-can tell, at toggles and change points, they are asked.
+They pass, block by block, through the paths of the linkage as numpy: intermediate results stay in
+the cache, and memory grows only with the returned arrays. A state that leaves a path gets its
+status from the fates of the path; only the plain steps can solve toggles and change points, so
+they are called for these.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.results import LoopClosure
 
 BLOCK = 8192
-"""States of a block: as many as stay in the cache."""
+"""Number of states in a block: as many as fit into the cache."""
 
 _APART = 8
 """
 Numbers between two rows of scratch.
 
-Of rows that touch numpy 1.26 thinks that they overlap, and works number by number, which takes ten
-times as long; and rows a power of two apart have the same places in the cache.
+numpy 1.26 treats adjacent rows as overlapping and computes number by number, ten times as slowly;
+and rows a power of two apart share the same places in the cache.
 """
 
 _OPEN, _INDETERMINATE = CODES[Status.OPEN], CODES[Status.INDETERMINATE]
@@ -58,7 +58,7 @@ _CLOSED, _LIMITED = CODES[Status.CLOSED], CODES[Status.LIMITED]
 _TOGGLE = CODES[Status.TOGGLE]
 
 _LOST = (Status.OPEN, Status.INDETERMINATE)
-"""What is told by the fates beside a path; where only the plain steps can tell, they are asked."""
+"""The statuses that the fates of a path decide; the plain steps decide all others."""
 
 
 class _Program(NamedTuple):
@@ -68,9 +68,9 @@ class _Program(NamedTuple):
     Attributes
     ----------
     values
-        What is asked for, and where the path holds.
+        The requested numbers, and where the path is valid.
     fates
-        Of those where it does not, which are open, and which are indeterminate.
+        Where the path is not valid: which states are open, and which are indeterminate.
 
     """
 
@@ -80,17 +80,17 @@ class _Program(NamedTuple):
 
 class Solver:
     """
-    A linkage, asked for certain numbers at many states.
+    Solves a linkage for certain numbers at many states.
 
     Parameters
     ----------
     closure
         The linkage.
     width
-        How many numbers it is asked for of a position, and of each derivative.
+        Number of values of a position, and of each derivative.
     wanted
-        Which; all published joints if not given. Of these a state tells, too, that one is beyond
-        its limits.
+        Selects the values; by default all published joints, and then the status also says that a
+        joint is beyond its limits.
 
     """
 
@@ -111,7 +111,7 @@ class Solver:
         derivatives: int = 2,
         out: Batch | None = None,
     ) -> Batch:
-        """Solve all states, as `Closure.solve` says."""
+        """Solve all states, as `Closure.solve` specifies."""
         if derivatives not in (0, 1, 2):
             raise ValueError(f'derivatives: {derivatives!r} is none of 0, 1, 2')
         driven = self._driven
@@ -124,13 +124,13 @@ class Solver:
         given = _numbers('inputs', list(inputs), driven, None)
         count = len(given[0])
         for name, values in (('rates', rates), ('accelerations', accelerations))[:derivatives]:
-            # That of a single one may stand without a list.
+            # The values of a single driven joint need no list.
             alone = np.ndim(values) < 2 if driven == 1 else not np.iterable(values)
             each = [values] if alone else list(values)
             given += _numbers(name, each, driven, count)
         batch = _room(self._width, count, derivatives, out)
         numbers: list[Any] = [value if value.ndim else float(value) for value in given]
-        # Nothing is worked out of what is 0, and nothing multiplied by 1.
+        # A constant 0 or 1 is folded into the program.
         kinds = [int(n) if isinstance(n, float) and n in (0.0, 1.0) else type(n) for n in numbers]
         programs = self._programs(derivatives, tuple(kinds))
         functions = [function for program in programs for function in program]
@@ -152,7 +152,7 @@ class Solver:
         return batch
 
     def _solve(self, block: _Block, programs: Sequence[_Program], one: Compiled) -> None:
-        """Solve a block: those states that no program can tell of one by one."""
+        """Solve a block; states that no program covers are solved one by one."""
         left = block.begin(self._driven)
         for program in programs:
             if left is not None and not left.size:
@@ -171,7 +171,7 @@ class Solver:
         return Compiled(self._closure, derivatives, self._wanted, within_limits=False)
 
     def _program(self, derivatives: int, kinds: tuple[Any, ...]) -> list[_Program]:
-        """Return the paths over arrays; none where links are iterated: that is no line."""
+        """Return the paths over arrays; none if links are iterated, which is no straight line."""
         if iterated(self._closure):
             return []
         return [
@@ -182,7 +182,7 @@ class Solver:
 
 class _Block(NamedTuple):
     """
-    Some states.
+    A block of states.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ class _Block(NamedTuple):
     status
         The code of each state.
     values
-        Where the numbers go that are asked for, (width, N), of positions and derivatives.
+        The requested numbers, (width, N), of positions and derivatives.
     rows, masks
         Scratch.
 
@@ -204,7 +204,7 @@ class _Block(NamedTuple):
     masks: Mask
 
     def begin(self, driven: int) -> Any:
-        """Note which states are no numbers; return the others, None where all are."""
+        """Mark the states that are not finite; return the others, or None if all are finite."""
         self.status.fill(_CLOSED)
         for values in self.given[:driven]:
             if not np.isfinite(values.sum()):
@@ -212,7 +212,7 @@ class _Block(NamedTuple):
         return np.flatnonzero(self.status == _CLOSED) if self.status.any() else None
 
     def pass_through(self, program: _Program, states: Any) -> Any:
-        """Pass states through a path, None for all; return those of which it cannot tell."""
+        """Pass states (None: all) through a path; return those that it does not cover."""
         holds = self._write(program, states)
         if holds is None or holds.all():
             return np.empty(0, np.intp)
@@ -220,7 +220,7 @@ class _Block(NamedTuple):
         if states is not None:
             on, off = states[on], states[off]
         if len(on) < len(off):
-            # Nothing is written: most of it would have been for nothing.
+            # Nothing was written, since most of it would be invalid.
             self._write(program, on)
         lost = np.empty((len(_LOST), len(off)), bool)
         self._run(program.fates, self._of(off), list(lost))
@@ -229,7 +229,7 @@ class _Block(NamedTuple):
         return off[~lost.any(axis=0)]
 
     def _write(self, program: _Program, states: Any) -> Mask | None:
-        """Write what is asked for of states, None for all; return where the path holds."""
+        """Write the requested numbers of states (None: all); return where the path is valid."""
         rows = [row for values in self.values for row in values]
         if states is None:
             return self._run(program.values, self.given, rows)
@@ -242,13 +242,13 @@ class _Block(NamedTuple):
     def put(self, k: int, driven: int, one: Compiled) -> None:
         """Solve a single state."""
         numbers = [float(n[k]) if isinstance(n, np.ndarray) else n for n in self.given]
-        # A rate that is none makes none, and the pose is what it is.
+        # A rate that is not finite has no result, but the pose is valid.
         answer = one(*(number if isfinite(number) else 0.0 for number in numbers))
         self.status[k] = CODES[answer.status]
-        for order, (values, found) in enumerate(zip(self.values, answer.values, strict=True)):
-            if found:
+        for order, (values, solved) in enumerate(zip(self.values, answer.values, strict=True)):
+            if solved:
                 end = (1 + order) * driven
-                values[:, k] = found if all_finite(numbers[:end]) else np.nan
+                values[:, k] = solved if all_finite(numbers[:end]) else np.nan
 
     def _of(self, states: Any) -> list[Any]:
         return [n[states] if isinstance(n, np.ndarray) else n for n in self.given]
@@ -260,14 +260,14 @@ class _Block(NamedTuple):
         )
 
     def clear(self) -> None:
-        """Write NaN where a state has no pose, or no rates."""
+        """Write NaN for states without a pose, or without rates."""
         if self.status.any():
             for order, values in enumerate(self.values):
                 np.copyto(values, np.nan, where=self.status >= (_TOGGLE if order else _OPEN))
 
 
 def _program(path: Lowered, kinds: Sequence[Any]) -> _Program:
-    """Return a path over arrays; kinds are the types of its inputs, or what they are."""
+    """Return a path over arrays; kinds are the types of its inputs, or their constants."""
     (inputs, decisions, outputs, _), ends = path
     names = [given.name for given in inputs]
     each = list(zip(names, kinds, strict=True))
@@ -277,8 +277,8 @@ def _program(path: Lowered, kinds: Sequence[Any]) -> _Program:
     lost: list[Number] = [False] * len(_LOST)
     for (condition, held), fate in zip(decisions, ends, strict=True):
         if condition.name != 'finite':
-            found = form.number(condition)
-            falls = found if held else form.opposite(found)
+            truth = form.number(condition)
+            falls = truth if held else form.opposite(truth)
             leaves = form.both(holds, form.opposite(falls))
             holds = form.both(holds, falls)
             for k, status in enumerate(_LOST):
@@ -288,7 +288,7 @@ def _program(path: Lowered, kinds: Sequence[Any]) -> _Program:
 
 
 def _comes_to(form: ArrayForm, fate: Fate, status: Status) -> Number:
-    """Return the condition that a fate comes to a status."""
+    """Return the condition that a fate leads to a status."""
     if not isinstance(fate, Fork):
         return fate is status
     condition = form.number(fate.condition)
@@ -299,7 +299,7 @@ def _comes_to(form: ArrayForm, fate: Fate, status: Status) -> Number:
 
 
 def _numbers(name: str, values: list[Any], driven: int, count: int | None) -> list[Array]:
-    """Return an array for each driven joint, as long as the states; of one number, if may be."""
+    """Return an array for each driven joint; a scalar stays one if the count is known."""
     if len(values) != driven:
         raise ValueError(f'{name}: {len(values)} given; give {driven}, one for each driven joint')
     try:
@@ -322,7 +322,7 @@ def _numbers(name: str, values: list[Any], driven: int, count: int | None) -> li
 
 
 def _room(width: int, count: int, derivatives: int, out: Batch | None) -> Batch:
-    """Return the arrays that the results go to: those given, as far as they are."""
+    """Return the arrays for the results: those of ``out``, and new ones for the others."""
     arrays: list[Any] = []
     given = out or (None,) * 4
     for k, (name, array) in enumerate(zip(Batch._fields, given, strict=True)):

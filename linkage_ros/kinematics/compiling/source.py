@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-A linkage as source that stands alone: what is alike in C, JavaScript and Python.
+A linkage as standalone source: the common part of C, JavaScript and Python.
 
 The source is a head that explains it, and one function: it takes the inputs, and their rates and
-accelerations as far as these are asked for, and returns a status and the joints.
+accelerations if requested, and returns a status and the joints.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ from linkage_ros.kinematics.rounding import ROUNDING, SMALLEST
 from linkage_ros.kinematics.status import Status
 
 WIDTH = 99
-"""Of the lines of a source."""
+"""Width of the lines of a source."""
 
 FUNCTIONS = ('position', 'velocity', 'motion')
-"""What the function is called, by how many derivatives it gives."""
+"""Name of the function, by the number of derivatives."""
 
 GIVEN = ('inputs', 'rates', 'accelerations')
 RETURNED = ('joints', 'joint_rates', 'joint_accelerations')
@@ -64,31 +64,31 @@ STATUSES = {
     'that no direction can be told. No values.',
     UNDECIDED: 'This code cannot tell, only linkage_ros itself can. No values.',
 }
-"""The statuses of a source, in the order of their numbers, and what they say."""
+"""The statuses of a source, in the order of their numbers, with their meanings."""
 
 _PLAIN = frozenset((0.0, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, inf))
 """Constants that need no name."""
 
 _THRESHOLDS = {SMALLEST: 'smallest', ROUNDING: 'rounding'}
-"""What is smaller counts as 0, and the rounding error of a sum relative to its terms."""
+"""Smaller numbers count as 0; rounding error of a sum relative to its terms."""
 
 
 class Subject(NamedTuple):
     """
-    What is compiled.
+    The linkage and the numbers to compile.
 
     Attributes
     ----------
     closure
         The linkage.
     name
-        Of the linkage; of a C source an identifier.
+        Name of the linkage; in C an identifier.
     file
-        From which the linkage was read.
+        File from which the linkage was read.
     derivatives
-        What is worked out: positions (0), velocities too (1), and accelerations (2).
+        0: positions; 1: velocities too; 2: accelerations too.
     joints
-        The published joints that are asked for.
+        The requested published joints.
 
     """
 
@@ -100,10 +100,10 @@ class Subject(NamedTuple):
 
 
 class Language(ABC):
-    """How the parts of a source are written."""
+    """A language: how the parts of a source are written."""
 
     functions: ClassVar[dict[str, str]] = {}
-    """Functions that have another name than on the tape."""
+    """Functions that have a different name on the tape."""
     infinity: ClassVar[str]
     conjunction: ClassVar[str] = '&&'
     disjunction: ClassVar[str] = '||'
@@ -123,11 +123,11 @@ class Language(ABC):
         return f'{condition} ? {one} : {other}'
 
     def negated(self, condition: str) -> str:
-        """Write that a condition does not hold, which is also so of numbers that are none."""
+        """Write that a condition does not hold; this is true for NaN too."""
         return f'!{condition}' if condition.isidentifier() else f'!({condition})'
 
     def block(self, condition: str, lines: Sequence[str]) -> list[str]:
-        """Write lines that are run where a condition holds."""
+        """Write lines that run if a condition holds."""
         return [f'if ({condition}) {{', *(f'    {line}' for line in lines), '}']
 
     def wrapped(self, line: str) -> list[str]:
@@ -140,12 +140,12 @@ class Language(ABC):
         )  # fmt: skip
 
     def function(self, derivatives: int) -> str:
-        """Return the name of the function that gives so many derivatives."""
+        """Return the name of the function with so many derivatives."""
         return FUNCTIONS[derivatives]
 
     @abstractmethod
     def assigned(self, name: str, text: str, truth: bool = False) -> str:
-        """Write a line that gives a name to a number, or to a truth."""
+        """Write a line that assigns a number, or a truth value, to a name."""
 
     @abstractmethod
     def commented(self, line: str, text: str) -> str:
@@ -157,7 +157,7 @@ class Language(ABC):
 
     @abstractmethod
     def rounded(self, text: str) -> str:
-        """Write the nearest whole number."""
+        """Write the nearest integer."""
 
     @abstractmethod
     def status(self, name: str) -> str:
@@ -165,7 +165,7 @@ class Language(ABC):
 
     @abstractmethod
     def left(self, status: str) -> str:
-        """Write a line that returns a status, and no values."""
+        """Write a line that returns a status without values."""
 
     @abstractmethod
     def solved(self, status: str, groups: Sequence[Sequence[str]]) -> list[str]:
@@ -173,7 +173,7 @@ class Language(ABC):
 
     @abstractmethod
     def whole(self, subject: Subject, head: Sequence[str], body: Sequence[str]) -> str:
-        """Write the source: its head is text, the body is that of the function."""
+        """Write the source from the text of its head and the body of the function."""
 
 
 def source(subject: Subject, language: Language) -> str:
@@ -183,14 +183,14 @@ def source(subject: Subject, language: Language) -> str:
     Parameters
     ----------
     subject
-        What is compiled.
+        The linkage and the numbers to compile.
     language
         The language.
 
     Raises
     ------
     DefinitionError
-        Where the linkage cannot be compiled.
+        If the linkage cannot be compiled.
 
     """
     closure = subject.closure
@@ -202,8 +202,8 @@ def source(subject: Subject, language: Language) -> str:
         groups = [[part.joints[i] for i in asked] for part in motion if part is not None]
         return [*groups, [motion.position.joints[i] for i in bounded]]
 
-    found = program(closure, subject.derivatives, wanted)
-    body = _Body(subject, language, found)
+    compiled = program(closure, subject.derivatives, wanted)
+    body = _Body(subject, language, compiled)
     head = _head(subject, language.function(subject.derivatives))
     return language.whole(subject, list(head), body.lines())
 
@@ -253,7 +253,7 @@ class _Body:
         return [*(f'    {line}' for line in constants), *wrapped]
 
     def _follow(self, tree: Tree) -> None:
-        """Write a tree: what is usual goes straight on, all else is a block that returns."""
+        """Write a tree: the usual path continues, every other one is a block that returns."""
         language, writer = self._language, self._writer
         while isinstance(tree, Branch):
             condition = writer.write(tree.condition)
@@ -291,7 +291,7 @@ class _Body:
         writer.lines += language.solved(status, texts)
 
     def _beyond(self, bound: Bound, name: str) -> str:
-        """Write that a value is beyond its limits, as `Bound.beyond` finds it."""
+        """Write that a value is beyond its limits, as `Bound.beyond` does."""
         language = self._language
 
         def compared(value: str) -> str:
@@ -328,7 +328,7 @@ def _roots(tree: Tree) -> Iterator[Any]:
 
 
 def _constants(roots: Sequence[Any]) -> Iterator[float]:
-    """Yield the constants of what the roots need, as often as they are written."""
+    """Yield the constants that the roots need, once for each use."""
     for operation in uses(roots):
         for argument in operation.arguments:
             if not isinstance(argument, Operation):
@@ -337,15 +337,15 @@ def _constants(roots: Sequence[Any]) -> Iterator[float]:
 
 def _lengths(closure: Closure) -> dict[float, str]:
     """Return names of the lengths of links, by their values in the unit of the steps."""
-    found: dict[float, set[str]] = defaultdict(set)
+    named: dict[float, set[str]] = defaultdict(set)
     for link, points in closure.linkage.links.items():
         for (one, (x, y)), (other, (u, v)) in combinations(points.items(), 2):
-            found[hypot(u - x, v - y) / closure.scale].add(f'{link}_{one}_{other}')
+            named[hypot(u - x, v - y) / closure.scale].add(f'{link}_{one}_{other}')
         for point, place in points.items():
             for axis, value in zip('xy', place, strict=True):
-                found[value / closure.scale].add(f'{link}_{point}_{axis}')
-    # What several have in common is named after none.
-    names = {value: names.pop() for value, names in found.items() if len(names) == 1}
+                named[value / closure.scale].add(f'{link}_{point}_{axis}')
+    # A value that several lengths share gets the name of none.
+    names = {value: names.pop() for value, names in named.items() if len(names) == 1}
     often = Counter(names.values())
     return {
         value: f'length_{name}'

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-What is done to symbols, written down: the tape of a compiled linkage.
+The tape of a compiled linkage: a record of the operations on symbols.
 
-A symbol stands for a number that is not known yet. What the steps of a linkage do to it becomes
-an operation, each once. Where the steps decide by a symbol, they go on as they do at one state of
-the linkage, and the decision stays on the tape: what is compiled holds where all are made alike.
+A symbol stands for a number that is not known yet. The steps of a linkage turn it into operations,
+each recorded once. If the steps decide by a symbol, they follow the decision at one state of the
+linkage, and the tape records it: the compiled code is valid where all decisions are the same.
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ class Operation:
     Attributes
     ----------
     name
-        What is done: the name of an input, ``+``, ``sin``, ``where``, ``call``, and so on.
+        The operation: the name of an input, ``+``, ``sin``, ``where``, ``call``, and so on.
     arguments
         Other operations, and constants.
     kind
-        Of what it gives.
+        Type of the result.
     number
-        On the tape.
+        Index on the tape.
     value
-        At the state of the linkage at which the tape is written.
+        Value at the state of the linkage at which the tape is recorded.
 
     """
 
@@ -60,16 +60,16 @@ class Operation:
 
     @property
     def is_input(self) -> bool:
-        """Whether it is given from outside."""
+        """Whether it is an input."""
         return not self.arguments
 
     def operands(self) -> list[Operation]:
-        """Return the operations that it starts from."""
+        """Return the operations among the arguments."""
         return [argument for argument in self.arguments if isinstance(argument, Operation)]
 
 
 class Decision(NamedTuple):
-    """What the steps have decided by: a condition, and whether it held."""
+    """A decision of the steps: a condition, and whether it held."""
 
     condition: Operation
     held: bool
@@ -122,7 +122,7 @@ class Tape:
     Attributes
     ----------
     decisions
-        In the order in which the steps have made them, each condition once.
+        The decisions in the order in which the steps made them, each condition once.
 
     """
 
@@ -133,24 +133,24 @@ class Tape:
         self._ahead: Sequence[bool | None] = ()
 
     def given(self, name: str, value: complex) -> Symbol:
-        """Return the symbol of an input, real or complex as its value is."""
+        """Return the symbol of an input, real or complex like its value."""
         kind: Kind = 'complex' if isinstance(value, complex) else 'real'
         return Symbol(self, self._new(name, (), kind, value))
 
     def begin(self, ahead: Sequence[bool | None] = ()) -> None:
-        """Forget all decisions; those to come are made as is said ahead, then by the values."""
+        """Forget all decisions; the next ones follow ``ahead``, and then the values."""
         self.decisions, self._decided, self._ahead = [], {}, ahead
 
     def decide(self, condition: Operation) -> bool:
-        """Return whether a condition holds, and note it."""
-        found = self._decided.get(condition.number)
-        if found is None:
+        """Return whether a condition holds, and record the decision."""
+        held = self._decided.get(condition.number)
+        if held is None:
             number = len(self.decisions)
-            said = self._ahead[number] if number < len(self._ahead) else None
-            found = bool(condition.value) if said is None else said
-            self._decided[condition.number] = found
-            self.decisions.append(Decision(condition, found))
-        return found
+            ahead = self._ahead[number] if number < len(self._ahead) else None
+            held = bool(condition.value) if ahead is None else ahead
+            self._decided[condition.number] = held
+            self.decisions.append(Decision(condition, held))
+        return held
 
     def write(self, name: str, *arguments: Any) -> Any:
         """Return the symbol of an operation on symbols and constants."""
@@ -165,19 +165,19 @@ class Tape:
         return Symbol(self, self._new(name, given, _kind(name, given), None))
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Symbol:
-        """Return the symbol of what a function returns, which no symbol can pass."""
+        """Return the symbol of a function's result; the function cannot take symbols."""
         given = tuple(a.operation if isinstance(a, Symbol) else a for a in arguments)
         return Symbol(self, self._new('call', (function, *given), 'other', None))
 
     def _new(self, name: str, arguments: tuple[Any, ...], kind: Kind, value: Any) -> Operation:
         key = (name, *(_key(argument) for argument in arguments))
-        found = self._known.get(key)
-        if found is None:
+        operation = self._known.get(key)
+        if operation is None:
             if value is None:
                 value = _value(name, arguments)
-            found = Operation(name, arguments, kind, len(self._known), value)
-            self._known[key] = found
-        return found
+            operation = Operation(name, arguments, kind, len(self._known), value)
+            self._known[key] = operation
+        return operation
 
 
 class Symbol:
@@ -187,9 +187,9 @@ class Symbol:
     Parameters
     ----------
     tape
-        Where it is written down what is done to it.
+        The tape that records the operations on it.
     operation
-        What it is.
+        The operation that it stands for.
 
     """
 
@@ -200,7 +200,7 @@ class Symbol:
         self.operation = operation
 
     def apply(self, name: str, *arguments: Any) -> Any:
-        """Return what a function of `arithmetic` makes of its arguments."""
+        """Return the result of a function of `arithmetic`."""
         return self.tape.write(name, *arguments)
 
     def __add__(self, other: Any) -> Any:
@@ -263,14 +263,14 @@ class Symbol:
         return self.tape.write('item', self, index)
 
     def __bool__(self) -> bool:
-        """Decide: what is a number holds where it is not 0."""
+        """Decide; a number is true if it is not 0."""
         if self.operation.kind == 'truth':
             return self.tape.decide(self.operation)
         return bool(self != 0.0)
 
     @property
     def real(self) -> Any:
-        """Return the part along x; of a real number itself."""
+        """Return the part along x; a real number is its own real part."""
         return self if self.operation.kind == 'real' else self.tape.write('real', self)
 
     @property
@@ -279,12 +279,12 @@ class Symbol:
         return 0.0 if self.operation.kind == 'real' else self.tape.write('imag', self)
 
     def conjugate(self) -> Any:
-        """Return the mirror image."""
+        """Return the complex conjugate."""
         return self if self.operation.kind == 'real' else self.tape.write('conjugate', self)
 
 
 def never_minus_zero(number: Any) -> bool:
-    """Return whether a real number is surely not −0.0, as adding 0.0 would make it 0.0."""
+    """Return whether a real number is certainly not −0.0, which adding 0.0 would change."""
     if not isinstance(number, Operation):
         return isinstance(number, float) and math.copysign(1.0, number) > 0.0
     if number.kind != 'real':
@@ -297,7 +297,7 @@ def never_minus_zero(number: Any) -> bool:
 
 
 def _simplified(name: str, given: tuple[Any, ...]) -> Any:
-    """Return what an operation comes to without being done, to the last bit; None if it must."""
+    """Return an operation in a simpler form with the same bits, or None if there is none."""
     if name in ('+', '-', '*', '/') and not any(
         isinstance(a, complex) or (isinstance(a, Operation) and a.kind == 'complex') for a in given
     ):
@@ -331,7 +331,7 @@ def _is(given: Any, value: float) -> bool:
 
 
 def _negated(given: Any) -> Any:
-    """Return what an operation is the negative of, if it is one."""
+    """Return the operand of a negation, or None."""
     if isinstance(given, Operation) and given.name == 'negative' and given.kind == 'real':
         return given.arguments[0]
     return None
@@ -359,7 +359,7 @@ def _key(argument: Any) -> Any:
 
 
 def _value(name: str, arguments: tuple[Any, ...]) -> Any:
-    """Return the value; NaN where there is none, off the way that the steps take."""
+    """Return the value; NaN if it has none, in branches that the steps do not take."""
     values = [a.value if isinstance(a, Operation) else a for a in arguments]
     try:
         if name == 'call':

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A linkage's steps, run on symbols along one path of decisions."""
+"""The steps of a linkage, run on symbols along one path of decisions."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 
 Number = Operation | float
-"""What a program returns: an operation, or a constant."""
+"""A result of a program: an operation, or a constant."""
 
 
 class Motion(NamedTuple):
-    """A linkage on symbols, as far as it was asked for."""
+    """The motion of a linkage on symbols, as far as requested."""
 
     position: Position
     velocity: Velocity | None
@@ -39,23 +39,23 @@ class Motion(NamedTuple):
 
 
 Wanted = Callable[[Motion], Sequence[Sequence[float]]]
-"""Picks out of a motion the numbers that a program returns, in groups."""
+"""Selects the numbers of a motion that a program returns, in groups."""
 
 
 class Path(NamedTuple):
     """
-    What the steps do as long as they decide alike.
+    The operations of the steps while their decisions are the same.
 
     Attributes
     ----------
     inputs
-        The driven joints' values, then their rates and their accelerations, as far as asked for.
+        The values of the driven joints, then their rates and accelerations, if requested.
     decisions
-        In order. Where one falls otherwise the path does not hold.
+        The decisions in order. If one of them differs, the path is not valid.
     outputs
-        What it returns, in groups.
+        The returned numbers, in groups.
     tape
-        What it is written on.
+        The tape of the operations.
 
     """
 
@@ -87,16 +87,16 @@ def traced(
     at
         Values of its inputs, in [rad] or [m], at which it is closed.
     derivatives
-        What is worked out: positions (0), velocities too (1), and accelerations (2).
+        0: positions; 1: velocities too; 2: accelerations too.
     wanted
-        What of it the path returns.
+        Selects the numbers that the path returns.
     within_limits
-        Whether the path ends where a joint is beyond its limits.
+        Whether the path ends if a joint is beyond its limits.
 
     Raises
     ------
     ValueError
-        Where the linkage is not closed at that state.
+        If the linkage is not closed at that state.
 
     """
     tape = Tape()
@@ -108,7 +108,7 @@ def traced(
     motion = moved(closure, given, within_limits)
     if motion.position.status is not Status.CLOSED:
         raise ValueError(f'{list(at)}: the linkage is {motion.position.status.value} there')
-    # What is wanted may decide, too.
+    # The selection may make decisions, too.
     outputs = tuple(tuple(number_of(n) for n in group) for group in wanted(motion))
     inputs = tuple(symbol.operation for group in given for symbol in group)
     return Path(inputs, tuple(tape.decisions), outputs, tape)
@@ -128,16 +128,16 @@ def moved(
     return Motion(position, velocity, acceleration)
 
 
-def number_of(found: Any) -> Number:
-    """Return the operation of a symbol, or the constant that a number is."""
-    return found.operation if isinstance(found, Symbol) else found
+def number_of(number: Any) -> Number:
+    """Return the operation of a symbol, or a constant as it is."""
+    return number.operation if isinstance(number, Symbol) else number
 
 
-# What becomes of a linkage where it leaves a path: which status it has there.
+# The fates of a path: the status of the linkage where it leaves the path.
 
 
 class Fork(NamedTuple):
-    """A condition, and what becomes of the linkage where it holds and where it does not."""
+    """A condition, and the fates where it holds and where it fails."""
 
     condition: Operation
     held: Fate
@@ -145,43 +145,43 @@ class Fork(NamedTuple):
 
 
 Fate: TypeAlias = Status | Fork | None
-"""A status; or nothing, where the steps go on in another way and only they can tell."""
+"""A status; or None if the steps continue on another path, and only they give the status."""
 
 
 def fates(closure: LoopClosure, path: Path) -> tuple[Fate, ...]:
     """
-    Return for each decision of a path what becomes of the linkage where it falls otherwise.
+    Return, for each decision of a path, the fate of the linkage if the decision differs.
 
-    The status is that of the first step that is not closed. Where that has a pose, as at a toggle,
-    a later step may have a worse one.
+    The status is that of the first step that is not closed. If that step has a pose, as at a
+    toggle, a later step may have a worse status.
 
     Parameters
     ----------
     closure
         The linkage.
     path
-        As it was traced, without limits.
+        The path, traced without limits.
 
     """
-    found: list[Fate] = []
+    result: list[Fate] = []
     held: list[bool] = []
     for decision in path.decisions:
         if decision.condition.name == 'finite':
-            found.append(Status.INDETERMINATE)
+            result.append(Status.INDETERMINATE)
         else:
-            found.append(_fate(closure, path, [*held, not decision.held]))
+            result.append(_fate(closure, path, [*held, not decision.held]))
             held.append(decision.held)
-    return tuple(found)
+    return tuple(result)
 
 
 def _fate(closure: LoopClosure, path: Path, decided: Sequence[bool]) -> Fate:
-    """Return the fate of a linkage whose first decisions fall as is said."""
+    """Return the fate of a linkage for its first decisions."""
     tape = path.tape
     tape.begin()
     inputs = path.inputs[: len(closure.linkage.inputs)]
     symbols: list[Any] = [Symbol(tape, given) for given in inputs]
     known = closure.known(*symbols)
-    # The inputs are finite: what is decided begins with the first step.
+    # The inputs are finite: the first decision is that of the first step.
     tape.begin(decided)
     fate: Fate = None
     for step in closure.steps:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Operations in the order in which a program does them, and how an expression is written."""
+"""The order of the operations of a program, and their expressions."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ from typing import Any, NamedTuple
 from linkage_ros.kinematics.compiling.tape import Operation
 
 _DEEPEST = 12
-"""How deep an expression is nested at most: compilers have limits, and readers, too."""
+"""Deepest nesting of an expression: compilers have limits, and readers too."""
 
 _PRECEDENCE = {'+': 4, '-': 4, '*': 5, '/': 5, 'negative': 6, '**': 7}
 _COMPARISONS = frozenset(('<', '<=', '>', '>=', '==', '!='))
 
 
 def uses(roots: Iterable[Any]) -> dict[Operation, int]:
-    """Return how often each operation is used by others that the roots need, or as a root."""
-    found: dict[Operation, int] = {}
+    """Return how often each operation is used, by others that the roots need or as a root."""
+    counts: dict[Operation, int] = {}
     waiting = [root for root in roots if isinstance(root, Operation)]
     for root in waiting:
-        found[root] = found.get(root, 0) + 1
+        counts[root] = counts.get(root, 0) + 1
     seen = set()
     while waiting:
         operation = waiting.pop()
         if operation not in seen:
             seen.add(operation)
             for operand in operation.operands():
-                found[operand] = found.get(operand, 0) + 1
+                counts[operand] = counts.get(operand, 0) + 1
                 waiting.append(operand)
-    return found
+    return counts
 
 
 class Text(NamedTuple):
@@ -54,7 +54,7 @@ class Text(NamedTuple):
     depth: int
 
     def within(self, precedence: int) -> str:
-        """Return it as a part of an expression that binds so tightly."""
+        """Return it as a part of an expression of a precedence."""
         return self.text if self.precedence >= precedence else f'({self.text})'
 
 
@@ -63,14 +63,14 @@ _ATOM = 9
 
 class Writer:
     """
-    Writes operations as lines of a language that has C's operators.
+    Writes operations as lines of a language with the operators of C.
 
-    What is used once stands where it is used; what is used more often has a name.
+    An operation that is used once is written inline; one that is used more often gets a name.
 
     Parameters
     ----------
     roots
-        All that the program needs: its conditions and its outputs.
+        All results that the program needs: its conditions and its outputs.
     constant
         Writes a constant.
     call
@@ -99,12 +99,12 @@ class Writer:
         self.lines: list[str] = []
 
     def name(self, operation: Operation, text: str) -> None:
-        """Let an operation, such as an input, be known by a name."""
+        """Give a name to an operation, such as an input."""
         self._texts[operation] = Text(text, _ATOM, 0)
 
     @contextmanager
     def block(self) -> Iterator[list[str]]:
-        """Collect the lines of a block; the names that it gives are not known behind it."""
+        """Collect the lines of a block; names assigned in it are unknown after it."""
         texts, lines = self._texts, self.lines
         self._texts, self.lines = dict(texts), []
         yield self.lines
@@ -123,7 +123,7 @@ class Writer:
         return self._texts[root]
 
     def _needed(self, root: Operation) -> Iterator[Operation]:
-        """Yield what has no text yet, each after its operands."""
+        """Yield the operations without a text, each after its operands."""
         waiting: list[tuple[Operation, bool]] = [(root, False)]
         while waiting:
             operation, ready = waiting.pop()
@@ -148,13 +148,17 @@ class Writer:
         depth = 1 + max((part.depth for part in parts), default=0)
         name = operation.name
         if name in _PRECEDENCE and name not in ('negative', '**'):
-            own = _PRECEDENCE[name]
+            precedence = _PRECEDENCE[name]
             one, other = parts
-            # Sums and products are done from the left: what stands right is done before.
-            return Text(f'{one.within(own)} {name} {other.within(own + 1)}', own, depth)
+            # Sums and products associate to the left: the right operand needs brackets.
+            return Text(
+                f'{one.within(precedence)} {name} {other.within(precedence + 1)}',
+                precedence,
+                depth,
+            )
         if name == 'negative':
-            own = _PRECEDENCE[name]
-            return Text(f'-{parts[0].within(own + 1)}', own, depth)
+            precedence = _PRECEDENCE[name]
+            return Text(f'-{parts[0].within(precedence + 1)}', precedence, depth)
         if name in _COMPARISONS:
             one, other = parts
             return Text(f'{one.within(4)} {name} {other.within(4)}', 2, depth)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-PRP: a pin where two known lines cross.
+PRP: a pin at the intersection of two known lines.
 
 The pin travels along a line through E1 in the direction û1 on one link and along a line through E2
 in the direction û2 on another. With × for the z component of the cross product and δ the angle
@@ -21,9 +21,9 @@ from û1 to û2::
 
     E1 + s1·û1 = E2 + s2·û2        s1 = (E2 − E1) × û2 / sin δ        s2 = (E2 − E1) × û1 / sin δ
 
-The rates solve the same equations for the difference of the velocities that the two links have at
-the pin, the accelerations for that of the accelerations, Coriolis' included. Where the lines are
-parallel they do not meet, or lie on each other: open, or indeterminate.
+The rates solve the same equations for the difference of the links' velocities at the pin, the
+accelerations for that of their accelerations, including Coriolis terms. Parallel lines do not
+meet, or coincide: open, or indeterminate.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class PRPPose(NamedTuple):
     status
         Whether the lines cross.
     gap
-        The distance of parallel lines, else 0, in the unit of the lengths.
+        Distance of parallel lines, otherwise 0, in the unit of the lengths.
     first, second
         s1 and s2, in the unit of the lengths.
     across
@@ -75,7 +75,7 @@ class PRPDyad:
     arms
         Indices, among the coordinates, of the angles of the links that carry the lines.
     units
-        Directions of the lines where those coordinates are 0.
+        Directions of the lines at coordinates of 0.
 
     """
 
@@ -94,7 +94,7 @@ class PRPDyad:
         angle, other_angle = (known.coordinates[k] for k in self.arms)
         start, end = (known.pins[k] for k in self._starts)
         units = facing(angle) * self._units[0], facing(other_angle) * self._units[1]
-        # The angle between the lines first: two directions would cancel where they are parallel.
+        # The angle first: the product of two directions would cancel for parallel lines.
         across = facing(other_angle - angle) * self._across
         between = end - start
         if abs(across.imag) <= ROUNDING:
@@ -138,7 +138,7 @@ class PRPDyad:
         return angle, angle + pi
 
     def side_of(self, pose: PRPPose) -> float:
-        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        """Return a number with the sign of the assembly; 0 where it is singular."""
         return pose.across.imag
 
     def transmission_angle(self, pose: PRPPose) -> float:
@@ -147,38 +147,19 @@ class PRPDyad:
 
 
 def _carried(slide: float, rate: float, turn: float, change: float) -> complex:
-    """Return what a turning line does to a point on it, centrifugal, Euler and Coriolis."""
+    """Return the centrifugal, Euler and Coriolis terms of a point on a turning line."""
     return 1j * (change * slide + 2.0 * turn * rate) - turn * turn * slide
 
 
 def resolved(
     between: complex, units: tuple[complex, complex], sine: float, state: State
 ) -> tuple[float, float]:
-    """Resolve a vector along both lines, and append its parts."""
+    """Resolve a vector along both lines, and append its components."""
     one, other = units
     first, second = cross(between, other) / sine, cross(between, one) / sine
     state.coordinates.append(first)
     state.coordinates.append(second)
     return first, second
-
-
-# PRP on two links that are pinned together: a pin where a line of the one crosses one of the
-# other.
-#
-# Seen from O, the pin of the two links, the lines pass at the offsets h1 and h2, to the left, and
-# the dyad's pin lies r1 and r2 ahead of their feet. With δ the angle from û1 to û2, n̂ = i·û::
-#
-#     r1·û1 + h1·n̂1 = r2·û2 + h2·n̂2
-#
-#     r1 = (h1·cos δ − h2)/sin δ        ṙ1 = −δ̇·r2/sin δ
-#     r2 = (h1 − h2·cos δ)/sin δ        ṙ2 = −δ̇·r1/sin δ
-#
-#     r̈1 = −δ̈·r2/sin δ + δ̇²·(r1 + r2·cos δ)/sin²δ
-#     r̈2 = −δ̈·r1/sin δ + δ̇²·(r2 + r1·cos δ)/sin²δ
-#
-# The offsets are constants of the linkage, where `PRPDyad` takes the difference of two points of
-# the ground's frame, which may be far from where the lines cross: it lost 8,000 u·κ where the
-# points were 1,000 times as far, and 23 u·κ in random linkages.
 
 
 class CrankPRPPose(NamedTuple):
@@ -190,7 +171,7 @@ class CrankPRPPose(NamedTuple):
     status
         Whether the lines cross.
     gap
-        The distance of parallel lines, else 0, in the unit of the lengths.
+        Distance of parallel lines, otherwise 0, in the unit of the lengths.
     first, second
         r1 and r2, in the unit of the lengths.
     across
@@ -207,19 +188,34 @@ class CrankPRPPose(NamedTuple):
 
 class CrankPRPDyad:
     """
-    A pin on two lines of links that are pinned together.
+    A pin on two lines of links that are pinned together at O.
+
+    The lines pass O at the offsets h1 and h2, to the left, and the dyad's pin lies r1 and r2 ahead
+    of the feet of O on them. With δ the angle from û1 to û2 and n̂ = i·û::
+
+        r1·û1 + h1·n̂1 = r2·û2 + h2·n̂2
+
+        r1 = (h1·cos δ − h2)/sin δ        ṙ1 = −δ̇·r2/sin δ
+        r2 = (h1 − h2·cos δ)/sin δ        ṙ2 = −δ̇·r1/sin δ
+
+        r̈1 = −δ̈·r2/sin δ + δ̇²·(r1 + r2·cos δ)/sin²δ
+        r̈2 = −δ̈·r1/sin δ + δ̇²·(r2 + r1·cos δ)/sin²δ
+
+    The offsets are constants of the linkage. `PRPDyad` takes the difference of two points in the
+    frame of the ground, which may be far from the intersection: it lost 8,000 u·κ where the points
+    were 1,000 times as far, and 23 u·κ in random linkages.
 
     Parameters
     ----------
     offsets
         h1 and h2, in the unit of the lengths.
     size
-        Of the coordinates that the offsets were made of: what parallel lines may be apart by
-        rounding, in units of u.
+        Size of the coordinates from which the offsets were computed: it bounds, in units of u, the
+        distance of parallel lines that rounding causes.
     arms
         Indices, among the coordinates, of the angles of the links that carry the lines.
     across
-        e^{iδ} where those coordinates are equal.
+        e^{iδ} if those coordinates are equal.
 
     """
 
@@ -234,7 +230,7 @@ class CrankPRPDyad:
         self._across = across
 
     def close(self, known: State) -> CrankPRPPose:
-        """Append both ways along the lines."""
+        """Append r1 and r2."""
         x = known.coordinates
         (i, j), (one, other) = self.arms, self._offsets
         across = facing(x[j] - x[i]) * self._across
@@ -285,5 +281,5 @@ class CrankPRPDyad:
         return angle, angle + pi
 
     def side_of(self, pose: CrankPRPPose) -> float:
-        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        """Return a number with the sign of the assembly; 0 where it is singular."""
         return pose.across.imag

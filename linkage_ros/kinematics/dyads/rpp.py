@@ -16,14 +16,15 @@
 """
 RPP: a link pinned at A slides along a second one, which slides on a known line; the Scotch yoke.
 
-Both links keep their angles to the one that carries the known line. In its frame, with A at z,
-the directions v̂ and û of the second line and of the known one, κ a constant, and × for the z
-component of the cross product::
+Both links keep their angles to the link that carries the known line. In the frame of that link,
+A is at z, v̂ and û are the directions of the second and the known line, κ is a constant, and × the
+z component of the cross product::
 
     z = κ + s2·û + s1·v̂        s1 = (z − κ) × û/(v̂ × û)        s2 = (z − κ) × v̂/(û × v̂)
 
-s2 is the slide along the known line, s1 that of the pinned link along the second. The same holds
-of the rates and of the accelerations. There is one solution at every state, and no toggle.
+s2 is the slide along the known line, s1 that of the pinned link along the second. The same
+equations hold for the rates and the accelerations. There is one solution at every state, and no
+toggle.
 """
 
 from __future__ import annotations
@@ -72,8 +73,8 @@ class RPPDyad:
     inner, outer
         v̂ and û, not parallel.
     offsets
-        κ × û and κ × v̂, in the unit of the lengths: taken from z − κ they would lose what of κ
-        lies along a line, which may be far longer.
+        κ × û and κ × v̂, in the unit of the lengths: subtracting κ from z first would lose
+        accuracy where κ is long along a line.
 
     """
 
@@ -120,7 +121,7 @@ class RPPDyad:
     def _slides(
         self, place: complex, offsets: tuple[float, float], state: State
     ) -> tuple[float, float]:
-        """Resolve a vector along both lines, and append its parts."""
+        """Resolve a vector along both lines, and append its components."""
         along_outer, along_inner = offsets
         first = (cross(place, self._outer) - along_outer) / self._across
         second = (along_inner - cross(place, self._inner)) / self._across

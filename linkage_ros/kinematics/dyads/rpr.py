@@ -14,20 +14,20 @@
 
 
 """
-RPR: a rail pinned at A along which a block slides that is pinned at D; the inverted slider-crank.
+RPR: a rail pinned at A and a block on it pinned at D; the inverted slider-crank.
 
 The rail's direction is û, n̂ is û turned left by 90°, and the line along which D travels passes A
 at the offset h: AD = r·û + h·n̂. With s = |AD|::
 
     r = σ·√(s² − h²)        ψ = dir(û) = dir(AD) − atan2(h, r)
 
-σ = +1 where D lies ahead of A along û, −1 where it lies behind. For a straight rail h = 0 and r =
-±s. Where |d − a| = |h| (a straight rod: the crank as long as the distance to the swivel), r passes
+σ = +1 if D lies ahead of A along û, −1 if it lies behind. A straight rail has h = 0 and r = ±s.
+If |d − a| = |h| (for a straight rod: the crank is as long as the distance to the swivel), r passes
 zero with the sign of the half angle, as the rod itself does. At r = 0 a straight rod has no
-direction that could be told: the pose is indeterminate, not zero. A bent one (h ≠ 0) is at a
-change point where |d − a| = |h|, else at a toggle.
+defined direction: the pose is indeterminate, not zero. A bent one (h ≠ 0) is at a change point if
+|d − a| = |h|, otherwise at a toggle.
 
-Rates, where the diagonal grows by g = ṡ/s and turns by t, and with 1 + h²/r² = s²/r²::
+Rates, with g = ṡ/s and t the rate of the diagonal's direction, and with 1 + h²/r² = s²/r²::
 
     ψ̇ = t + h·(g/r)                        ṙ = s²·(g/r)
     ψ̈ = ṫ + h·(e/r − 2g·(g/r))             r̈ = s²·(e/r)           e = ġ + g²·(1 − h²/r²)
@@ -62,11 +62,11 @@ class RPRPose(NamedTuple):
     status
         Whether it closes.
     gap
-        What the rail's line misses D by where it does not, else 0, in the unit of the lengths.
+        Distance by which the rail's line misses D, or 0, in the unit of the lengths.
     rail
-        ψ, direction of the rail's line, in [rad].
+        ψ, the direction of the rail's line, in [rad].
     slide
-        r, from the foot of A on the line to D, along the line, in the unit of the lengths.
+        r, along the line from the foot of A on it to D, in the unit of the lengths.
     diagonal
         From A to D.
 
@@ -88,10 +88,10 @@ class RPRDyad:
     diagonal
         From A to D, with the limits |h| and ∞.
     offset
-        h, from A to the line, positive where the line lies left of A, in the unit of the lengths.
+        h, from A to the line, positive if the line lies left of A, in the unit of the lengths.
     sign
-        The assembly: +1 where D lies ahead of A along the rail, −1 where it lies behind. Where the
-        diagonal passes a change point: for 0 < φ < 2π.
+        The assembly: +1 if D lies ahead of A along the rail, −1 if it lies behind. If the diagonal
+        passes a change point, this holds for 0 < φ < 2π.
 
     """
 
@@ -141,7 +141,7 @@ class RPRDyad:
         changes.coordinates.append(pose.diagonal.square * (change.change * lean + whirl * bend))
 
     def side_of(self, pose: RPRPose) -> float:
-        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        """Return a number with the sign of the assembly; 0 where it is singular."""
         return pose.slide
 
     def transmission_angle(self, pose: RPRPose) -> float:

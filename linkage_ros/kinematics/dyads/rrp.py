@@ -16,14 +16,14 @@
 """
 RRP: a link pinned at A whose other pin B travels along a known line; the slider-crank.
 
-In the frame of the rail A lies at (x, y), and the link has the length b. With σ = +1 where B lies
-ahead of A along the line, −1 where it lies behind::
+In the frame of the rail A lies at (x, y), and the link has the length b. With σ = +1 if B lies
+ahead of A along the line, −1 if it lies behind::
 
     w = σ·√((b − y)·(b + y))        λ = atan2(−y, w)        r = x + w
 
-λ is the direction of the link in the frame of the rail, r the place of B along the line. Where the
+λ is the direction of the link in the frame of the rail, r the place of B along the line. If the
 link stands across the line, w = 0: a toggle, or a change point, where ẏ is 0 as well and the rail
-gives ẏ/w and the like. Rates::
+gives quotients such as ẏ/w. Rates::
 
     λ̇ = −ẏ/w                        ṙ = ẋ + y·λ̇
     λ̈ = −(ÿ + y·λ̇²)/w               r̈ = ẍ + ẏ·λ̇ + y·λ̈
@@ -49,7 +49,7 @@ class RRPPose(NamedTuple):
     status
         Whether it closes.
     gap
-        What the link misses the line by where it does not, else 0, in the unit of the lengths.
+        Distance by which the link misses the line, or 0, in the unit of the lengths.
     link
         Direction of A→B, in [rad].
     slide
@@ -70,7 +70,7 @@ class RRPPose(NamedTuple):
 
 
 class RRPRates(NamedTuple):
-    """The rates of the rail's frame, A's velocity in it, and λ̇."""
+    """The rates of the rail (A's velocity in its frame, and the frame's rate), and λ̇."""
 
     rail: tuple[complex, float]
     link: float
@@ -83,10 +83,10 @@ class RRPDyad:
     Parameters
     ----------
     rail
-        The rail, asked for a link of length b.
+        The rail, for a link of length b.
     sign
-        The assembly: +1 where B lies ahead of A, −1 where it lies behind. Where the rail passes a
-        change point: for −π/2 < ψ < π/2.
+        The assembly: +1 if B lies ahead of A, −1 if it lies behind. If the rail passes a change
+        point, this holds for −π/2 < ψ < π/2.
 
     """
 
@@ -97,7 +97,7 @@ class RRPDyad:
         self._sign = float(sign)
 
     def close(self, known: State) -> RRPPose:
-        """Append the direction of the link, as the rail's link has it, and the slide."""
+        """Append the direction of the link, in the rail's coordinates, and the slide."""
         sight = self.rail.at(known)
         status, place = sight.status, sight.place
         if status is Status.OPEN:
@@ -132,7 +132,7 @@ class RRPDyad:
         changes.coordinates.append(pull.real + velocity.imag * link + y * change)
 
     def side_of(self, pose: RRPPose) -> float:
-        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        """Return a number with the sign of the assembly; 0 where it is singular."""
         return pose.along
 
     def transmission_angle(self, pose: RRPPose) -> float:

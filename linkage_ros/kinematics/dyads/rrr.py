@@ -15,33 +15,33 @@
 """
 RRR: two links pinned together; the coupler and the rocker of a four-bar.
 
-The first link runs from its outer pin A to B, the second from its outer pin D to B. A, D and B are
-a triangle with the sides s = |AD|, b = |AB| and c = |DB|. With σ = +1 where B lies left of A→D::
+The first link runs from its outer pin A to B, the second from its outer pin D to B. A, D and B
+form a triangle with the sides s = |AD|, b = |AB| and c = |DB|. With σ = +1 if B lies left of A→D::
 
     K = σ·√((s² − (b − c)²)·((b + c)² − s²)) = 2·AB × DB
     θ3 = dir(AD) + atan2(K, (b² − c²) + s²)
     θ4 = dir(AD) + atan2(K, (b² − c²) − s²)
 
-Both factors of K come from the diagonal, where what cancels as the dyad folds or stretches is a
-constant of the linkage. At a change point their roots are signed, so that the motion passes it as
-the linkage itself does, at any step and with no memory.
+Both factors of K come from the diagonal, where the terms that cancel as the dyad folds or
+stretches are a constant of the linkage. At a change point their roots are signed, so that the
+motion passes it as the linkage itself does, at any step and with no memory.
 
-Rates, from the closing equation multiplied by DB and by AB, where the diagonal grows by g = ṡ/s
-and turns by t. With β = θ3 − dir(AD) and γ' = θ4 − dir(AD) let M = (b² − c²) + s² = K·cot(β) and
-L = (b² − c²) − s² = K·cot(γ')::
+Rates, from the closing equation multiplied by DB and by AB, with g = ṡ/s and t the rate of the
+diagonal's direction. With β = θ3 − dir(AD) and γ' = θ4 − dir(AD) let
+M = (b² − c²) + s² = K·cot(β) and L = (b² − c²) − s² = K·cot(γ')::
 
     ω3 = t + L·(g/K)        ω4 = t + M·(g/K)
 
-Since ω3 − t and ω4 − t are the rates of β and γ', these differentiate into::
+Since ω3 − t and ω4 − t are the rates of β and γ', the derivatives are::
 
     α3 = ṫ + L·(e/K) − 2g·(g/K)·(b² − c²)
     α4 = ṫ + M·(e/K) − 2g·(g/K)·(b² − c²)        e = ġ + g² − L·M·(g/K)²
 
 At a change point g, e and K are 0: the diagonal gives both quotients.
 
-OA × DB = a·c·sin(θ4 − φ) says the same of a four-bar, but where crank and rocker are nearly
-parallel it takes the difference of two angles that were rounded at the size of a half-turn: 6,500
-u·κ was measured.
+For a four-bar OA × DB = a·c·sin(θ4 − φ) is an alternative, but where crank and rocker are nearly
+parallel it is the difference of two angles that were rounded at the size of a half-turn: 6,500 u·κ
+were measured.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class RRRPose(NamedTuple):
     status
         Whether it closes.
     gap
-        What the links miss each other by where it does not, else 0, in the unit of the lengths.
+        Distance by which the links miss each other, or 0, in the unit of the lengths.
     first, second
         θ3 and θ4, directions of A→B and D→B, in [rad].
     cross
@@ -108,8 +108,8 @@ class RRRDyad:
     b, c
         Lengths of the first and the second link, in one unit; at best near 1.
     sign
-        The assembly: +1 where B lies left of A→D, −1 where it lies right of it. Where the diagonal
-        passes a change point: for 0 < φ < π.
+        The assembly: +1 if B lies left of A→D, −1 if it lies right. If the diagonal passes a
+        change point, this holds for 0 < φ < π.
 
     """
 
@@ -142,7 +142,7 @@ class RRRDyad:
         triangle_accelerations(pose, self._sign, self._difference, growth, change, changes)
 
     def side_of(self, pose: RRRPose) -> float:
-        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        """Return a number with the sign of the assembly; 0 where it is singular."""
         return pose.cross
 
     def transmission_angle(self, pose: RRRPose) -> float:
@@ -162,7 +162,7 @@ def crank_diagonal(
     """
     Return the diagonal of the four-bar with crank a, coupler b, rocker c and ground d.
 
-    Of a parallelogram whole turns need not be known: both roots change their sign with one.
+    The whole turns of a parallelogram need not be known: both roots change sign with a turn.
     """
     fold = margin(max(a, d), -min(a, d), -max(b, c), min(b, c))
     stretch = margin(b, c, -a, -d)
@@ -220,43 +220,18 @@ def triangle_accelerations(
         )
 
 
-# RRR on two links that are pinned together, with a change point where they lie folded.
-#
-# There |d − a| = |b − c|, and of `RRRDyad` over a `CrankDiagonal` one root is near itself. Where A
-# passes D closely, s is small, and of ω = (σρ·((b² − c²) ± s²) − 2a(d − a) + near²)/(2s²), with
-# ρ = far/stretch, all but a little cancels. With A = a + d, B = b + c, R = stretch and
-# N = B² − A², its bracket::
-#
-#     ρ² = (A² − s²)/(B² − s²)        B·ρ = A − s²·w        w = N/(R·(B·far + A·R))
-#
-# Put in, s² divides all but a constant, which is 0 on one side (σ = +1 where b − c = d − a)::
-#
-#     ω3 = (1 − σρ − σ·(b − c)·w)/2 − k/(2s²)
-#     ω4 = (1 + σρ − σ·(b − c)·w)/2 − k/(2s²)        k = A·((d − a) − σ·(b − c))
-#
-# and 1 − ρ = N/R²/(1 + ρ). Of a parallelogram N = 0 and ω4 = 1. By φ, of which s² has the
-# derivative near·far, and with H = B·(R² + far²)/(2R) + A·far::
-#
-#     α3 = σ·N·near/2·(+1/(2R³) − (b − c)·H/G²) + k·near·far/(2s⁴)
-#     α4 = σ·N·near/2·(−1/(2R³) − (b − c)·H/G²) + k·near·far/(2s⁴)        G = N/w
-#
-# Where far is below 0, ρ is, too: σ and near change their signs, and far is taken positive.
-# Without this 4,000 u·κ of a velocity and 10⁶ u·κ of an acceleration were lost, κ being that of
-# lengths which change together, so that the change point stays one.
-
-
 class FoldingRRRRates(NamedTuple):
     """
-    What the accelerations start from.
+    The rates, and the terms that the accelerations start from.
 
     Attributes
     ----------
     swing
         φ̇.
     first, second
-        ω3 and ω4 of φ̇ = 1, against OD.
+        ω3 and ω4 for φ̇ = 1, relative to OD.
     side
-        σ, and its sign changed where far is below 0.
+        σ, with the opposite sign if far is below 0.
     constant
         k.
 
@@ -271,12 +246,34 @@ class FoldingRRRRates(NamedTuple):
 
 class FoldingRRRDyad(RRRDyad):
     """
-    Two links pinned together, on two links that are, which can lie folded along each other.
+    Two links pinned together, on two pinned links, that can lie folded along each other.
+
+    At that change point |d − a| = |b − c|, and one root of `RRRDyad` over a `CrankDiagonal` is
+    near itself. Where A passes D closely, s is small, and nearly all cancels in
+    ω = (σρ·((b² − c²) ± s²) − 2a(d − a) + near²)/(2s²) with ρ = far/stretch. With A = a + d,
+    B = b + c, R = stretch and its bracket N = B² − A²::
+
+        ρ² = (A² − s²)/(B² − s²)        B·ρ = A − s²·w        w = N/(R·(B·far + A·R))
+
+    Inserted, s² divides all but a constant, which is 0 on one side (σ = +1 if b − c = d − a)::
+
+        ω3 = (1 − σρ − σ·(b − c)·w)/2 − k/(2s²)
+        ω4 = (1 + σρ − σ·(b − c)·w)/2 − k/(2s²)        k = A·((d − a) − σ·(b − c))
+
+    and 1 − ρ = N/R²/(1 + ρ). A parallelogram has N = 0 and ω4 = 1. The derivative of s² by φ is
+    near·far; with H = B·(R² + far²)/(2R) + A·far::
+
+        α3 = σ·N·near/2·(+1/(2R³) − (b − c)·H/G²) + k·near·far/(2s⁴)
+        α4 = σ·N·near/2·(−1/(2R³) − (b − c)·H/G²) + k·near·far/(2s⁴)        G = N/w
+
+    If far is below 0, so is ρ: σ and near change their signs, and far is taken positive. Without
+    this form 4,000 u·κ of a velocity and 10⁶ u·κ of an acceleration were lost, where κ is that of
+    lengths which change together, so that the change point remains one.
 
     Parameters
     ----------
     diagonal
-        From A to D; it `fits`.
+        From A to D; one that `fits`.
     b, c, sign
         As in `RRRDyad`.
 
@@ -301,7 +298,7 @@ class FoldingRRRDyad(RRRDyad):
 
     @staticmethod
     def fits(diagonal: AnyDiagonal) -> bool:
-        """Return whether a diagonal passes such a change point."""
+        """Return whether a diagonal passes a change point where the links fold."""
         return isinstance(diagonal, CrankDiagonal) and not diagonal.brackets[0]
 
     def rates(  # type: ignore[override]  # other ones
@@ -313,7 +310,7 @@ class FoldingRRRDyad(RRRDyad):
         fold_ratio, stretch_ratio = self.diagonal.ratios(pose.diagonal)
         ratio = self._sign * fold_ratio * stretch_ratio
         side = copysign(1.0, ratio)
-        # 1 on one side and 0 on the other one.
+        # 1 on one side and 0 on the other.
         same, other = 0.5 + 0.5 * side, 0.5 - 0.5 * side
         constant = same * left + other * right
         more, less, bent = 1.0 + abs(ratio), 0.0, 0.0
@@ -360,21 +357,12 @@ class FoldingRRRDyad(RRRDyad):
         a.append(base + pull * rates.second + square_rate * (whirl - turn))
 
 
-# RRR whose links change their length: cylinders, and links with a motor in them.
-#
-# A side of the triangle runs through links that driven joints hold together, so that its vector z
-# in the frame of its first link is a function of the inputs. At one state it is a triangle like
-# any other. For the rates, the end of a side that did not turn would move by ż·e^{iθ}: added to
-# the velocity of its outer pin, this gives the velocity equation of a dyad of constant sides.
-# Likewise (z̈ + 2i·θ̇·ż)·e^{iθ} for the accelerations.
-
-
 class DrivenOffset(NamedTuple):
     """
-    From the frame of one link to that of the one which it is driven against.
+    The transformation from the frame of one link to that of a link it is driven against.
 
     A point z becomes origin + e^{i·(angle + sign·x[turn])}·(z − inner) + sign·x[slide]·unit; turn
-    or slide is the input, the other one is −1.
+    or slide is the index of the input, and the other is −1.
     """
 
     origin: complex
@@ -388,14 +376,14 @@ class DrivenOffset(NamedTuple):
 
 class Side:
     """
-    A vector from one point of a group of links to another, in the frame of the first one's link.
+    A vector from one point of a group of links to another, in the frame of the link of the first.
 
     Parameters
     ----------
     start, end
         The points, each in the frame of its own link.
     carries
-        From the link of the end to the link of the start, one after the other.
+        The transformations from the link of the end to the link of the start, in this order.
 
     """
 
@@ -419,7 +407,7 @@ class Side:
     def changes(
         self, x: list[float], v: list[float], a: list[float] | None = None
     ) -> tuple[complex, complex]:
-        """Return its first derivative, and its second one where accelerations are given."""
+        """Return the first derivative, and the second if accelerations are given."""
         z, rate, change = self._end, 0j, 0j
         for origin, inner, angle, turn, slide, sign, unit in self._carries:
             if turn >= 0:
@@ -450,7 +438,7 @@ class DrivenRRRPose(NamedTuple):
 
 
 class DrivenRRRRates(NamedTuple):
-    """The growth of the diagonal, and the rates of both sides."""
+    """The rates of the diagonal, and those of both sides."""
 
     growth: DiagonalRate
     sides: tuple[complex, complex]
@@ -458,7 +446,13 @@ class DrivenRRRRates(NamedTuple):
 
 class DrivenRRRDyad:
     """
-    Two groups of links pinned together.
+    RRR whose sides change their length: cylinders, and links with a motor in them.
+
+    A side of the triangle runs through links that driven joints hold together, so its vector z in
+    the frame of its first link is a function of the inputs. At one state it is a triangle like any
+    other. For the rates, ż·e^{iθ}, the velocity of the end of a side that does not turn, is added
+    to the velocity of its outer pin; this gives the velocity equation of a dyad of constant sides.
+    Likewise (z̈ + 2i·θ̇·ż)·e^{iθ} for the accelerations.
 
     Parameters
     ----------
@@ -467,7 +461,7 @@ class DrivenRRRDyad:
     sides
         From A to B, and from D to B.
     sign
-        The assembly: +1 where B lies left of A→D, −1 where it lies right of it.
+        The assembly: +1 if B lies left of A→D, −1 if it lies right.
 
     """
 
@@ -519,7 +513,7 @@ class DrivenRRRDyad:
         start, end = self._ends
         growth, triangle = rates.growth, pose.triangle
         lean = self._sign * growth.lean
-        # The rates of this dyad's own links, as `rates` has appended them.
+        # The rates of the links of this dyad, as `rates` has appended them.
         turns = growth.turn + triangle.less * lean, growth.turn + triangle.more * lean
         pulls = []
         for side, turn, rate, unit in zip(
@@ -537,7 +531,7 @@ class DrivenRRRDyad:
         triangle_accelerations(triangle, self._sign, difference, growth, growth_change, changes)
 
     def side_of(self, pose: DrivenRRRPose) -> float:
-        """Return a number whose sign tells the side of the assembly; 0 where it is singular."""
+        """Return a number with the sign of the assembly; 0 where it is singular."""
         return pose.triangle.cross
 
     def transmission_angle(self, pose: DrivenRRRPose) -> float:

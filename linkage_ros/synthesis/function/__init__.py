@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Functions that a four-bar shall work out."""
+"""Function generation: functions that a four-bar shall compute."""

@@ -17,9 +17,9 @@
 A formula of x, as a user types it.
 
 Each token of the text is checked: only numbers, x, constants, functions, operators and parentheses
-come through, in an order that a formula can have. What is left is parsed as Python, which gives
-the precedence (-x^2 is -(x^2), 2^x^2 is 2^(x^2)), and never run. ``^`` and ``**`` are the same;
-``log`` is the natural logarithm, as ``ln`` is, and ``log10`` the one to the base of 10.
+are accepted, in a valid order. The text is then parsed as Python, which gives the precedence
+(-x^2 is -(x^2), 2^x^2 is 2^(x^2)), and is never executed. ``^`` and ``**`` are the same; ``log``
+is the natural logarithm, like ``ln``; ``log10`` has base 10.
 """
 
 from __future__ import annotations
@@ -70,10 +70,10 @@ _OPERATORS: dict[type[ast.operator], np.ufunc] = {
 }
 
 _LONGEST = 200
-"""Characters."""
+"""Most characters of a formula."""
 
 _DEEPEST = 40
-"""Levels of parentheses, powers and signs: Python's parser and stack must bear them."""
+"""Levels of parentheses, powers and signs: a limit for Python's parser and stack."""
 
 _TOKEN = re.compile(
     r'(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)'
@@ -97,10 +97,10 @@ _MEANT = {
     '[': '(',
     ']': ')',
 }
-"""What is meant by characters that come with formulas copied from elsewhere."""
+"""Meaning of characters that come with formulas copied from elsewhere."""
 
 _Step = float | np.ufunc | None
-"""A number, what is done to the one or two values before it, or x."""
+"""A number, an operation on the one or two values before it, or None for x."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ class Expression:
     Raises
     ------
     SynthesisError
-        Where it is none: with the part that is wrong, and its place, counted from 1.
+        If it is not a formula: with the wrong part and its place, counted from 1.
 
     """
 
@@ -135,7 +135,7 @@ class Expression:
 
     def __call__(self, x: float | Array) -> float | Array:
         """
-        Return the values; inf or nan where there are none.
+        Return the values; inf or NaN where the formula has none.
 
         Parameters
         ----------
@@ -156,13 +156,13 @@ class Expression:
                     stack[first:] = [step(*stack[first:])]
         (result,) = stack
         if values.ndim:
-            # Of a formula without an x, a number; and x itself is not given away.
+            # A formula without x gives a number; and the array x itself must not be returned.
             return np.array(np.broadcast_to(result, values.shape))
         return float(result)
 
 
 class _Token(NamedTuple):
-    """A part of a formula: its kind as the pattern has it, and where it begins."""
+    """A part of a formula: its kind in the pattern, its text and its start."""
 
     kind: str
     text: str
@@ -170,7 +170,7 @@ class _Token(NamedTuple):
 
 
 def _steps(node: ast.expr) -> Iterator[_Step]:
-    """Yield values first, then the operations on them, in the order in which they are done."""
+    """Yield values, then the operations on them, in the order of evaluation."""
     match node:
         case ast.Constant():
             yield cast('float', node.value)
@@ -190,7 +190,7 @@ def _steps(node: ast.expr) -> Iterator[_Step]:
 
 
 def _as_python(text: str) -> str:
-    """Return a formula as Python writes it; refuse a text that is none."""
+    """Return a formula in Python syntax; refuse a text that is not a formula."""
     if len(text) > _LONGEST:
         raise _error(
             text, f'is {len(text)} characters long', f'keep it within {_LONGEST} characters'
@@ -257,7 +257,7 @@ def _tokens(text: str) -> Iterator[_Token]:
 
 
 def _is_value(text: str, token: _Token, after: _Token | None) -> bool:
-    """Return whether a token is a value; a function, whose parenthesis follows, is none yet."""
+    """Return whether a token is a value; a function before its parenthesis is not."""
     if token.kind == 'number':
         if not isfinite(float(token.text)):
             raise _wrong(text, token, 'is beyond all numbers', 'write a smaller one')
@@ -285,5 +285,5 @@ def _error(text: str, reason: str, remedy: str) -> SynthesisError:
 
 
 def named(text: str) -> str:
-    """Return a formula as errors name it."""
+    """Return the name of a formula in errors."""
     return f'function {quoted(text)}'

@@ -34,32 +34,32 @@ def generate_function(
     ground: float = 1.0,
 ) -> Design:
     """
-    Design a four-bar that works out a function.
+    Design a four-bar that computes a function.
 
-    With three precision points it has them exactly, by Freudenstein's equation; with more it comes
-    as near to them as a four-bar can, which needs scipy.
+    With three precision points it meets them exactly, by Freudenstein's equation; with more points
+    it is the nearest four-bar, which needs scipy.
 
     Parameters
     ----------
     function
-        Of x, such as ``'log10(x)'``.
+        Function of x, such as ``'log10(x)'``.
     x_range
-        Where x begins and ends.
+        First and last x.
     crank_range, rocker_range
         Angles of crank and rocker there, in [rad].
     points
-        How many precision points, spaced as `chebyshev` says.
+        Number of precision points, spaced by `chebyshev`.
     ground
         Length of the ground, in [m].
 
     Raises
     ------
     SynthesisError
-        If the function or a range cannot be used, or no four-bar of finite links does it.
+        If the function or a range is invalid, or no four-bar of finite links exists.
     LinkageError
         If scipy is needed and not installed.
     TypeError
-        If the function is not a text.
+        If the function is not a string.
 
     """
     if not isinstance(function, str):

@@ -12,19 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 Function generation: a four-bar whose crank angle is x and whose rocker angle is y = f(x).
 
-Both scales are even: x begins and ends where the crank's range does, and f of these two where the
-rocker's does (F. Freudenstein, Approximate synthesis of four-bar linkages, Transactions of the
-ASME 77 (1955) 853-861: starting and final values, and the scale factors between them). In between
-f may go beyond its ends, and the rocker with it. A range may go down: the crank turns back, or y
-falls where the rocker's angle grows.
+Both scales are linear: the range of x corresponds to the range of the crank, and the values of f
+at its ends to the range of the rocker (F. Freudenstein, Approximate synthesis of four-bar
+linkages, Transactions of the ASME 77 (1955) 853-861: starting and final values, and the scale
+factors between them). In between f may go beyond its values at the ends, and the rocker with it.
+A range may decrease: the crank turns back, or y falls while the rocker's angle grows.
 
-The structural error is the rocker angle of a design less the wanted one. It is what remains when
-every link has its length exactly and nothing bends or plays. At precision points of an exact
-design it is 0, between them it is not.
+The structural error is the rocker angle of a design minus the wanted one. It remains even if every
+link has its exact length and nothing bends or has play. At the precision points of an exact design
+it is 0, between them it is not.
 """
 
 from __future__ import annotations
@@ -45,26 +44,26 @@ from numpy.typing import ArrayLike
 _SAMPLES = 2000
 
 _ZOOMS = 3
-"""Each makes the samples some 700 times denser, where the function is steepest."""
+"""Each zoom makes the samples about 700 times denser, where the function is steepest."""
 
 _JUMP = 0.1
-"""A step that stays this part of itself when one looks 3e8 times closer is no slope."""
+"""A step is a jump if this fraction of it remains when it is sampled 3e8 times closer."""
 
 _ROUNDING = 1e-12
-"""What is less of a function's values is rounding."""
+"""Smaller fractions of a function's values are rounding."""
 
 
 def check_defined(function: Expression, low: float, high: float) -> None:
     """
-    Refuse a function that has no value somewhere in a range, or jumps there.
+    Refuse a function that is undefined or jumps somewhere in a range.
 
-    It is sampled, and the edges of what has no value are narrowed down; what lies between two
-    samples and shows in neither is missed.
+    The function is sampled, and the edges of undefined parts are narrowed down; a gap between two
+    samples is missed.
 
     Raises
     ------
     SynthesisError
-        With where it is, and what range would do.
+        With the place, and a range that is possible.
 
     """
     low, high = min(low, high), max(low, high)
@@ -82,7 +81,7 @@ def check_defined(function: Expression, low: float, high: float) -> None:
 
 
 def _undefined(function: Expression, xs: Array, ys: Array) -> SynthesisError:
-    """Return what is wrong with a function of which some samples have no value."""
+    """Return the error for a function that is undefined at some samples."""
     span = float(xs[-1] - xs[0])
     good = np.isfinite(ys)
     runs = _runs(function, xs, good)
@@ -106,18 +105,18 @@ def _undefined(function: Expression, xs: Array, ys: Array) -> SynthesisError:
 
 
 def _runs(function: Expression, xs: Array, good: Array) -> list[tuple[float, float, bool]]:
-    """Return the parts of a range in which a function has values, and in which it has none."""
-    found = []
+    """Return the parts of a range in which a function is defined, and in which it is not."""
+    runs = []
     start = float(xs[0])
     for i in np.flatnonzero(np.diff(good)):
         edge = _edge(function, float(xs[i]), float(xs[i + 1]))
-        found.append((start, edge, bool(good[i])))
+        runs.append((start, edge, bool(good[i])))
         start = edge
-    return [*found, (start, float(xs[-1]), bool(good[-1]))]
+    return [*runs, (start, float(xs[-1]), bool(good[-1]))]
 
 
 def _edge(function: Expression, low: float, high: float) -> float:
-    """Return where, between two places, a function begins or ceases to have values."""
+    """Return the place between two others at which a function becomes defined or undefined."""
     before = isfinite(function(low))
     while low < (middle := 0.5 * (low + high)) < high:
         if isfinite(function(middle)) == before:
@@ -129,9 +128,9 @@ def _edge(function: Expression, low: float, high: float) -> float:
 
 def _jump(function: Expression, xs: Array, ys: Array) -> float | None:
     """
-    Return where a function jumps: a pole between two samples, or an angle that starts again.
+    Return the place where a function jumps: a pole between two samples, or an angle that wraps.
 
-    What is looked at ever closer is its steepest place.
+    The search zooms in on the steepest place.
     """
     largest = []
     for _ in range(_ZOOMS + 1):
@@ -139,7 +138,7 @@ def _jump(function: Expression, xs: Array, ys: Array) -> float | None:
             steps = np.abs(np.diff(ys))
         steepest = int(np.argmax(steps))
         largest.append(float(steps[steepest]))
-        # A step more on each side: a pole may lie beside the steepest step.
+        # One step more on each side: a pole may lie beside the steepest step.
         low, high = xs[max(steepest - 1, 0)], xs[min(steepest + 2, len(xs) - 1)]
         place = 0.5 * float(xs[steepest] + xs[steepest + 1])
         xs = np.linspace(low, high, _SAMPLES + 1)
@@ -151,36 +150,36 @@ def _jump(function: Expression, xs: Array, ys: Array) -> float | None:
 
 
 def _rounded(x: float, span: float) -> str:
-    """Return a place as it matters in a range as wide as this."""
+    """Return a place with the digits that matter in a range of this width."""
     # Adding 0 makes 0 of -0.
     return f'{round(x, 10 - floor(log10(span))) + 0.0:.10g}'
 
 
 Range = tuple[float, float]
-"""Where something begins and ends; it may go down."""
+"""First and last value of a range; it may decrease."""
 
 _MOST = 1000
-"""Precision points; more make no four-bar better."""
+"""Most precision points; more do not improve a four-bar."""
 
 
 @dataclass(frozen=True, slots=True)
 class FunctionTask:
     """
-    A function to be generated.
+    A function to be generated by a four-bar.
 
     Parameters
     ----------
     function
-        f.
+        The function f.
     x_range
-        Where x begins and ends.
+        First and last x.
     crank_range, rocker_range
         Angles of the links there, in [rad].
 
     Raises
     ------
     SynthesisError
-        Where a range is none, or f has no value everywhere in it or the same at both ends.
+        If a range is invalid, or f is undefined in it or has equal values at both ends.
 
     """
 
@@ -198,12 +197,12 @@ class FunctionTask:
 
     @property
     def y_range(self) -> Range:
-        """Return what f is at the ends of the range of x."""
+        """Return the values of f at the ends of the range of x."""
         start, end = self.x_range
         return self.function(start), self.function(end)
 
     def _check_swing(self) -> None:
-        """Refuse a function whose ends say nothing of how far it goes between them."""
+        """Refuse a function that is equal at both ends, or whose rocker would turn fully."""
         values = self.function(np.linspace(*self.x_range, _SAMPLES + 1))
         start, end = self.y_range
         by = abs(end - start)
@@ -233,12 +232,12 @@ class FunctionError(NamedTuple):
     Attributes
     ----------
     x, y
-        Where it is made, and what the function is there.
+        Where the error occurs, and the value of the function there.
     error
-        What is shown over y.
+        The shown value minus y.
     percent
-        The same, in percent of what y changes by over the range; above 0 in the direction in
-        which y goes.
+        The same, in percent of the change of y over the range; above 0 in the direction of that
+        change.
 
     """
 
@@ -250,16 +249,16 @@ class FunctionError(NamedTuple):
 
 def chebyshev(low: float, high: float, count: int) -> Array:
     """
-    Return precision points of a range, spaced as P. L. Chebyshev has it.
+    Return precision points of a range, by P. L. Chebyshev's spacing.
 
-    They are (low + high)/2 − (high − low)/2·cos((2j − 1)π/(2n)), where the polynomial of degree n
-    that stays nearest to 0 over the range has its zeros, as half angles, which do not cancel
-    near ``low``.
+    They are (low + high)/2 − (high − low)/2·cos((2j − 1)π/(2n)), the zeros of the polynomial of
+    degree n that deviates least from 0 over the range; computed by half angles, which do not
+    cancel near ``low``.
 
     Raises
     ------
     SynthesisError
-        Where they are too many.
+        If there are too many points.
 
     """
     if count > _MOST:
@@ -278,7 +277,7 @@ def pairs(task: FunctionTask, xs: ArrayLike) -> tuple[list[float], list[float]]:
     Raises
     ------
     SynthesisError
-        Where a point lies outside of the range, or comes twice.
+        If a point lies outside of the range, or is repeated.
 
     """
     points = [float(x) for x in np.asarray(xs, np.float64).ravel()]
@@ -301,22 +300,22 @@ def pairs(task: FunctionTask, xs: ArrayLike) -> tuple[list[float], list[float]]:
 
 
 def wanted_rocker(task: FunctionTask, crank: ArrayLike) -> Array:
-    """Return the rocker's angles that go with angles of the crank in its range, in [rad]; (…)."""
+    """Return the rocker's angles for angles of the crank in its range, in [rad]; (…)."""
     return _rocker(task, _x(task, np.asarray(crank, np.float64)))
 
 
 def on_scale(task: FunctionTask, crank: float, error: float) -> FunctionError:
     """
-    Return what an error of the rocker means for the function.
+    Return an error of the rocker on the scale of the function.
 
     Parameters
     ----------
     task
         The function.
     crank
-        Where, in [rad].
+        Angle of the crank, in [rad].
     error
-        What the rocker's angle has over the wanted one, in [rad].
+        The rocker's angle minus the wanted one, in [rad].
 
     """
     x = float(_x(task, np.array(crank)))
@@ -326,7 +325,7 @@ def on_scale(task: FunctionTask, crank: float, error: float) -> FunctionError:
 
 
 def _x(task: FunctionTask, crank: Array) -> Array:
-    """Return x at angles of the crank, within the range of x also where these round."""
+    """Return x at angles of the crank, within the range of x in spite of rounding."""
     start, end = task.crank_range
     x: Array = np.clip(
         _between(task.x_range, (crank - start) / (end - start)),
@@ -343,7 +342,7 @@ def _rocker(task: FunctionTask, x: Array) -> Array:
 
 
 def _between(ends: Range, part: Array) -> Array:
-    """Return what lies a part of the way between two ends, which themselves are exact."""
+    """Interpolate between two ends, which are exact themselves."""
     start, end = ends
     return start * (1.0 - part) + end * part
 
@@ -370,15 +369,15 @@ def _check_turn(name: str, ends: Range) -> None:
 _ERROR_SAMPLES = 720
 
 _ERROR_ZOOMS = 4
-"""How often a summit is looked at closer, each time 32 times; then its height has all digits."""
+"""Zooms on a maximum, each 32 times closer; then its height has all digits."""
 
 _GRID = 64
 
 _SUMMITS = 8
-"""How many of the highest are looked at: the errors of a good design are nearly equal."""
+"""Number of maxima that are refined: the errors of a good design are nearly equal."""
 
 _SAME = 1e-9
-"""What a range may end short of the crank's by and the loop still closes, in [rad]."""
+"""In [rad]: a loop that opens nearer than this to the end of a range counts as closed there."""
 
 
 class StructuralError(NamedTuple):
@@ -390,17 +389,17 @@ class StructuralError(NamedTuple):
     crank
         Angles of the crank from one end of the range to the other, in [rad]; (n,).
     error
-        The rocker's angle less the wanted one there, in (−π, π] rad, nan where the loop is open;
+        The rocker's angle minus the wanted one there, in (−π, π] rad, NaN if the loop is open;
         (n,).
     greatest
-        The error that is farthest from 0, in [rad]; nan where the loop closes nowhere.
+        The error that is farthest from 0, in [rad]; NaN if the loop closes nowhere.
     at
-        Angle of the crank where it is made, in [rad].
+        Angle of the crank at that error, in [rad].
     rms
         Root of the mean square where the loop closes, in [rad].
     opens_at
         Angle of the crank, on its way through the range, at which the loop opens, in [rad]; None
-        where it closes all the way.
+        if it closes all the way.
 
     """
 
@@ -421,11 +420,11 @@ def structural_error(
     Parameters
     ----------
     design
-        The design; its own positions are among the samples.
+        The design; its positions are among the samples.
     wanted
         Returns the rocker's angles for angles of the crank, in [rad]; (n,) each.
     low, high
-        Where the range begins and ends, in [rad]; it may go down.
+        First and last angle of the range, in [rad]; it may decrease.
 
     """
     closure = Closure(design.four_bar.linkage())
@@ -468,7 +467,7 @@ def _wrapped(angle: Array) -> Array:
 
 
 def _greatest(errors: Callable[[Array], Array], crank: Array, error: Array) -> tuple[float, float]:
-    """Return where the error is farthest from 0, and what it is there."""
+    """Return the place where the error is farthest from 0, and the error there."""
     heights = np.nan_to_num(np.abs(error), nan=-1.0)
     highest = int(np.argmax(heights))
     if heights[highest] < 0.0:
@@ -476,7 +475,7 @@ def _greatest(errors: Callable[[Array], Array], crank: Array, error: Array) -> t
     beside = np.pad(heights, 1, constant_values=-1.0)
     summits = np.flatnonzero((heights >= beside[:-2]) & (heights >= beside[2:]) & (heights >= 0.0))
     summits = summits[np.argsort(-heights[summits], kind='stable')[:_SUMMITS]]
-    places, found = [crank[highest]], [error[highest]]
+    places, errors_at = [crank[highest]], [error[highest]]
     start = crank[np.maximum(summits - 1, 0)]
     end = crank[np.minimum(summits + 1, len(crank) - 1)]
     for _ in range(_ERROR_ZOOMS):
@@ -485,10 +484,10 @@ def _greatest(errors: Callable[[Array], Array], crank: Array, error: Array) -> t
         best = np.nan_to_num(np.abs(values), nan=-1.0).argmax(-1)
         row = np.arange(len(grid))
         places.extend(grid[row, best])
-        found.extend(values[row, best])
+        errors_at.extend(values[row, best])
         start, end = grid[row, np.maximum(best - 1, 0)], grid[row, np.minimum(best + 1, _GRID)]
-    i = int(np.nanargmax(np.abs(found)))
-    return float(places[i]), float(found[i])
+    i = int(np.nanargmax(np.abs(errors_at)))
+    return float(places[i]), float(errors_at[i])
 
 
 def _rms(crank: Array, error: Array) -> float:
@@ -502,7 +501,7 @@ def _rms(crank: Array, error: Array) -> float:
 
 
 def _opens_at(closure: Closure, low: float, high: float) -> float | None:
-    """Return where, on the way from one angle to another, the loop opens, if it does."""
+    """Return the angle, on the way from one to another, at which the loop opens, or None."""
     interval = InputSweep(closure).range_about(low)
     if interval is None:
         return low

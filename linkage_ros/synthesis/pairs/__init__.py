@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pairs of crank and rocker angles: exact, nearest, with free zeros."""
+"""Four-bars for pairs of crank and rocker angles: exact, nearest, with free zeros."""

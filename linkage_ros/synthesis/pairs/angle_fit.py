@@ -14,13 +14,13 @@
 
 
 """
-Pairs met as well as may be: least squares of what the rocker is off, not of an equation.
+The four-bar nearest to pairs of angles: least squares of the rocker's errors, not of an equation.
 
-Freudenstein's equation weighs a pair by how fast what it leaves grows with the rocker's angle,
-which is little near a toggle and nothing at it; its best four-bar is a start only. Here the links
-are stretched, and turned in their frames where zeros are free, until the sum of squares of the
-rocker's errors is least. Where a loop does not close the rocker points as near as it can come, and
-what the links miss each other by is an error beside the angle's, and counts for more.
+Freudenstein's equation weighs a pair by the growth of its residual with the rocker's angle, which
+is small near a toggle and zero at it; its best four-bar is only a start. Here the links are
+stretched, and turned in their frames if zeros are free, until the sum of squares of the rocker's
+errors is least. If a loop does not close, the rocker points as near as it can, and the distance
+between the links is an additional error, with a larger weight.
 """
 
 from __future__ import annotations
@@ -42,25 +42,25 @@ _TOLERANCE = 1e-15
 _TRIALS = 2000
 
 _GAP = 30.0
-"""What a gap counts for beside an angle: a loop that opens is of no use, however small the gap."""
+"""Weight of a gap relative to an angle: a loop that opens is useless, however small the gap."""
 
 _TRIPLES = 200
-"""How many threes of the pairs are tried as starts, and how many of all starts are fitted."""
+"""Triples of the pairs that are tried as starts, and starts that are fitted."""
 _STARTS = 6
 
 _LONGEST = 100.0
-"""In grounds, of a start's links, or of the ground in a link: what is fitted may go beyond."""
+"""Largest ratio of a link and the ground in a start, either way; the fit may exceed it."""
 
 
 def nearest(
     crank: Sequence[float], rocker: Sequence[float], ground: float, *, free_zeros: bool = False
 ) -> Design:
     """
-    Return the four-bar that comes nearest to more than three pairs.
+    Return the four-bar nearest to more than three pairs.
 
-    Minima are many. It is the best of those that the four-bar of Freudenstein's equation leads to,
-    and some that have three of the pairs exactly; one that closes at all pairs comes before any
-    that does not.
+    There are many minima. The result is the best of those reached from the four-bar of
+    Freudenstein's equation, and from some that meet three of the pairs exactly; one that closes at
+    all pairs is preferred to any that does not.
 
     Parameters
     ----------
@@ -69,14 +69,14 @@ def nearest(
     ground
         Length of the ground, in [m].
     free_zeros
-        Whether the zero angles of crank and rocker are free too; five pairs then, at least.
+        Whether the zero angles of crank and rocker are free too; this needs five pairs.
 
     Raises
     ------
     SynthesisError
-        Where the pairs fix no four-bar.
+        If the pairs determine no four-bar.
     LinkageError
-        Where scipy is not installed.
+        If scipy is not installed.
 
     """
     starts = [fit_equation(crank, rocker, ground), *_through_triples(crank, rocker, ground)]
@@ -86,7 +86,7 @@ def nearest(
 
 
 def _opens(design: Design) -> bool:
-    """Return whether the loop is open in one of the positions."""
+    """Return whether the loop is open at one of the positions."""
     _, gaps = np.split(rocker_errors(design), 2)
     return bool(gaps.any())
 
@@ -94,39 +94,39 @@ def _opens(design: Design) -> bool:
 def _through_triples(
     crank: Sequence[float], rocker: Sequence[float], ground: float
 ) -> Iterator[Design]:
-    """Yield four-bars that have three of the pairs exactly, on either assembly."""
+    """Yield four-bars that meet three of the pairs exactly, on either assembly."""
     triples = list(combinations(range(len(crank)), 3))
     chosen = np.array(triples[:: -(-len(triples) // _TRIPLES)])
-    found = links(np.array(crank)[chosen], np.array(rocker)[chosen]).lengths
-    size = np.abs(found)
+    lengths = links(np.array(crank)[chosen], np.array(rocker)[chosen]).lengths
+    size = np.abs(lengths)
     usual = np.all((size < _LONGEST) & (size > 1.0 / _LONGEST), axis=-1)
     wanted = wanted_of(crank, rocker)
-    for a, b, c in (found[usual] * ground).tolist():
+    for a, b, c in (lengths[usual] * ground).tolist():
         for side in SIDES:
             yield Design(FourBar.of_lengths(a, b, c, ground, side=side), wanted)
 
 
 def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
     """
-    Change the links until the rocker is off least; the ground stays.
+    Change the links until the rocker's error is least; the ground stays.
 
-    What is least is `root_mean_square` of the errors, on one assembly for all positions: both are
+    It minimises `root_mean_square` of the errors, on one assembly for all positions: both are
     tried and the better is returned, never one that is worse than the start on its own assembly.
-    The minimum is the one that the start leads to, and the same each time.
+    The minimum is the one reached from the start, and the same each time.
 
     Parameters
     ----------
     design
-        The start. All positions that it is wanted for have a rocker angle.
+        The start. All its wanted positions have a rocker angle.
     free_zeros
         Whether the zero angles of crank and rocker are free too.
 
     Raises
     ------
     SynthesisError
-        Where a position asks for no rocker angle, or there are fewer than unknowns.
+        If a position has no wanted rocker angle, or there are fewer positions than unknowns.
     LinkageError
-        Where scipy is not installed.
+        If scipy is not installed.
 
     """
     count = 5 if free_zeros else 3
@@ -137,7 +137,7 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
             'give more pairs, or synthesise exactly',
         )
     least_squares = scipy_optimize().least_squares
-    found = [(root_mean_square(design), design)]
+    candidates = [(root_mean_square(design), design)]
     for side in SIDES:
         start = replace(design.four_bar, side=side)
 
@@ -155,9 +155,9 @@ def fit_angles(design: Design, *, free_zeros: bool = False) -> Design:
             max_nfev=_TRIALS,
         )
         fitted = design._replace(four_bar=_changed(start, best.x))
-        found.append((root_mean_square(fitted), fitted))
-    # What overflowed is no better than anything.
-    return min(found, key=lambda one: one[0] if isfinite(one[0]) else inf)[1]
+        candidates.append((root_mean_square(fitted), fitted))
+    # A result that overflowed counts as the worst.
+    return min(candidates, key=lambda one: one[0] if isfinite(one[0]) else inf)[1]
 
 
 def root_mean_square(design: Design) -> float:
@@ -170,17 +170,17 @@ def root_mean_square(design: Design) -> float:
 
 
 def _weighed(design: Design) -> Array:
-    """Return the errors as they are squared."""
+    """Return the weighted errors that are squared."""
     angles, gaps = np.split(rocker_errors(design), 2)
     return np.concatenate((angles, _GAP * gaps))
 
 
 def rocker_errors(design: Design) -> Array:
     """
-    Return what the rocker is off in each position on the design's assembly; (2n,).
+    Return the errors of the rocker in each position on the design's assembly; (2n,).
 
-    First the angles in [rad], then what coupler and rocker miss each other by, in rocker lengths;
-    0 where they reach.
+    First the angles in [rad], then the gaps between coupler and rocker, in rocker lengths; 0 if
+    the loop closes.
     """
     for number, wanted in enumerate(design.wanted, 1):
         if wanted.rocker is None:
@@ -192,7 +192,7 @@ def rocker_errors(design: Design) -> Array:
     four_bar = design.four_bar
     _, b, c, _ = four_bar.lengths
     o2, o4 = four_bar.pivots
-    # From O4 to A: the rocker lies off it by an angle of the triangle that it, b and c make.
+    # From O4 to A: the rocker is at an angle of the triangle with sides diagonal, b and c.
     diagonal = o2 + four_bar.crank * np.exp(1j * theta) - o4
     s = np.maximum(np.abs(diagonal), np.finfo(np.float64).tiny)
     cosine = ((s - b) * (s + b) + c * c) / (2.0 * c * s)

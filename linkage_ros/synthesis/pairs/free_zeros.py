@@ -16,34 +16,34 @@
 """
 Four and five pairs: the zeros of crank and rocker are unknowns too.
 
-Where only the turns of crank and rocker matter and not where they are counted from,
-Freudenstein's equation has two unknowns more, α and β::
+If only the rotations of crank and rocker matter and not their zeros, Freudenstein's equation has
+two more unknowns, α and β::
 
     k1·cos(φ + β) + k2·cos(θ + α) + k3 = cos(θ + α − φ − β)
 
-The equation of the first pair is subtracted from the others. With δ for the halves of the
-differences to the first pair, m for the means with it and
+The equation of the first pair is subtracted from the others. With δ for half the differences from
+the first pair, m for the means with it and
 
     p = sin δφ·e^{i·mφ},  q = sin δθ·e^{i·mθ},  r = sin(δθ − δφ)·e^{i(mθ − mφ)},
 
-each other pair leaves, by cos u − cos v = −2·sin((u + v)/2)·sin((u − v)/2),
+each other pair gives, by cos u − cos v = −2·sin((u + v)/2)·sin((u − v)/2),
 
     k1·Im(p·e^{iβ}) + k2·Im(q·e^{iα}) = Im(r·e^{i(α − β)}).
 
-*Four pairs and one zero free.* Three equations in k1 and k2 have a solution where the determinant
-of their three columns is zero. Two of the columns are linear in (cos β, sin β): a quadratic form,
-so that two zeros of the rocker fit at most. Likewise two of the crank.
+*Four pairs and one free zero.* Three equations in k1 and k2 have a solution if the determinant of
+their three columns is zero. Two of the columns are linear in (cos β, sin β): a quadratic form, so
+at most two zeros of the rocker are solutions. Likewise two of the crank.
 
-*Five pairs and both free.* With P = k1·e^{iβ}, Q = k2·e^{iα} and R = e^{i(α − β)} the four
-equations are linear and homogeneous in six real numbers. What they leave is a plane, s·u + t·v,
-and in it R·P·Q* = k1·k2 must be real: a cubic form in s and t, so that three solutions fit at
-most, and one or three are real.
+*Five pairs and both zeros free.* With P = k1·e^{iβ}, Q = k2·e^{iα} and R = e^{i(α − β)} the four
+equations are linear and homogeneous in six real numbers. Their solutions form a plane, s·u + t·v,
+and in it R·P·Q* = k1·k2 must be real: a cubic form in s and t, so there are at most three
+solutions, of which one or three are real.
 
 A solution is polished by Newton's method on the differences. The last step computes the residuals
-in sums of two doubles: they may be smaller than the rounding of their terms, and no more may be
-lost than rounding the angles loses. The coupler is never imaginary: it closes the first pair, and
-the others with it. A zero turned by π is the same linkage with the link reversed: zeros are in
-[−π/2, π/2], and lengths have signs.
+in sums of two doubles: they may be smaller than the rounding of their terms, and no more digits
+may be lost than rounding the angles loses. The coupler is never imaginary: it closes the first
+pair, and with it the others. A zero turned by π is the same linkage with the link reversed: zeros
+are in [−π/2, π/2], and lengths have signs.
 """
 
 from __future__ import annotations
@@ -76,21 +76,21 @@ Moved = Literal['rocker', 'crank', 'both']
 Lost = Literal['imaginary', 'infinite', 'vague']
 
 NOISE = 8.0
-"""Times what rounding the angles does: below it nothing can be told from zero."""
+"""Multiple of the effect of rounding the angles: smaller values cannot be told from zero."""
 
 _UNKNOWNS: dict[Moved, list[int]] = {'crank': [0, 1, 2], 'rocker': [0, 1, 3], 'both': [0, 1, 2, 3]}
-"""Of k1, k2, α, β: what is not given."""
+"""Indices of the unknowns among k1, k2, α, β."""
 
 _STEPS = 8
-"""Of Newton's method at most: two reach rounding level, but for a double root."""
+"""Most steps of Newton's method: two reach rounding level, except for a double root."""
 
 _VAGUE = 0.1
-"""Of a link: what it may not be uncertain by."""
+"""Largest relative uncertainty of a link."""
 
 
 class Differences(NamedTuple):
     """
-    What the other pairs have over the first, as rows of length 1.
+    The equations of the other pairs minus the first, as rows of length 1.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Differences(NamedTuple):
     size
         Root of abs(p)² + abs(q)² + abs(r)²; (n − 1,).
     noise
-        What rounding the angles does to each row; (n − 1,).
+        Effect of rounding the angles on each row; (n − 1,).
 
     """
 
@@ -116,12 +116,12 @@ class Differences(NamedTuple):
 
 class Solution(NamedTuple):
     """
-    A four-bar on a ground of 1.
+    A four-bar on a ground of length 1.
 
     Attributes
     ----------
     lengths
-        Of crank, coupler and rocker, the first and the last signed; (3,).
+        Lengths of crank, coupler and rocker, the first and the last signed; (3,).
     zeros
         α and β, in [−π/2, π/2]; (2,).
     condition, sensitivity
@@ -136,7 +136,7 @@ class Solution(NamedTuple):
 
 
 def differences(crank: Sequence[float], rocker: Sequence[float]) -> Differences:
-    """Return what the other pairs have over the first; angles in [rad], (n,)."""
+    """Return the equations of the other pairs minus the first; angles in [rad], (n,)."""
     theta, phi = np.asarray(crank, np.float64), np.asarray(rocker, np.float64)
     by_theta, by_phi = 0.5 * (theta[1:] - theta[0]), 0.5 * (phi[1:] - phi[0])
     mean_theta, mean_phi = 0.5 * (theta[1:] + theta[0]), 0.5 * (phi[1:] + phi[0])
@@ -150,7 +150,7 @@ def differences(crank: Sequence[float], rocker: Sequence[float]) -> Differences:
 
 
 def polished(rows: Differences, alpha: float, beta: float, moved: Moved) -> Solution | Lost:
-    """Return the four-bar next to these zeros, or why there is none."""
+    """Return the four-bar nearest to these zeros, or the reason why there is none."""
     columns = np.stack(_columns(rows, alpha, beta), -1)
     k1, k2, one = np.linalg.svd(columns * (1.0, 1.0, -1.0))[2][2]
     if abs(one) * LONGEST <= max(abs(k1), abs(k2)):
@@ -160,7 +160,7 @@ def polished(rows: Differences, alpha: float, beta: float, moved: Moved) -> Solu
     least = _residual(rows, best)
     for _ in range(_STEPS):
         tried = best.copy()
-        # A double root leaves no full rank: the shortest step is as good as any.
+        # A double root has no full rank: the shortest step is as good as any.
         slopes = _slopes(rows, best)[:, free]
         tried[free] -= np.linalg.lstsq(slopes, _left(rows, best), rcond=None)[0]
         residual = _residual(rows, tried)
@@ -178,7 +178,7 @@ def polished(rows: Differences, alpha: float, beta: float, moved: Moved) -> Solu
 
 
 def same(one: Solution, other: Solution) -> bool:
-    """Return whether two differ by rounding only, as those near a double root may."""
+    """Return whether two differ only by rounding, as solutions near a double root may."""
     (pins, lost), (others, lost_too) = _pins(one), _pins(other)
     return bool(np.all(np.abs(pins - others) <= NOISE * UNIT_ROUNDOFF * (lost + lost_too)))
 
@@ -193,7 +193,7 @@ def _columns(rows: Differences, alpha: float, beta: float) -> tuple[Array, Array
 
 
 def _left(rows: Differences, unknowns: Array) -> Array:
-    """Return what the equations leave; (n − 1,)."""
+    """Return the residuals of the equations; (n − 1,)."""
     k1, k2, alpha, beta = unknowns
     P, Q, R = _columns(rows, alpha, beta)
     left: Array = k1 * P + k2 * Q - R
@@ -201,7 +201,7 @@ def _left(rows: Differences, unknowns: Array) -> Array:
 
 
 def _left_exactly(rows: Differences, unknowns: Array) -> Array:
-    """Return what the equations leave, by sums of two doubles; (n − 1,)."""
+    """Return the residuals of the equations, by sums of two doubles; (n − 1,)."""
     k1, k2, alpha, beta = _twofold(unknowns)
     by_theta, by_phi = (_half(two_sum(z[1:], -z[:1])) for z in (rows.theta, rows.phi))
     theta, phi = (_half(two_sum(z[1:], z[:1])) for z in (rows.theta, rows.phi))
@@ -216,9 +216,9 @@ def _links(
     rows: Differences, unknowns: Array, rest: Array
 ) -> tuple[float, float, complex, complex, complex]:
     """
-    Return the lengths of crank and rocker, and where crank, rocker and coupler point at first.
+    Return the lengths of crank and rocker, and the directions of the links in the first pair.
 
-    By sums of two doubles: where the coupler is short, crank and rocker cancel.
+    By sums of two doubles: with a short coupler, crank and rocker cancel.
     """
     (one,) = _twofold(np.ones(1))
     parts = zip(_twofold(unknowns), _twofold(rest), strict=True)
@@ -240,13 +240,13 @@ def _half(angle: Twofold) -> Twofold:
 
 
 def _residual(rows: Differences, unknowns: Array) -> float:
-    """Return the largest of what is left, by what rounding the angles does to it."""
+    """Return the largest residual, relative to the effect of rounding the angles on it."""
     left = np.abs(_left(rows, unknowns)) / rows.noise
     return float(np.max(left)) / float(max(1.0, *np.abs(unknowns[:2])))
 
 
 def _slopes(rows: Differences, unknowns: Array) -> Array:
-    """Return the derivatives of what is left by k1, k2, α and β; (n − 1, 4)."""
+    """Return the derivatives of the residuals by k1, k2, α and β; (n − 1, 4)."""
     k1, k2, alpha, beta = unknowns
     P, Q, _ = _columns(rows, alpha, beta)
     of_p, of_q = (rows.p * rect(1.0, beta)).real, (rows.q * rect(1.0, alpha)).real
@@ -256,11 +256,11 @@ def _slopes(rows: Differences, unknowns: Array) -> Array:
 
 def _valued(rows: Differences, unknowns: Array, free: list[int]) -> Solution:
     """
-    Return the links, and what they are worth.
+    Return the links, and their accuracy.
 
-    By a pair's own angles its equation moves by g = sin(θ + α − φ − β) − k2·sin(θ + α) and
-    h = −sin(θ + α − φ − β) − k1·sin(φ + β), its difference by −g/2 and −h/2; by those of the first
-    pair all differences move the other way.
+    The equation of a pair changes with its own angles by g = sin(θ + α − φ − β) − k2·sin(θ + α)
+    and h = −sin(θ + α − φ − β) − k1·sin(φ + β), its difference by −g/2 and −h/2; with the angles
+    of the first pair all differences change by the opposite.
     """
     k1, k2, alpha, beta = unknowns
     slopes = _slopes(rows, unknowns)[:, free]
@@ -279,7 +279,7 @@ def _valued(rows: Differences, unknowns: Array, free: list[int]) -> Solution:
     rest[free] = -inverse[free] @ (rows.size * _left_exactly(rows, unknowns))
     a, c, crank, rocker, coupler = _links(rows, unknowns, rest)
     of_a, of_c = -a * a * of_k1, c * c * of_k2
-    # The coupler closes the first pair, whose own angles turn crank and rocker too.
+    # The coupler closes the first pair, whose angles also turn crank and rocker.
     of_t, of_p = of_alpha.copy(), of_beta.copy()
     of_t[0] += 1.0
     of_p[len(p)] += 1.0
@@ -301,36 +301,36 @@ def _inverse(matrix: Array) -> Array:
 
 
 def _acute(angle: float) -> tuple[float, float]:
-    """Return an angle less its half turns, in [−π/2, π/2], and −1.0 where these are odd."""
+    """Return an angle minus its half turns, in [−π/2, π/2], and −1.0 if these are odd."""
     halves = round(angle / pi)
     return angle - pi * halves, -1.0 if halves % 2 else 1.0
 
 
 def _pins(solution: Solution) -> tuple[NDArray[np.complex128], Array]:
-    """Return where the pins of crank and rocker lie in their frames, and how sensitive; (2,)."""
+    """Return the pins of crank and rocker in their frames, and their sensitivities; (2,)."""
     lengths = solution.lengths[::2]
     sensitivity = solution.sensitivity[[0, 2]] + np.abs(lengths) * solution.sensitivity[3:]
     return lengths * np.exp(1j * solution.zeros), sensitivity
 
 
 _NEARLY_REAL = 1e-3
-"""Imaginary part of a root that is polished all the same; rounding splits a double root so."""
+"""Largest imaginary part of a root that is still polished; rounding splits a double root so."""
 
 
 class Count(NamedTuple):
     """
-    How many solutions the equations have; a double one counts once.
+    The number of solutions of the equations; a double one counts once.
 
     Attributes
     ----------
     real
-        Four-bars.
+        Real four-bars.
     imaginary
-        Solutions whose zeros are no real angles.
+        Solutions whose zeros are not real angles.
     infinite
-        With a crank or rocker infinitely long, or of no length.
+        Solutions with a crank or rocker of infinite length, or of no length.
     vague
-        Whose links cannot be told: rounding the angles alone changes one by a tenth and more.
+        Solutions with uncertain links: rounding the angles alone changes one by a tenth or more.
 
     """
 
@@ -340,38 +340,39 @@ class Count(NamedTuple):
     vague: int
 
     def __str__(self) -> str:
-        """Return what a user reads, as '3 solutions, 2 imaginary'."""
-        said = [f'{sum(self)} solution' + 's' * (sum(self) != 1)]
+        """Return the text for a user, such as '3 solutions, 2 imaginary'."""
+        parts = [f'{sum(self)} solution' + 's' * (sum(self) != 1)]
         kinds = ('imaginary', 'with infinite links', 'whose links cannot be told')
-        said += [f'{n} {kind}' for n, kind in zip(self[1:], kinds, strict=True) if n]
-        return ', '.join(said)
+        parts += [f'{n} {kind}' for n, kind in zip(self[1:], kinds, strict=True) if n]
+        return ', '.join(parts)
 
 
 class FreeZeros(NamedTuple):
     """
-    A solution with zeros of its own.
+    A solution with free zeros.
 
     Attributes
     ----------
     design
-        The four-bar; its pins lie so in the frames of crank and rocker that the angles are those
-        of the pairs.
+        The four-bar; the places of its pins in the frames of crank and rocker make the angles
+        those of the pairs.
     moved
-        Whose zero was free.
+        The link whose zero was free.
     lengths
-        Of crank, coupler and rocker, in [m]; crank and rocker are negative where the link points
-        the other way.
+        Lengths of crank, coupler and rocker, in [m]; crank and rocker are negative if the link
+        points the other way.
     alpha, beta
-        Zeros of crank and rocker, in [rad], in [−π/2, π/2]: what the pin's angle has over the
-        link's; 0 where it was not free.
+        Zeros of crank and rocker, in [rad], in [−π/2, π/2]: the angle of the pin minus that of the
+        link; 0 if it was not free.
     condition
-        Of the differences' derivatives by k1, k2 and the free zeros, by the 2-norm, rows and
-        columns scaled to length 1. It does not know of the angles' nearness; sensitivity does.
+        Condition number of the differences' derivatives by k1, k2 and the free zeros, by the
+        2-norm, with rows and columns scaled to length 1. It does not include the nearness of the
+        angles; the sensitivity does.
     sensitivity
-        Of crank, coupler, rocker, α and β: Σ|x ∂L/∂x| + ``abs(L)`` over all angles x. Times 2⁻⁵³
-        it is what rounding the angles alone can make of each; errors are within twice that.
+        Σ|x ∂L/∂x| + ``abs(L)`` of crank, coupler, rocker, α and β over all angles x. Times 2⁻⁵³ it
+        bounds the error that rounding the angles alone causes; errors are within twice that.
     among
-        Of all solutions that the pairs have, this one among them.
+        The number of all solutions of the pairs, including this one.
 
     """
 
@@ -386,7 +387,7 @@ class FreeZeros(NamedTuple):
 
     @property
     def digits(self) -> tuple[float, float, float]:
-        """Return how many digits of a, b and c can be trusted, 0 to 16."""
+        """Return the number of reliable digits of a, b and c, 0 to 16."""
         lost = (
             TRUSTED * UNIT_ROUNDOFF * part / abs(length)
             for part, length in zip(self.sensitivity[:3], self.lengths, strict=True)
@@ -399,9 +400,9 @@ def four_pairs(
     crank: Sequence[float], rocker: Sequence[float], ground: float
 ) -> tuple[FreeZeros, ...]:
     """
-    Return all four-bars that have four pairs, with the zero of the rocker free, then the crank's.
+    Return all four-bars for four pairs, with the zero of the rocker free, then the crank's.
 
-    Of each the best conditioned comes first. A four-bar that needs no zero moved is listed once.
+    Of each the best conditioned comes first. A four-bar with both zeros at 0 is listed once.
 
     Parameters
     ----------
@@ -413,13 +414,13 @@ def four_pairs(
     Raises
     ------
     SynthesisError
-        Where none is real with finite links, or any number of them fits.
+        If none is real with finite links, or infinitely many exist.
 
     """
     check_pairs(crank, rocker, ground)
     rows = differences(crank, rocker)
     sizes = np.linalg.svd(_real(rows), compute_uv=False)
-    # Of a determinant of three rows, by rounding one: with an area that the others span at most.
+    # Rounding error of a determinant: that of one row times the largest area of the others.
     noise = NOISE * np.sum(rows.noise) * sizes[0] * sizes[1]
     directions: list[tuple[Moved, float, float]] = []
     imaginary = vague = 0
@@ -454,7 +455,7 @@ def five_pairs(
     crank: Sequence[float], rocker: Sequence[float], ground: float
 ) -> tuple[FreeZeros, ...]:
     """
-    Return all four-bars that have five pairs with the zeros of crank and rocker free.
+    Return all four-bars for five pairs with the zeros of crank and rocker free.
 
     The best conditioned comes first.
 
@@ -468,14 +469,14 @@ def five_pairs(
     Raises
     ------
     SynthesisError
-        Where none is real with finite links, or any number of them fits.
+        If none is real with finite links, or infinitely many exist.
 
     """
     check_pairs(crank, rocker, ground)
     rows = differences(crank, rocker)
     _, sizes, vectors = np.linalg.svd(_real(rows))
     noise = NOISE * np.linalg.norm(rows.noise) / max(float(sizes[3]), SMALLEST)
-    # R is found with the other sign, which is as good.
+    # R has the opposite sign here, which is equivalent.
     P, Q, R = (vectors[4:, i] + 1j * vectors[4:, i + 1] for i in (0, 2, 4))
     form: Array = np.convolve(np.convolve(R, P), np.conj(Q)).imag
     p, q, r = map(np.linalg.norm, (P, Q, R))
@@ -484,7 +485,7 @@ def five_pairs(
     directions: list[tuple[Moved, float, float]] = []
     for s, t in _roots(form):
         p, q, r = (s * z[0] + t * z[1] for z in (P, Q, R))
-        # From the two that are largest: the third may be nothing but rounding.
+        # From the two largest: the third may be nothing but rounding.
         smallest = min(map(abs, (p, q, r)))
         alpha = phase(p) + phase(r) if abs(q) == smallest else phase(q)
         beta = phase(q) - phase(r) if abs(p) == smallest else phase(p)
@@ -502,11 +503,11 @@ def _determinant(one: Array, other: Array, third: Array) -> float:
 
 
 def _roots(form: Array) -> Iterator[tuple[float, float]]:
-    """Yield where Σ form[j]·xⁿ⁻ʲ·yʲ is zero, as (x, y) of length 1; also what is almost real."""
+    """Yield the roots of Σ form[j]·xⁿ⁻ʲ·yʲ as (x, y) of length 1; also roots almost real."""
     degree = len(form) - 1
     turns = np.arange(8) * pi / 8
     powers = [np.cos(turns) ** (degree - j) * np.sin(turns) ** j for j in range(degree + 1)]
-    # The turn that leaves no root near infinity.
+    # The rotation that leaves no root near infinity.
     turn = float(turns[np.argmax(np.abs(form @ powers))])
     c, s = cos(turn), sin(turn)
     for root in np.roots(_turned(form, c, s)):
@@ -533,7 +534,7 @@ def _listed(
     lost: Mapping[Lost, int],
     ground: float,
 ) -> tuple[FreeZeros, ...]:
-    """Return the four-bars near to (whose zero is free, α, β), or say why there are none."""
+    """Return the four-bars near to (moved, α, β), or raise the reason why there are none."""
     counts: dict[Lost, int] = {'imaginary': 0, 'infinite': 0, 'vague': 0, **lost}
     candidates: list[tuple[Moved, Solution]] = []
     for moved, alpha, beta in directions:
@@ -542,28 +543,28 @@ def _listed(
             counts[solution] += 1
         else:
             candidates.append((moved, solution))
-    # Of two that are the same, the one that can be told better stays.
+    # Of two equal ones, the less sensitive stays.
     candidates.sort(key=lambda one: float(np.sum(one[1].sensitivity)))
-    found: list[tuple[Moved, Solution]] = []
+    four_bars: list[tuple[Moved, Solution]] = []
     for moved, solution in candidates:
-        if not any(same(solution, other) for _, other in found):
-            found.append((moved, solution))
-    among = Count(len(found), *counts.values())
-    if not found:
+        if not any(same(solution, other) for _, other in four_bars):
+            four_bars.append((moved, solution))
+    among = Count(len(four_bars), *counts.values())
+    if not four_bars:
         free = 'a zero of rocker or crank' if len(rows.theta) == 4 else 'both zeros'
         raise SynthesisError(
             'pairs',
             f'no four-bar has all {len(rows.theta)} with {free} free: {among}',
             'move one of the angles, or leave the zeros as they are for the nearest four-bar',
         )
-    found.sort(key=lambda one: (one[0] == 'crank', one[1].condition))
-    return tuple(_result(rows, moved, solution, among, ground) for moved, solution in found)
+    four_bars.sort(key=lambda one: (one[0] == 'crank', one[1].condition))
+    return tuple(_result(rows, moved, solution, among, ground) for moved, solution in four_bars)
 
 
 def _result(
     rows: Differences, moved: Moved, solution: Solution, among: Count, ground: float
 ) -> FreeZeros:
-    """Return a solution on its ground."""
+    """Return a solution scaled to its ground."""
     a, b, c = solution.lengths.tolist()
     alpha, beta = solution.zeros.tolist()
     lengths = a * ground, b * ground, c * ground

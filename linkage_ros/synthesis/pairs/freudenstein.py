@@ -14,17 +14,17 @@
 
 
 """
-Freudenstein's equation: the four-bar whose crank and rocker stand at given pairs of angles.
+Freudenstein's equation: the four-bar for given pairs of crank and rocker angles.
 
-The loop a·e^{iθ} + b·e^{iγ} = d + c·e^{iφ}, freed of the coupler's angle γ, is linear in three
+The loop a·e^{iθ} + b·e^{iγ} = d + c·e^{iφ}, without the coupler's angle γ, is linear in three
 numbers (F. Freudenstein, Approximate synthesis of four-bar linkages, Transactions of the ASME 77
 (1955) 853-861)::
 
     k1·cos φ + k2·cos θ + k3 = cos(θ − φ)
     k1 = d/a,  k2 = −d/c,  k3 = (a² − b² + c² + d²)/(2ac)
 
-Three pairs fix them (`System`, threes of pairs by the thousand). The first equation is subtracted
-from the other two, so that k3 falls out::
+Three pairs determine them (`System`, for thousands of triples at once). The first equation is
+subtracted from the other two, which eliminates k3::
 
     k1·(cos φᵢ − cos φ₁) + k2·(cos θᵢ − cos θ₁) = cos(θᵢ − φᵢ) − cos(θ₁ − φ₁),  i = 2, 3
 
@@ -32,14 +32,14 @@ The differences are products,
 
     cos u − cos v = −2·sin((u + v)/2)·sin((u − v)/2),
 
-of angles that are sums of two or four doubles, and are taken as such. Determinants, lengths and
-the coupler are computed in sums of two doubles too, since no more may be lost there than rounding
-the angles loses: at a change point, in a parallelogram or with a short coupler, terms cancel that
-the angles themselves do not touch. So the error of the lengths is that of the angles: each length
-is within 4·2⁻⁵³ of its sensitivity κ, the sum of what a relative change of each angle makes of it
-(`gradient`), and where κ is too large for any digit, none is trusted. More pairs are met by least
-squares. The coupler is real wherever the angles are: b² is the mean, over the pairs, of the
-squared distance of crank pin and rocker pin.
+of angles that are sums of two or four doubles, and are computed so. Determinants, lengths and the
+coupler are computed in sums of two doubles too, so that they lose no more than rounding the angles
+loses: at a change point, in a parallelogram or with a short coupler, terms cancel whatever the
+angles are. So the error of the lengths is that of the angles: each length is within 4·2⁻⁵³ of its
+sensitivity κ, the sum of its relative changes with each angle (`gradient`); if κ is too large for
+any digit, no digit is trusted. More pairs are met by least squares. The coupler is real whenever
+the angles are: b² is the mean, over the pairs, of the squared distance of crank pin and rocker
+pin.
 """
 
 from __future__ import annotations
@@ -77,18 +77,18 @@ class System(NamedTuple):
     theta, phi
         Angles of crank and rocker, in [rad]; (3, n).
     P, Q, R
-        What cos φ, cos θ and cos(θ − φ) of the second and third pair have over those of the
-        first, divided by −2; (2, n).
+        cos φ, cos θ and cos(θ − φ) of the second and third pair minus those of the first, divided
+        by −2; (2, n).
     last
-        What P and Q of the third pair have over those of the second; (2, n).
+        P and Q of the third pair minus those of the second; (2, n).
     determinant
         P0·Q1 − P1·Q0; (n,).
     k
         k1, k2 and k3; (3, n).
     lengths
-        Of crank, coupler and rocker, the first and the last signed; (3, n).
+        Lengths of crank, coupler and rocker, the first and the last signed; (3, n).
     coupler
-        Its x and y in the first pair; (2, n).
+        Vector of the coupler in the first pair, x and y; (2, n).
 
     """
 
@@ -106,7 +106,7 @@ class System(NamedTuple):
 
 def solved(theta: Array, phi: Array) -> System:
     """
-    Solve; infinite or nan where there is no solution.
+    Solve three pairs; infinite or NaN if there is no solution.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def solved(theta: Array, phi: Array) -> System:
         P, Q, R = differences(theta, phi)
         determinant, of_k1, of_k2 = _determinant(P, Q), _determinant(R, Q), _determinant(P, R)
         a, c = over(determinant, of_k1), over(determinant, (-of_k2[0], -of_k2[1]))
-        # The coupler is what closes the first position. From k3 long links would leave little.
+        # The coupler closes the first position. From k3, long links would leave few digits.
         nothing = np.zeros_like(theta[0])
         crank_y, crank_x = sine_cosine((theta[0], nothing))
         rocker_y, rocker_x = sine_cosine((phi[0], nothing))
@@ -142,7 +142,7 @@ def solved(theta: Array, phi: Array) -> System:
 
 def differences(theta: Array, phi: Array) -> tuple[Twofold, Twofold, Twofold]:
     """
-    Return what all equations but the first have over it, divided by −2.
+    Return all equations but the first minus the first, divided by −2.
 
     Parameters
     ----------
@@ -176,9 +176,9 @@ def gradient(system: System) -> Array:
     """
     Differentiate the lengths, and the direction of the coupler in the first pair, by the angles.
 
-    Equation i, k1·cos φ + k2·cos θ + k3 − cos(θ − φ) = 0, moves by sin(θ − φ) − k2·sin θ with θᵢ,
-    by −sin(θ − φ) − k1·sin φ with φᵢ; the k by that times less column i of the inverse. The
-    coupler is 1 + c·e^{iφ} − a·e^{iθ} in the first pair.
+    The residual of equation i, k1·cos φ + k2·cos θ + k3 − cos(θ − φ), changes by
+    sin(θ − φ) − k2·sin θ with θᵢ and by −sin(θ − φ) − k1·sin φ with φᵢ; k changes by that times
+    minus column i of the inverse. The coupler is 1 + c·e^{iφ} − a·e^{iθ} in the first pair.
 
     Returns
     -------
@@ -195,7 +195,7 @@ def gradient(system: System) -> Array:
     moves = np.concatenate((k2 * np.sin(theta) - across, k1 * np.sin(phi) + across))
     of_a = -a * a * np.concatenate((of_k1, of_k1)) * moves
     of_c = c * c * np.concatenate((of_k2, of_k2)) * moves
-    # Crank and rocker as the coupler sees them: along it and across.
+    # Crank and rocker in the frame of the coupler: along it and across.
     x, y = system.coupler / b
     crank_x, crank_y = np.cos(theta[0]), np.sin(theta[0])
     rocker_x, rocker_y = np.cos(phi[0]), np.sin(phi[0])
@@ -214,7 +214,7 @@ def doubt(system: System) -> Array:
     """
     Return Σ|x ∂D/∂x| / ``abs(D)`` of the determinant D over the six angles x; (n,).
 
-    Of dM, the trace of M⁻¹·dM is that of the logarithm of D.
+    The trace of M⁻¹·dM is the differential of the logarithm of D.
     """
     of_k1, of_k2 = _inverse(system)
     by_theta = np.sin(system.theta) * of_k2 * system.theta
@@ -232,7 +232,7 @@ def condition(system: System) -> Array:
 
 
 def _inverse(system: System) -> tuple[Array, Array]:
-    """Return how k1 and k2 go with the right sides of the three equations; (3, n) each."""
+    """Return the derivatives of k1 and k2 by the right sides of the equations; (3, n) each."""
     P, Q, (last_P, last_Q) = system.P, system.Q, system.last
     scale = -0.5 / system.determinant
     return (
@@ -245,9 +245,9 @@ def _norm(x: Array, y: Array, z: Array) -> Array:
     """
     Return the 2-norm of matrices of three rows; (n,).
 
-    The greatest eigenvalue of their squares in closed form (O. K. Smith, Eigenvalues of a
-    symmetric 3 × 3 matrix, Communications of the ACM 4 (1961)), which is exact enough for the
-    greatest, and some ten times as fast as a decomposition.
+    The largest eigenvalue of their squares in closed form (O. K. Smith, Eigenvalues of a symmetric
+    3 × 3 matrix, Communications of the ACM 4 (1961)), which is accurate enough for the largest,
+    and about ten times as fast as a decomposition.
     """
     xx, yy, zz = (x * x).sum(0), (y * y).sum(0), (z * z).sum(0)
     xy, xz, yz = (x * y).sum(0), (x * z).sum(0), (y * z).sum(0)
@@ -263,23 +263,23 @@ def _norm(x: Array, y: Array, z: Array) -> Array:
 MOVE = 'move one of the angles'
 
 _SAME = 1e-12
-"""Angles nearer than this are the same, in [rad]."""
+"""Angles nearer than this count as equal, in [rad]."""
 
 _FARTHEST = 1e9
-"""An angle beyond this, in [rad], has lost the digits that say where in its turn it is."""
+"""Larger angles, in [rad], have lost the digits of their direction."""
 
 _CONSISTENT = 1e-9
-"""Equations that leave a smaller part of themselves do not contradict each other."""
+"""Equations with a smaller relative residual do not contradict each other."""
 
 
 def wanted_of(crank: Sequence[float], rocker: Sequence[float]) -> tuple[Wanted, ...]:
-    """Return pairs as positions that are wanted."""
+    """Return pairs as wanted positions."""
     return tuple(Wanted(t, p) for t, p in zip(crank, rocker, strict=True))
 
 
 def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) -> None:
     """
-    Refuse pairs that no four-bar can have, or that say one thing twice.
+    Refuse pairs that no four-bar can have, or that repeat each other.
 
     Raises
     ------
@@ -314,9 +314,9 @@ def check_pairs(crank: Sequence[float], rocker: Sequence[float], ground: float) 
 
 def centred(crank: Sequence[float], rocker: Sequence[float]) -> tuple[Array, Array, Array]:
     """
-    Return what each pair's cos φ, cos θ and cos(θ − φ) have over their means, by −2; (n,) each.
+    Return cos φ, cos θ and cos(θ − φ) of each pair minus their means, divided by −2; (n,) each.
 
-    Freudenstein's k3 is what makes the rest zero on the whole: against the means it falls out.
+    Subtracting the means eliminates Freudenstein's k3, which makes the mean residual zero.
     """
     theta, phi = np.array(crank, np.float64), np.array(rocker, np.float64)
     columns = differences(theta[:, None], phi[:, None])
@@ -325,7 +325,7 @@ def centred(crank: Sequence[float], rocker: Sequence[float]) -> tuple[Array, Arr
 
 
 def dependent(crank: Sequence[float], rocker: Sequence[float]) -> SynthesisError:
-    """Return why the equations of pairs do not fix a four-bar, as far as that can be told."""
+    """Return the reason why the equations of pairs do not determine a four-bar, if known."""
     pairs = [*enumerate(zip(crank, rocker, strict=True), 1)]
     if all(abs(remainder(theta - phi, tau)) < _SAME for _, (theta, phi) in pairs):
         return SynthesisError(
@@ -364,16 +364,16 @@ def _degrees(angle: float) -> str:
 
 
 TRUSTED = 4.0
-"""Units of roundoff times sensitivity that the error of a length stays within; measured."""
+"""Bound of the error of a length, in units of roundoff times sensitivity; measured."""
 
 LONGEST = 1e9
-"""In grounds: a link beyond it is an infinite one but for rounding."""
+"""In grounds: the length of a longer link is indistinguishable from infinite."""
 
 _NOISE = TRUSTED * UNIT_ROUNDOFF
 _SHAKEN = 0.1
 
 _BLOCK = 2048
-"""Threes of pairs that are worked on at once: they stay near the processor."""
+"""Triples of pairs that are computed at once: they stay in the cache."""
 
 
 class Links(NamedTuple):
@@ -385,8 +385,8 @@ class Links(NamedTuple):
     k
         Freudenstein's k1, k2, k3; (…, 3).
     lengths
-        Of crank, coupler and rocker; (…, 3). Crank and rocker are negative where the link points
-        the other way. Infinite or nan where there is no such link.
+        Lengths of crank, coupler and rocker; (…, 3). Crank and rocker are negative if the link
+        points the other way. Infinite or NaN if there is no such link.
 
     """
 
@@ -396,20 +396,20 @@ class Links(NamedTuple):
 
 class ThreePairs(NamedTuple):
     """
-    What three pairs come to, and what it is worth; any number of them at once.
+    The solution of three pairs, and its accuracy; any number of them at once.
 
     Attributes
     ----------
     k, lengths
         As in `Links`.
     condition
-        Of the matrix of rows (cos φ, cos θ, 1), by the 2-norm; (…).
+        Condition number of the matrix of rows (cos φ, cos θ, 1), by the 2-norm; (…).
     doubt
         Σ|x ∂y/∂x| over the six angles x; (…, 2). Of the logarithm y of the system's determinant,
         and of the coupler's angle y in the first pair, in [rad].
     sensitivity
-        Of each length L, Σ|x ∂L/∂x| + ``abs(L)`` over the six angles x; (…, 3). Times 2⁻⁵³ it is
-        what rounding the angles alone can make of a length.
+        Σ|x ∂L/∂x| + ``abs(L)`` of each length L over the six angles x; (…, 3). Times 2⁻⁵³ it
+        bounds the error of a length that rounding the angles alone causes.
     gradient
         ∂L/∂x of each length by the three crank angles, then by the three rocker angles, per
         [rad]; (…, 3, 6).
@@ -425,18 +425,18 @@ class ThreePairs(NamedTuple):
 
     @property
     def digits(self) -> Array:
-        """Return how many digits of each length can be trusted, 0 to 16; (…, 3)."""
+        """Return the number of reliable digits of each length, 0 to 16; (…, 3)."""
         with np.errstate(all='ignore'):
             return np.asarray(np.clip(-np.log10(self.lost), 0.0, 16.0))
 
     @property
     def lost(self) -> Array:
         """
-        Return what part of each length may be the rounding of the angles; (…, 3).
+        Return the relative error of each length that rounding the angles may cause; (…, 3).
 
-        It is 4·2⁻⁵³ of the sensitivity, and the square of the greatest such part that lengths,
-        determinant and direction of the coupler have, for what is not linear. Where that is a
-        tenth and more, the first derivatives say nothing any more: then it is 1 for all three.
+        It is 4·2⁻⁵³ of the sensitivity, plus the square of the largest such error of lengths,
+        determinant and direction of the coupler, for the nonlinear part. If that is a tenth or
+        more, the first derivatives are meaningless: then it is 1 for all three.
         """
         with np.errstate(all='ignore'):
             linear = _NOISE * self.sensitivity / np.abs(self.lengths)
@@ -446,9 +446,9 @@ class ThreePairs(NamedTuple):
 
 def links(crank: ArrayLike, rocker: ArrayLike) -> Links:
     """
-    Solve for three pairs, or for many threes at once.
+    Solve for three pairs, or for many triples at once.
 
-    Nothing is raised: what does not exist is infinite or nan.
+    No error is raised: a link that does not exist is infinite or NaN.
 
     Parameters
     ----------
@@ -467,9 +467,9 @@ def links(crank: ArrayLike, rocker: ArrayLike) -> Links:
 
 def three_pairs(crank: ArrayLike, rocker: ArrayLike) -> ThreePairs:
     """
-    Solve for three pairs, or for many threes at once, and say what the result is worth.
+    Solve for three pairs, or for many triples at once, with the accuracy of the result.
 
-    Nothing is raised: what does not exist is infinite or nan.
+    No error is raised: a link that does not exist is infinite or NaN.
 
     Parameters
     ----------
@@ -519,16 +519,16 @@ def exact(
     Raises
     ------
     SynthesisError
-        Where two pairs contradict or repeat each other, or no one four-bar of finite links has
-        the three.
+        If two pairs contradict or repeat each other, or no single four-bar of finite links has
+        the three pairs.
 
     """
     check_pairs(crank, rocker, ground)
-    found = three_pairs(crank, rocker)
-    if not _NOISE * found.doubt[0] < _SHAKEN:
+    solution = three_pairs(crank, rocker)
+    if not _NOISE * solution.doubt[0] < _SHAKEN:
         raise dependent(crank, rocker)
-    a, b, c = (float(length) for length in found.lengths)
-    parts = _NOISE * found.sensitivity / np.abs(found.lengths)
+    a, b, c = (float(length) for length in solution.lengths)
+    parts = _NOISE * solution.sensitivity / np.abs(solution.lengths)
     for link, length, part in (('crank', a, parts[0]), ('rocker', c, parts[2])):
         if not (part < 1.0 and abs(length) < LONGEST):
             raise SynthesisError(
@@ -536,7 +536,7 @@ def exact(
                 'would be infinitely long, and is a slider on a straight line then',
                 MOVE,
             )
-    if not found.digits.all():
+    if not solution.digits.all():
         raise SynthesisError(
             'the pairs',
             f'do not tell how long the links are: rounding their angles changes one by '
@@ -544,28 +544,28 @@ def exact(
             'move the pairs apart',
         )
     four_bar = FourBar.of_lengths(a * ground, b * ground, c * ground, ground)
-    return assembled(Design(four_bar, wanted_of(crank, rocker))), found
+    return assembled(Design(four_bar, wanted_of(crank, rocker))), solution
 
 
 def fit_equation(crank: Sequence[float], rocker: Sequence[float], ground: float) -> Design:
     """
-    Design the four-bar that comes nearest to three pairs or more, by Freudenstein's equation.
+    Design the four-bar nearest to three or more pairs, by Freudenstein's equation.
 
-    What is least is the sum of squares of what the equation leaves, not of the rocker's error;
+    It minimises the sum of squares of the equation's residuals, not of the rocker's errors;
     `angle_fit.nearest` starts from here.
 
     Parameters
     ----------
     crank, rocker
-        As many angles each, in [rad].
+        Angles, in [rad]; as many of each.
     ground
         Length of the ground, in [m].
 
     Raises
     ------
     SynthesisError
-        Where two pairs contradict or repeat each other, or all together do not fix a four-bar of
-        finite links.
+        If two pairs contradict or repeat each other, or all together do not determine a four-bar
+        of finite links.
 
     """
     check_pairs(crank, rocker, ground)
@@ -593,7 +593,7 @@ def fit_equation(crank: Sequence[float], rocker: Sequence[float], ground: float)
 
 
 def _columns(angles: ArrayLike) -> Array:
-    """Return threes of angles as (3, n)."""
+    """Return triples of angles as (3, n)."""
     return np.ascontiguousarray(np.asarray(angles, np.float64).reshape(-1, 3).T)
 
 

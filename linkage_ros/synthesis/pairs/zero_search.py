@@ -14,13 +14,12 @@
 
 
 """
-Three pairs of which only the differences matter: where zero is, on crank and rocker, is free.
+Three pairs of which only the differences matter: the zeros of crank and rocker are free.
 
-Each pair of zeros (α, β) gives Freudenstein's equation another three pairs, θ + α and φ + β, and
-so another four-bar: a family of two parameters, of which most have a defect and few a good
-transmission angle. Random ones are tried by the million, and the best are followed to the place
-where they are best. Half a turn of a zero is the same link with the sign of its length changed, so
-that zeros from 0 to π are all.
+Each pair of zeros (α, β) gives Freudenstein's equation three other pairs, θ + α and φ + β, and so
+another four-bar: a family of two parameters, of which most have a defect and few a good
+transmission angle. Millions of random zeros are scored, and the best are refined. Half a turn of a
+zero is the same link with the opposite sign of its length, so zeros from 0 to π are sufficient.
 """
 
 from __future__ import annotations
@@ -38,16 +37,16 @@ from linkage_ros.synthesis.study import Found, search
 import numpy as np
 
 _FAR = 90.0
-"""What missing a need counts for beside a degree of transmission angle: more than all of them."""
+"""Weight of an unmet need relative to a degree of transmission angle: more than all of them."""
 
 _LARGEST = 1e6
-"""Links longer than so many grounds, or shorter than one of so many parts, are none."""
+"""Largest ratio of a link and the ground, either way."""
 
 _POOL = 4096
-"""How many of a search are looked at again; the best ones lie side by side."""
+"""Number of candidates that are refined; the best ones lie side by side."""
 
 _APART = 0.1
-"""Designs whose zeros are nearer than this, in [rad], are one."""
+"""Designs whose zeros are nearer than this, in [rad], count as one."""
 
 _GRID = 7
 _ROUNDS = 24
@@ -56,14 +55,14 @@ _ROUNDS = 24
 @dataclass(frozen=True, slots=True)
 class ZeroProblem:
     """
-    What `study.search` tries: zeros of crank and rocker, (α, β), in [rad].
+    The candidates of `study.search`: zeros of crank and rocker, (α, β), in [rad].
 
     Attributes
     ----------
     crank, rocker
         Three angles each, in [rad].
     needs
-        What the design must have.
+        The requirements on the design.
 
     """
 
@@ -72,15 +71,15 @@ class ZeroProblem:
     needs: Needs
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
-        """Return zeros at random; (count, 2)."""
+        """Return random zeros; (count, 2)."""
         return generator.uniform(0.0, pi, (count, 2))
 
     def score(self, candidates: Array) -> Array:
         """
-        Return what is missing of a transmission angle of 90 degrees, in degrees; (count,).
+        Return the deficit from a transmission angle of 90 degrees, in degrees; (count,).
 
-        A need that is not met counts for more than that. Infinite where there is no four-bar, and
-        where one has a defect.
+        An unmet need counts for more than that. Infinite without a four-bar, and for one with a
+        defect.
         """
         lengths, found, exists = self.courses(candidates)
         ends = found.directions[:, 0], found.directions[:, -1]
@@ -91,12 +90,12 @@ class ZeroProblem:
 
     def courses(self, candidates: Array) -> tuple[Array, Course, Flags]:
         """
-        Return the four-bars of zeros, and how they go through the pairs.
+        Return the four-bars of zeros, and their courses through the pairs.
 
         Returns
         -------
         lengths : (count, 4)
-            Of crank, coupler, rocker and ground; all 1 where there is no four-bar.
+            Lengths of crank, coupler, rocker and ground; all 1 if there is no four-bar.
         found : Course
         exists : (count,)
             Whether there is one.
@@ -131,8 +130,8 @@ def search_zeros(
     """
     Return the best four-bars for three pairs whose zeros are free, the best first.
 
-    Those that meet the needs come first, by their transmission angle; then the nearest. None has
-    a defect.
+    Designs that meet the needs come first, by their transmission angle; then the nearest. None
+    has a defect.
 
     Parameters
     ----------
@@ -141,16 +140,16 @@ def search_zeros(
     ground
         Length of the ground, in [m].
     needs
-        What the design must have.
+        The requirements on the design.
     seed, count, progress, address
         As in `study.search`.
     keep
-        How many to return, at most.
+        Most designs to return.
 
     Raises
     ------
     SynthesisError
-        Where two pairs are equal, or none of all zeros that were tried gives a four-bar without
+        If two pairs are equal, or none of the zeros that were tried gives a four-bar without
         defects.
 
     """
@@ -174,7 +173,7 @@ def search_zeros(
 
 
 def _polished(problem: ZeroProblem, start: Found, radius: float) -> Found:
-    """Return the best place about a candidate: of a grid about it, then of finer ones."""
+    """Return the best place near a candidate: in a grid around it, then in finer ones."""
     axis = np.linspace(-1.0, 1.0, _GRID)
     grid = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
     best = start
@@ -190,7 +189,7 @@ def _polished(problem: ZeroProblem, start: Found, radius: float) -> Found:
 
 
 def _distinct(found: Sequence[Found]) -> list[Found]:
-    """Return the best of those that are near each other, of a list with the best first."""
+    """Return the best of candidates near each other, from a list with the best first."""
     kept: list[Found] = []
     for one in found:
         alpha, beta = one.candidate

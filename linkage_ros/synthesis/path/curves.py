@@ -14,7 +14,7 @@
 
 
 """
-The points that a coupler curve shall pass, and coupler curves of many four-bars at once.
+The points that a coupler curve shall pass, and the coupler curves of many four-bars at once.
 
 A four-bar is a row of nine numbers (`COLUMNS`): the crank's pivot p, the direction φ of the
 ground, the logarithms of the lengths a, b, c, d, and the traced point w in the coupler's frame. At
@@ -47,30 +47,30 @@ from numpy.typing import NDArray
 @dataclass(frozen=True, slots=True)
 class PathTask:
     """
-    Points to pass, in their order.
+    Points to pass, in this order.
 
     Attributes
     ----------
     points
-        Places in the ground's frame, in [m]; three at least.
+        Places in the frame of the ground, in [m]; three at least.
     closed
-        Whether the path returns to its first point; the crank turns fully then.
+        Whether the path returns to its first point; then the crank turns fully.
     timing
-        Crank angles at the points, in [rad], all up or all down and within a turn; None where
-        the crank may be anywhere.
+        Crank angles at the points, in [rad], all increasing or all decreasing, within a turn; None
+        if they are free.
     zero_free
-        Whether only the differences of these angles count. Else they are those of the crank's
+        Whether only the differences of these angles count. Otherwise they are those of the crank's
         pin itself, from the x axis.
     full_turn
-        Whether the crank shall turn fully also where the path is open.
+        Whether the crank shall turn fully even if the path is open.
     links
-        How short and how long links may be, and how far the traced point may be from the crank's
-        pin along x and y of the coupler, as multiples of the path's size.
+        Smallest and largest length of links, and largest distance of the traced point from the
+        crank's pin along x and y of the coupler, as multiples of the path's size.
 
     Raises
     ------
     SynthesisError
-        Where no path is described.
+        If the definition is invalid.
 
     """
 
@@ -93,7 +93,7 @@ class PathTask:
 
     @property
     def size(self) -> float:
-        """Return the diagonal of the box about the points, in [m]."""
+        """Return the diagonal of the bounding box of the points, in [m]."""
         return _size(self.points)
 
 
@@ -135,7 +135,7 @@ def _check_timing(timing: tuple[float, ...], points: int, closed: bool) -> None:
             'write on beyond 360 or below 0 degrees where they wrap',
         )
     travel = abs(timing[-1] - timing[0])
-    # A few roundings of degrees are no more than a turn.
+    # A few rounding errors of degrees are no more than a turn.
     if not travel < tau * (1.0 + 1e-12) or (closed and travel > tau * (1.0 - 1e-12)):
         raise SynthesisError(
             'timing',
@@ -152,14 +152,14 @@ def _size(points: tuple[complex, ...]) -> float:
 
 class Fitted(NamedTuple):
     """
-    Four-bars and where their cranks are at the points.
+    Four-bars, and their crank angles at the points.
 
     Attributes
     ----------
     rows
-        (n, 9), as in `model`.
+        Dimensions by `COLUMNS`, (n, 9).
     angles
-        Of the crank from the ground line at the points, (n, N).
+        Crank angles from the ground line at the points, (n, N).
     side
         1 for left and −1 for right, (n,).
 
@@ -170,27 +170,28 @@ class Fitted(NamedTuple):
     side: Array
 
     def some(self, chosen: NDArray[np.intp]) -> Fitted:
-        """Return those of these numbers."""
+        """Return the four-bars with these indices."""
         return Fitted(self.rows[chosen], self.angles[chosen], self.side[chosen])
 
 
 @dataclass(frozen=True, slots=True)
 class Aim:
     """
-    What curves are fitted to.
+    The target of a fit.
 
     Attributes
     ----------
     points
-        (N,), of a path about the origin whose size is 1.
+        (N,), of a path around the origin whose size is 1.
     timing
-        Crank angles at the points, (N,); None where the crank may be anywhere.
+        Crank angles at the points, (N,); None if they are free.
     zero_free
-        Whether the timing's zero is, so that only differences count.
+        Whether the zero of the timing is free, so that only differences count.
     full_turn
-        Whether the loop must be closed at every crank angle.
+        Whether the loop must close at every crank angle.
     shortest, longest
-        Links may be; the traced point may be as far from the crank's pin, along x and along y.
+        Bounds of the links; the traced point may be at most ``longest`` from the crank's pin,
+        along x and along y.
 
     """
 
@@ -203,14 +204,14 @@ class Aim:
 
 
 COLUMNS = ('x', 'y', 'phi', 'ln_a', 'ln_b', 'ln_c', 'ln_d', 'w_x', 'w_y')
-"""What a row of dimensions holds."""
+"""The dimensions in a row."""
 
 LENGTHS = slice(3, 7)
 POINT = slice(7, 9)
-"""Where in it the logarithms of the lengths are, and the traced point."""
+"""The slices of a row with the logarithms of the lengths, and with the traced point."""
 
 _SPARE = 1e-9
-"""How far a loop stays from folding, relative to its longest diagonal: a root has a derivative."""
+"""Least distance of a loop from folding, relative to its longest diagonal, for its derivative."""
 
 
 class Slopes(NamedTuple):
@@ -237,7 +238,7 @@ def coupler_directions(
     crank: Complex, b: Array, c: Array, d: Array, side: Array
 ) -> tuple[Complex, Array]:
     """
-    Return e^{iβ}, and y², which is below 0 where the loop is open.
+    Return e^{iβ}, and y², which is below 0 if the loop is open.
 
     Parameters
     ----------
@@ -296,15 +297,15 @@ def folds(rows: Array, angles: Array) -> tuple[Array, Array, Array]:
     """
     Return the cotangent of the transmission angle, and its derivatives.
 
-    It is 0 where coupler and rocker are square, and without bounds where they are in line. With
+    It is 0 if coupler and rocker are square, and unbounded if they are in line. With
     cos μ = (b² + c² − |D|²)/2bc, d(cot μ) = d(cos μ)/sin³ μ.
 
     Parameters
     ----------
     rows
-        (n, 9).
+        Dimensions, (n, 9).
     angles
-        Of the crank, (n, N).
+        Crank angles, (n, N).
 
     Returns
     -------
@@ -336,7 +337,7 @@ def diagonals(a: Array, d: Array, low: Array, high: Array) -> tuple[Array, Array
     a, d
         Lengths of crank and ground.
     low, high
-        The crank angles that it turns between, counted from the ground line, in [rad].
+        First and last crank angle, from the ground line, in [rad].
 
     """
     first, last = np.cos(low), np.cos(high)
@@ -350,7 +351,7 @@ def diagonals(a: Array, d: Array, low: Array, high: Array) -> tuple[Array, Array
 
 
 def closes(rows: Array, low: Array, high: Array) -> Mask:
-    """Return which four-bars (n, 9) stay closed, and off a toggle, all the way between angles."""
+    """Return which four-bars (n, 9) stay closed, and away from toggles, between two angles."""
     a, b, c, d = np.exp(rows[:, LENGTHS]).T
     shortest, longest = diagonals(a, d, low, high)
     spare = _SPARE * longest
@@ -359,14 +360,14 @@ def closes(rows: Array, low: Array, high: Array) -> Mask:
 
 
 def _holds(low: Array, high: Array, angle: float) -> Mask:
-    """Return whether an angle, or it and whole turns, lies between two."""
+    """Return whether an angle lies between two others, modulo a turn."""
     turn = 2.0 * np.pi
     held: Mask = np.ceil((low - angle) / turn) * turn + angle <= high
     return held
 
 
 def along(curves: Complex) -> Array:
-    """Return how far along its curve every point is, from 0 to 1, (n, M)."""
+    """Return the relative distance of every point along its curve, from 0 to 1, (n, M)."""
     steps = np.abs(np.diff(curves, axis=1))
     way = np.zeros(curves.shape)
     np.cumsum(steps, axis=1, out=way[:, 1:])
@@ -375,20 +376,20 @@ def along(curves: Complex) -> Array:
 
 
 def fractions(points: Complex) -> Array:
-    """Return how far along a path its points are, from 0 to 1, (N,)."""
+    """Return the relative distance of points along their path, from 0 to 1, (N,)."""
     return along(points[None, :]).ravel()
 
 
 def theta_at(way: Array, wanted: Array) -> Array:
     """
-    Return where curves are so far along, as a fraction of their steps.
+    Return the places at relative distances along curves, as a fraction of their steps.
 
     Parameters
     ----------
     way
-        As from `along`, (n, M).
+        From `along`, (n, M).
     wanted
-        From 0 to 1, (N,), or (n, N).
+        Relative distances from 0 to 1, (N,), or (n, N).
 
     """
     before, part = _segment(way, wanted)
@@ -398,7 +399,7 @@ def theta_at(way: Array, wanted: Array) -> Array:
 
 
 def resampled(curves: Complex, way: Array, wanted: Array) -> Complex:
-    """Return the places of curves (n, M) that are so far along, (n, N), on their chords."""
+    """Return the places of curves (n, M) at relative distances, on their chords, (n, N)."""
     before, part = _segment(way, wanted)
     start = np.take_along_axis(curves, before, axis=1)
     end = np.take_along_axis(curves, before + 1, axis=1)
@@ -409,13 +410,13 @@ def resampled(curves: Complex, way: Array, wanted: Array) -> Complex:
 def _segment(
     way: Array, wanted: Array
 ) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.int64]], Array]:
-    """Return the step that each is in, and how far in it, (n, N) both."""
+    """Return the step that holds each distance, and the fraction of that step, (n, N) both."""
     rows, last = len(way), way.shape[1] - 1
     wanted = np.broadcast_to(wanted, (rows, wanted.shape[-1]))
-    # One search for all rows: each has a range of its own.
+    # One search for all rows: each has its own range.
     offset = 2.0 * np.arange(rows)[:, None]
-    found = np.searchsorted((way + offset).ravel(), (wanted + offset).ravel(), side='right')
-    before = found.reshape(wanted.shape) - np.arange(rows)[:, None] * (last + 1) - 1
+    index = np.searchsorted((way + offset).ravel(), (wanted + offset).ravel(), side='right')
+    before = index.reshape(wanted.shape) - np.arange(rows)[:, None] * (last + 1) - 1
     before = np.clip(before, 0, last - 1)
     low = np.take_along_axis(way, before, axis=1)
     high = np.take_along_axis(way, before + 1, axis=1)

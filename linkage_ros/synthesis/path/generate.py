@@ -14,28 +14,28 @@
 
 
 """
-Path generation: four-bars whose coupler point passes as near as can be to given points.
+Path generation: four-bars whose coupler point passes as near as possible to given points.
 
-Many four-bars are drawn and laid upon the points (`search`), the best are brought nearer, and the
+Many four-bars are drawn and placed on the points (`search`), the best are improved, and the
 distinct linkages among them are the result. A coupler curve has nine numbers: up to nine points
 can be met exactly without timing (H. Alt, Über die Erzeugung gegebener ebener Kurven mit Hilfe des
 Gelenkvierecks, Zeitschrift für angewandte Mathematik und Mechanik 3 (1923) 13-19), and five with
-it. Fewer points have endlessly many exact answers; those with the better transmission angles come
-first then. Every linkage has two others, its cognates, that trace the same curve (S. Roberts, On
-three-bar motion in plane space, Proceedings of the London Mathematical Society 7 (1875) 14-23).
+it. Fewer points have infinitely many exact solutions; those with the better transmission angles
+then come first. Every linkage has two others, its cognates, that trace the same curve (S. Roberts,
+On three-bar motion in plane space, Proceedings of the London Mathematical Society 7 (1875) 14-23).
 They count as different.
 
-Many four-bars are fitted at once, each from its own start, by least squares on the distances,
-damped until a step helps (K. Levenberg, 1944; D. W. Marquardt, 1963). A step does not help if it
-opens the loop on its way, or takes the points out of order, whatever the distances say. A guard
-keeps the first steps off toggles, so that no fit ends at such an edge far from the answer: the
-cotangent of the transmission angle counts as a distance. In a step
+Many four-bars are fitted at once, each from its own start, by least squares of the distances,
+damped until a step improves them (K. Levenberg, 1944; D. W. Marquardt, 1963). A step that opens
+the loop on its way, or passes the points in another order, is refused whatever the distances are.
+A guard keeps the first steps away from toggles, so that no fit ends at such an edge far from the
+solution: the cotangent of the transmission angle counts as a distance. In a step
 
-- the crank angle of every point is an unknown too, without timing. It moves one place only, so
-  that it is eliminated from the normal equations (a Schur complement): they stay nine by nine
-  however many points there are.
-- lengths stay in a box. A length at an edge that would leave the box is held for that step.
-- the move is bent as the curves bend, to second order.
+- without timing, the crank angle of every point is an unknown too. It moves only one place, so it
+  is eliminated from the normal equations (a Schur complement): they stay nine by nine however many
+  points there are.
+- lengths stay within bounds. A length at a bound that would leave it is held for that step.
+- the step is curved like the curves, to second order.
 """
 
 from __future__ import annotations
@@ -71,22 +71,22 @@ from numpy.typing import NDArray
 _SIZE = len(COLUMNS)
 
 _BENT = 0.4
-"""A step is bent by this part of its own length at most."""
+"""Largest second-order part of a step, relative to its length."""
 
 _AHEAD = 0.1
-"""The part of a step after which is looked how the curves bend."""
+"""Fraction of the step at which the curvature is evaluated."""
 
 _TINY = 1e-30
-"""Keeps a division from zero where a crank angle moves nothing."""
+"""Prevents a division by zero if a crank angle moves nothing."""
 
 
 def step(now: Fitted, seen: Slopes, damping: Array, aim: Aim, guard: float) -> Fitted:
     """
-    Return where one damped step leads, within the box.
+    Return the result of one damped step, within the bounds.
 
-    Without a guard the step is bent as the curves bend, to second order (M. K. Transtrum and J. P.
-    Sethna, Improvements to the Levenberg-Marquardt algorithm, arXiv:1201.5885, 2012): errors of
-    coupler curves have long, bent valleys, along which straight steps are short.
+    Without a guard the step has a second-order part (M. K. Transtrum and J. P. Sethna,
+    Improvements to the Levenberg-Marquardt algorithm, arXiv:1201.5885, 2012): errors of coupler
+    curves have long, curved valleys, along which straight steps are short.
     """
     equations = _equations(now, seen, aim, guard)
     solve = _Solver(now, equations, damping, aim)
@@ -104,18 +104,18 @@ def step(now: Fitted, seen: Slopes, damping: Array, aim: Aim, guard: float) -> F
 
 class _Equations(NamedTuple):
     """
-    What is asked of a step: derivatives times step = gaps, as near as can be.
+    The equations of a step: derivatives times step = gaps, by least squares.
 
     Attributes
     ----------
     by
-        Derivatives by the unknowns that all points share, (n, parts, N, m).
+        Derivatives by the unknowns common to all points, (n, parts, N, m).
     turns
         Derivatives by the crank angle of the point, (n, parts, N).
     gaps
-        (n, parts, N).
+        Right sides, (n, parts, N).
     more, aside
-        Derivatives of what belongs to no point, (n, k, m), and their gaps, (n, k).
+        Derivatives of equations without a point, (n, k, m), and their gaps, (n, k).
 
     """
 
@@ -133,7 +133,7 @@ def _equations(now: Fitted, seen: Slopes, aim: Aim, guard: float) -> _Equations:
     gaps = np.stack((miss.real, miss.imag), axis=1)
     more, aside = np.zeros((len(by), 0, _SIZE)), np.zeros((len(by), 0))
     if guard:
-        # Where the crank's angle is no unknown it is 0 or π, at which a full turn comes nearest to
+        # If the crank's angle is not an unknown it is 0 or π, where a full turn comes nearest to
         # its toggles.
         folded, by_dimension, by_angle = folds(now.rows, now.angles)
         by = np.concatenate((by, guard * by_dimension[:, None]), axis=1)
@@ -146,7 +146,7 @@ def _equations(now: Fitted, seen: Slopes, aim: Aim, guard: float) -> _Equations:
         by = np.concatenate((by, turns[..., None]), axis=3)
         more = np.pad(more, ((0, 0), (0, 0), (0, 1)))
     elif aim.timing is not None:
-        # The crank's angle in the world is given: what turns the ground turns it back.
+        # The crank's angle in the world is given: turning the ground turns it back.
         by[..., 2] -= turns
     return _Equations(by, turns, gaps, more, aside)
 
@@ -182,7 +182,7 @@ class _Solver:
         """Return the change of rows and angles."""
         slope, pull = self._slope(gaps, aside)
         change = np.matmul(self._inverse, np.where(self._held, 0.0, slope)[..., None])[..., 0]
-        # Far from the answer a step may be of any size, and e^x must stay finite.
+        # Far from the solution a step may have any size, and e^x must stay finite.
         np.clip(change, -1.0, 1.0, out=change)
         rows = change[:, :_SIZE]
         if self._aim.timing is None:
@@ -202,7 +202,7 @@ class _Solver:
 
 
 def _bend(now: Fitted, seen: Slopes, change: Fitted, aim: Aim) -> Complex:
-    """Return what the places lag behind a step for their second derivative along it, (n, N)."""
+    """Return the second-order change of the places along a step, (n, N)."""
     ahead = slopes(
         *_moved(now, Fitted(_AHEAD * change.rows, _AHEAD * change.angles, change.side), aim)
     )
@@ -219,7 +219,7 @@ def _moved(now: Fitted, change: Fitted, aim: Aim) -> Fitted:
 
 
 def _box(aim: Aim) -> tuple[Array, Array]:
-    """Return bounds of the rows, (9,)."""
+    """Return the bounds of the rows, (9,)."""
     low, high = np.full(_SIZE, -np.inf), np.full(_SIZE, np.inf)
     low[LENGTHS], high[LENGTHS] = np.log(aim.shortest), np.log(aim.longest)
     low[POINT], high[POINT] = -aim.longest, aim.longest
@@ -231,29 +231,29 @@ _TURN = 2.0 * np.pi
 _DAMPING = 1e-2
 _LEAST_DAMPED, _MOST_DAMPED = 1e-12, 1e10
 _HELPED, _FAILED = 0.2, 5.0
-"""What damping is multiplied by after a step."""
+"""Factors of the damping after a step that improved the distances, and after one that did not."""
 
 _SETTLED = 1e-15
-"""A step that gains less than this part of the squares is the last."""
+"""A step with a smaller relative gain of the squares is the last."""
 
 _NOTHING = 1e-30
-"""Squares that are rounding, of a path of size 1."""
+"""Squares below this are rounding, for a path of size 1."""
 
 
 def improve(start: Fitted, aim: Aim, steps: int, guard: float = 0.0) -> tuple[Fitted, Array]:
     """
-    Return the four-bars after so many steps, and their sums of squared distances, (n,).
+    Return the four-bars after some steps, and their sums of squared distances, (n,).
 
-    Those that are no answer from the outset (open, out of order) have inf, and stay as they are.
+    Invalid four-bars (open, or with points out of order) have inf, and are not changed.
 
     Parameters
     ----------
     start, aim
-        As above.
+        The start, and the points.
     steps
-        At most.
+        Most steps.
     guard
-        What a transmission angle of 45° counts for as a distance. Not part of the sums.
+        Weight of a transmission angle of 45° as a distance. Not part of the sums.
 
     """
     now = Fitted(*(np.array(part) for part in start))
@@ -261,7 +261,7 @@ def improve(start: Fitted, aim: Aim, steps: int, guard: float = 0.0) -> tuple[Fi
     cost = _cost(now, seen, aim, guard)
     damping = np.full(len(cost), _DAMPING)
     going = np.flatnonzero(np.isfinite(cost))
-    # What is tried may be open, and its derivatives anything: its cost is inf.
+    # A trial may be open, with meaningless derivatives: its cost is inf.
     with np.errstate(all='ignore'):
         for _ in range(steps):
             if not len(going):
@@ -321,21 +321,21 @@ def _squares(seen: Slopes, aim: Aim) -> Array:
 
 
 COUNT = 200_000
-"""Four-bars that are drawn, if not said otherwise."""
+"""Default number of four-bars that are drawn."""
 
 _STARTS = 512
 _STAGES = ((30, 3e-3, 128), (50, 3e-4, 64), (150, 3e-5, 32))
-"""Steps, guard and how many distinct four-bars go on."""
+"""Steps, guard, and the number of distinct four-bars that continue."""
 
 _LAST_STEPS = 300
 _THINNED = 32
-"""Points that the search looks at; the last steps see all of them."""
+"""Points used by the search; the last steps use all of them."""
 
 _SAME = 0.05
-"""Linkages whose places and lengths differ by less than this part of the longest are one."""
+"""Linkages that differ by less than this, relative to the longest length, count as one."""
 
 _EXACT = 1e-9
-"""Errors below this part of the path's size are none."""
+"""Errors below this, relative to the size of the path, count as none."""
 
 
 class PathResult(NamedTuple):
@@ -345,9 +345,10 @@ class PathResult(NamedTuple):
     Attributes
     ----------
     design
-        With the crank angle at each point; without timing the crank's x axis is along the link.
+        The design, with the crank angle at each point; without timing the crank's x axis is along
+        the link.
     rms, greatest
-        Of the distances from the points, in [m].
+        Root mean square and largest of the distances from the points, in [m].
 
     """
 
@@ -358,14 +359,14 @@ class PathResult(NamedTuple):
 
 class Paths(NamedTuple):
     """
-    What was found, by error.
+    The result of a path generation, sorted by error.
 
     Attributes
     ----------
     found
-        The best that were accepted.
+        The best accepted linkages.
     refused
-        The best that were not.
+        The best refused linkages.
 
     """
 
@@ -391,20 +392,20 @@ def generate_path(
     task
         The points.
     seed, count
-        Of the four-bars drawn; the same give the same results.
+        Seed and number of the drawn four-bars; the same values give the same results.
     keep
-        How many distinct linkages to return of each kind, at most.
+        Most distinct linkages of each kind to return.
     accept
-        Which ones will do; all, if not said.
+        Returns whether a linkage is acceptable; by default all are.
     progress
-        Is told how many of how many were drawn.
+        Called with the number of drawn four-bars, and their total.
     address
-        Of a Dask scheduler; '' to draw here.
+        Address of a Dask scheduler; '' to draw in this process.
 
     Raises
     ------
     SynthesisError
-        Where nothing that was drawn reaches the points with links of these sizes.
+        If no drawn four-bar reaches the points with links of these sizes.
 
     """
     points = np.array(task.points, dtype=np.complex128)
@@ -430,7 +431,7 @@ def generate_path(
             'times its size reaches the points',
             'allow longer links, or draw more',
         )
-    fitted = problem.starts(np.array([found.candidate for found in drawn]))
+    fitted = problem.starts(np.array([one.candidate for one in drawn]))
     for steps, guard, survivors in _STAGES:
         fitted, squares = improve(fitted, thin, steps, guard)
         fitted = fitted.some(_distinct(fitted, squares, max(survivors, 4 * keep)))
@@ -440,13 +441,13 @@ def generate_path(
 
 
 def _thinned(points: int) -> NDArray[np.intp]:
-    """Return the numbers of the points that are searched for, the first and the last with them."""
+    """Return the indices of the points for the search, including the first and the last."""
     chosen = np.linspace(0, points - 1, min(_THINNED, points)).round().astype(np.intp)
     return np.unique(chosen)
 
 
 def _on_all(fitted: Fitted, some: NDArray[np.intp], aim: Aim) -> Fitted:
-    """Return the same four-bars with crank angles at all points, by how far along they are."""
+    """Return the same four-bars with crank angles at all points, by distance along the path."""
     if len(some) == len(aim.points):
         return fitted
     if aim.timing is not None:
@@ -457,7 +458,7 @@ def _on_all(fitted: Fitted, some: NDArray[np.intp], aim: Aim) -> Fitted:
 
 
 def _distinct(fitted: Fitted, squares: Array, most: int) -> NDArray[np.intp]:
-    """Return the numbers of distinct four-bars, the nearest first."""
+    """Return the indices of distinct four-bars, the nearest first."""
     a, b, c, d = np.exp(fitted.rows[:, LENGTHS]).T
     x, y, direction = fitted.rows[:, :3].T
     rest = fitted.rows[:, 7:]
@@ -475,7 +476,7 @@ def _distinct(fitted: Fitted, squares: Array, most: int) -> NDArray[np.intp]:
 
 
 def _results(task: PathTask, fitted: Fitted, aim: Aim, middle: complex) -> list[PathResult]:
-    """Return the four-bars in the world, by error; where that is none, by transmission angle."""
+    """Return the designs, by error; those without an error by transmission angle."""
     miss = np.abs(aim.points - slopes(*fitted).places)
     rms = np.sqrt((miss * miss).mean(1))
     start, end = fitted.angles[:, 0], fitted.angles[:, -1]

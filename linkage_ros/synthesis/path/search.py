@@ -14,20 +14,20 @@
 
 
 """
-Where to begin: random four-bars, each laid upon the points as well as it can be.
+Starts of a path fit: random four-bars, each placed on the points as well as possible.
 
-What a coupler curve looks like depends on few numbers. Where the crank angles θ at the points are
-known, with a crank of length 1, ::
+The shape of a coupler curve depends on few numbers. If the crank angles θ at the points are known,
+with a crank of length 1, ::
 
     place ≈ p + q·e^{iθ} + r·e^{iβ}
 
 is linear in p (the crank's pivot), q (the crank's length and the ground's direction) and r (the
 traced point): only b, c, d, the assembly and the crank's zero are drawn. Without timing the points
-are first laid along the curve of a drawn traced point by how far along it they are, and the
-angles there are taken for known.
+are first assigned to the curve of a drawn traced point by their distance along it, and the angles
+there are taken as known.
 
-Every four-bar that is drawn closes on its way: d is drawn first, which gives the shortest and
-the longest diagonal, then b + c above the longest and b − c between the shortest's.
+Every drawn four-bar closes on its way: d is drawn first, which gives the shortest and the longest
+diagonal, then b + c above the longest and b − c between the shortest's.
 """
 
 from __future__ import annotations
@@ -51,25 +51,25 @@ import numpy as np
 _TURN = 2.0 * np.pi
 
 _GROUND = (-2.3, 2.3)
-"""Bounds of ln(d/a): grounds of a tenth of the crank to ten cranks."""
+"""Bounds of ln(d/a): grounds from a tenth of the crank to ten cranks."""
 
 _SPARE = (-4.0, 1.5)
-"""Bounds of the logarithm of how much b + c is more than the longest diagonal, relative to it."""
+"""Bounds of the logarithm of b + c minus the longest diagonal, relative to that diagonal."""
 
 _ARM = 1.0
-"""Spread of the traced point about the middle of the coupler, in lengths of it."""
+"""Spread of the traced point around the middle of the coupler, in coupler lengths."""
 
 _ARC = (0.35, 6.1)
-"""Bounds of how far the crank turns along an open path, in [rad]."""
+"""Bounds of the rotation of the crank along an open path, in [rad]."""
 
 _GRID = 48
 _AROUND = 32
-"""Steps of the crank, and places along the curve, at which a closed one is compared."""
+"""Steps of the crank, and places along the curve, at which a closed path is compared."""
 
 
 @dataclass(frozen=True, slots=True)
 class Starts(ABC):
-    """A search (see `Problem`) that can say where its candidates stand."""
+    """A search (see `Problem`) whose candidates are placed on the points."""
 
     aim: Aim
 
@@ -79,20 +79,20 @@ class Starts(ABC):
 
     @abstractmethod
     def _angles(self, candidates: Array) -> Array:
-        """Return the crank angles at the points, of each candidate, in [rad]."""
+        """Return the crank angles at the points for each candidate, in [rad]."""
 
     def score(self, candidates: Array) -> Array:
-        """Return the error of each candidate as it is laid upon the points."""
+        """Return the error of each candidate, placed on the points."""
         return _laid(candidates, self._angles(candidates), self.aim)[0]
 
     def starts(self, candidates: Array) -> Fitted:
-        """Return the candidates as four-bars laid upon the points."""
+        """Return the candidates as four-bars placed on the points."""
         return _started(candidates, self._angles(candidates), self.aim)
 
 
 @dataclass(frozen=True, slots=True)
 class Timed(Starts):
-    """Candidates b/a, c/a, d/a, side and the crank angle at the timing's zero."""
+    """Candidates b/a, c/a, d/a, side and the crank angle at the zero of the timing."""
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
         zero = generator.uniform(0.0, _TURN, count)
@@ -124,14 +124,14 @@ class Open(Starts):
 
 @dataclass(frozen=True, slots=True)
 class Closed(Starts):
-    """Candidates b/a, c/a, d/a, side and the traced point; where it begins is found."""
+    """Candidates b/a, c/a, d/a, side and the traced point; the start is computed."""
 
     def sample(self, generator: np.random.Generator, count: int) -> Array:
         bars = _bars(generator, np.zeros(count), np.full(count, _TURN), True)
         return np.column_stack((bars, _arms(generator, bars)))
 
     def _angles(self, candidates: Array) -> Array:
-        """Return the angles by the turn of the whole curve that lays it best on the points."""
+        """Return the angles for the rotation of the whole curve that fits the points best."""
         curve = _curve(candidates, np.linspace(0.0, _TURN, _GRID + 1)[None, :])
         way = along(curve)
         even = np.arange(_AROUND) / _AROUND
@@ -143,7 +143,7 @@ class Closed(Starts):
         best = np.full(len(candidates), -1.0)
         begin = np.zeros(len(candidates))
         way_round = np.ones(len(candidates))
-        # Backwards: the places at −0, −1, −2 … steps.
+        # Backwards: the places at steps of −0, −1, −2 …
         for sign, places in ((1.0, target), (-1.0, np.roll(target[::-1], 1))):
             fit = np.abs(np.fft.ifft(np.conj(spectrum) * _middled_spectrum(places), axis=1))
             shift = np.argmax(fit, axis=1)
@@ -158,14 +158,14 @@ class Closed(Starts):
 
 
 def problem_of(aim: Aim, closed: bool) -> Starts:
-    """Return the search for what is known of the path."""
+    """Return the search for a kind of path."""
     if aim.timing is not None:
         return Timed(aim)
     return Closed(aim) if closed else Open(aim)
 
 
 def _bars(generator: np.random.Generator, low: Array, high: Array, full_turn: bool) -> Array:
-    """Draw b, c, d of a crank of 1, and the side, which close between these angles; (n, 4)."""
+    """Draw b, c, d for a crank of 1, and the side, that close between these angles; (n, 4)."""
     count = len(low)
     if full_turn:
         low, high = np.zeros(count), np.full(count, _TURN)
@@ -197,9 +197,9 @@ def _couplers(candidates: Array, crank: Complex) -> Complex:
 
 def _laid(candidates: Array, angles: Array, aim: Aim) -> tuple[Array, Complex, Complex]:
     """
-    Return the squares that remain, q and r: least squares, solved in closed form.
+    Return the remaining squares, q and r: least squares, solved in closed form.
 
-    A four-bar with a length outside of the box has inf.
+    A four-bar with a length outside of the bounds has inf.
     """
     crank = np.exp(1j * angles)
     coupler = _couplers(candidates, crank)
@@ -211,7 +211,7 @@ def _laid(candidates: Array, angles: Array, aim: Aim) -> tuple[Array, Complex, C
     on_crank, on_coupler = np.conj(crank) @ target, np.conj(coupler) @ target
     with np.errstate(all='ignore'):
         if aim.timing is not None and not aim.zero_free:
-            # The crank's direction is given: q is along one direction, and only its size is free.
+            # The crank's direction is given: q lies along one direction, only its size is free.
             onward = np.exp(-1j * candidates[:, 4])
             own = cranks - _squared(shared) / couplers
             part = on_crank - shared * on_coupler / couplers
