@@ -54,16 +54,17 @@ from linkage_ros.replay.verify import turning_joints
 from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import StoppedError
 
-# The messages of a bag as rows of a table: one for each tick, or for each message of a topic.
+# Each tick, or each message of one topic, becomes a row.
 #
-# A tick's joint states, motions and pin forces follow each other in the bag, with one publish
-# time; they make one row. Columns are found in a first reading, since a joint may turn up late;
-# the rows come in a second one, so that no more than a row is held.
+# The joint states, motions and pin forces of a tick follow each other in the bag and share one
+# publish time: together they make one row. A joint may appear late, so a first pass collects the
+# columns. A second pass writes the rows, so that only one row is in memory.
 
 TIME, STAMP, PUBLISHED, LOGGED = 'time [s]', 'stamp [ns]', 'publish time [ns]', 'log time [ns]'
 """
-The first columns: since the first row's stamp, the stamp of the message itself, the time that was
-solved for or at which the source sent it, and the time of the tick that took or published it.
+The first columns: time since the first row's stamp, the stamp of the message, the time that was
+solved for or at which the source sent the message, and the time of the tick that received or
+published it.
 """
 
 _MOST_COLUMNS = 10_000
@@ -75,7 +76,7 @@ ProgressCallback = Callable[[int], None]
 
 class Source(NamedTuple):
     """
-    What rows are made of.
+    The origin of the rows.
 
     Attributes
     ----------
@@ -84,11 +85,11 @@ class Source(NamedTuple):
     types
         The topics, each with its type.
     closing
-        Topics whose messages end a tick.
+        Topics whose messages end the row of a tick.
     wanted
-        Of a topic with messages of others, what tells which are of the rows.
+        For each topic that also carries other messages, the test that selects those of the rows.
     dependent
-        Names of joints that nobody can command, as for `MessageValues`.
+        Names of dependent joints, which nobody can command; see `MessageValues`.
 
     """
 
@@ -101,18 +102,18 @@ class Source(NamedTuple):
 
 class Found(NamedTuple):
     """
-    What the first reading finds.
+    Result of the first pass.
 
     Attributes
     ----------
     keys
         The columns beyond the first four.
     rows
-        How many rows there are.
+        Number of rows.
     counts
-        Messages of each topic that are in the rows.
+        Number of messages in the rows, by topic.
     left_out
-        How many messages are not, by topic and reason.
+        Number of messages that are left out, by topic and reason.
 
     """
 
@@ -123,7 +124,7 @@ class Found(NamedTuple):
 
 
 class _Tick(NamedTuple):
-    """The messages of a tick, by topic, and its publish and log time."""
+    """The messages of a tick, by topic, with its publish time and log time."""
 
     published: int
     logged: int
@@ -132,21 +133,21 @@ class _Tick(NamedTuple):
 
 def survey(source: Source, order: Sequence[str], told: ProgressCallback) -> Found:
     """
-    Read a bag for the columns of its rows.
+    Collect the columns of the rows (first pass).
 
     Parameters
     ----------
     source
-        What rows are made of.
+        The origin of the rows.
     order
-        Joints that come first, in this order; others follow as they turn up.
+        Joints that come first, in this order; others follow in the order of the bag.
     told
-        Takes how many bytes have been read, now and then. What it raises ends the reading.
+        Called now and then with the number of bytes read; an exception from it ends the pass.
 
     Raises
     ------
     BagError
-        Where the bag is damaged, or names ever new joints.
+        If the bag is damaged, or new joint names keep coming.
 
     """
     found: dict[Key, None] = {}
@@ -171,7 +172,7 @@ def survey(source: Source, order: Sequence[str], told: ProgressCallback) -> Foun
 
 
 def _sorted(keys: Iterable[Key], order: Sequence[str]) -> tuple[Key, ...]:
-    """Return columns in order: by quantity, then joint; of a pin, force and torque together."""
+    """Sort the columns by quantity, then joint; force and torque of a pin stay together."""
     keys = tuple(keys)
     names = dict.fromkeys([*order, *(name for name, _ in keys)])
     ranks = {name: rank for rank, name in enumerate(names)}
@@ -199,7 +200,7 @@ def rows_of(source: Source, keys: Sequence[Key], told: ProgressCallback) -> Iter
             columns = placed.get(values.keys)
             if columns is None:
                 columns = placed[values.keys] = tuple(places[key] for key in values.keys)
-            # A motion repeats what its joint state says; it counts where that was dropped.
+            # ~/motion repeats the joint state; it counts only where the joint state was dropped.
             for column, number in zip(columns, values.numbers, strict=True):
                 if row[column] is None:
                     row[column] = number
@@ -252,7 +253,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Write the file; return 1 where it was stopped."""
+    """Write the file; return 1 if a signal stopped it."""
     try:
         found = export(arguments.bag, arguments.output, arguments.topic, stop)
     except StoppedError:
@@ -277,16 +278,16 @@ def export(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Found:
     file
         The file; one that exists is replaced.
     topic
-        What to write alone; nothing for the joint states and what was published with them.
+        The only topic to write; None for the joint states and what was published with them.
     stop
-        The wish to stop.
+        Set by a signal.
 
     Raises
     ------
     StoppedError
-        There was one.
+        If the event was set.
     LinkageError
-        Where the bag cannot be read or holds nothing to write, or the file cannot be written.
+        If the bag cannot be read or has nothing to write, or if the file cannot be written.
 
     """
     check_kind(file)
@@ -323,7 +324,7 @@ def export(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Found:
 
 
 def _scene(bag: Bag) -> Scene | None:
-    """Return the scene that a bag carries, where it carries one that this version can read."""
+    """Return the scene in a bag; None if there is none that this version can read."""
     try:
         return recorded_scene(bag)
     except LinkageError:
@@ -331,7 +332,7 @@ def _scene(bag: Bag) -> Scene | None:
 
 
 def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
-    """Return what to write, as it was asked for or as the bag says."""
+    """Return the topics to write: those asked for, or those that the bag names."""
     types = {each.name: each.type for each in bag.topics}
     readable = {name: kind for name, kind in types.items() if kind in TYPES}
     run = run_or_blank(bag)
@@ -345,7 +346,7 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
             raise BagError(
                 bag.path, f'{topic} is of {types[topic]}, which is not about joints', others
             )
-        # Commands of a crank may name joints that follow from it, without a number for them.
+        # A crank command may name dependent joints without a value for them.
         dependent: frozenset[str] = frozenset()
         if scene is not None and topic == run.crank_topic:
             dependent = scene.dependent_joints
@@ -390,7 +391,7 @@ def _nothing(source: Source, found: Found) -> BagError:
 
 
 def _head(key: Key, turning: Mapping[str, bool]) -> str:
-    """Return the heading of a column: the joint, what is told of it, and its unit."""
+    """Return the heading of a column: joint, quantity and unit."""
     name, quantity = key
     angular, linear = UNITS[quantity]
     told = name if quantity == POSITION else f'{name} {quantity}'
