@@ -45,10 +45,10 @@ _SINGULAR = (
     ('change points', Status.CHANGE_POINT),
     ('without a pose', Status.INDETERMINATE),
 )
-"""What singular inputs are called, by what is met there."""
+"""Names of singular inputs, by kind."""
 
 _PLACES = 4
-"""How many places of one extreme are named."""
+"""Maximum number of places shown for one extreme value."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
-    """Check the linkage; a file with an error in it has been refused when this returns."""
+    """Check the linkage; an invalid file raises before this returns."""
     closure = load(arguments.file)
     for number, table in enumerate(tables(closure, arguments.file)):
         if number:
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def tables(closure: Closure, title: str) -> Iterator[Table]:
-    """Yield what there is to say of a linkage."""
+    """Yield the tables that describe a linkage."""
     way = InputSweep(closure) if len(closure.linkage.inputs) == 1 else None
     yield Table(title, ('', ''), list(_facts(closure, way)))
     yield Table(
@@ -105,7 +105,7 @@ def tables(closure: Closure, title: str) -> Iterator[Table]:
 
 
 def describe_group(closure: Closure, number: int) -> tuple[str, str, str, str]:
-    """Return kind, links, way of solution and assembly of a group."""
+    """Return kind, links, solution method and assembly of a group."""
     group: Group = closure.structure.groups[number]
     if isinstance(group, Driven):
         given = closure.linkage.inputs[group.index]
@@ -189,7 +189,7 @@ def _reach(closure: Closure, way: InputSweep | None) -> Iterator[tuple[str, str]
 
 
 def _is_reached(way: InputSweep, value: float) -> bool:
-    """Return whether a value of the input, in one of its turns, is within the limits."""
+    """Return whether a value of the input, up to full turns, is within the limits."""
     turns = (0.0, -tau, tau) if way.turning else (0.0,)
     return not way.closure.bounds or any(way.range_about(value + turn) for turn in turns)
 
@@ -209,7 +209,7 @@ def _limits_text(limits: Limits, turning: bool) -> str:
 
 
 def _range_text(interval: InputRange) -> str:
-    """Return a range; where limits end it, with what ends it."""
+    """Return a range; if limits end it, with their names."""
     low, high = (value_text(value, interval.turning) for value in interval[:2])
     if interval.by == ('', ''):
         return f'{low} to {high}'
@@ -242,7 +242,7 @@ def _assembly(closure: Closure, dyad: Dyad) -> str:
 
 
 def _other_assemblies(closure: Closure) -> Iterator[Table]:
-    """Yield for each group that is iterated what else a pose could name at the same inputs."""
+    """Yield for each iterated group the other assemblies that a pose could name."""
     pose = closure.linkage.pose
     for number, group in enumerate(closure.structure.groups):
         if not isinstance(group, Iterated) or pose is None:
