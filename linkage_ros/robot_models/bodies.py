@@ -14,11 +14,11 @@
 
 
 """
-What links look like in a robot model: bars along their points, discs at them, rails for sliders.
+Shapes of links in a robot model: bars between their points, discs at them, rails for sliders.
 
-Robot models know boxes and cylinders only. All stand in the frame of their link; each link has a
-layer of its own, so that links pass each other as they do in a machine. Frames stay in the plane
-z = 0: where links are drawn does not move their pins.
+Robot models have only boxes and cylinders. All shapes are given in the frame of their link. Each
+link has a layer of its own, so that links pass each other as in a machine. Frames stay in the
+plane z = 0: the layer in which a link is drawn does not move its pins.
 """
 
 from __future__ import annotations
@@ -56,15 +56,15 @@ class Solid(NamedTuple):
     kind
         ``bar``, ``disc``, ``block`` or ``rail``.
     name
-        Of the point of a disc or block, of the slider of a rail; else ''.
+        Name of the point of a disc or block, or of the slider of a rail; else ''.
     centre, z
         In the frame of the link, in [m].
     angle
-        Of the box about z, in [rad].
+        Angle of a box about z, in [rad].
     length, width
-        Of the box; of a cylinder the diameter, twice. In [m].
+        Of a box; both are the diameter of a cylinder. In [m].
     height
-        Along z, in [m].
+        Size along z, in [m].
 
     """
 
@@ -79,7 +79,7 @@ class Solid(NamedTuple):
 
 
 class Body(NamedTuple):
-    """A link as it is seen."""
+    """The shapes of a link."""
 
     colour: tuple[float, float, float, float]
     solids: tuple[Solid, ...]
@@ -87,16 +87,16 @@ class Body(NamedTuple):
 
 def bodies(closure: Closure, found: Mapping[str, Span], first_layer: int = 0) -> dict[str, Body]:
     """
-    Return what each link looks like.
+    Return the shapes of each link.
 
     Parameters
     ----------
     closure
         The linkage.
     found
-        How far its joints go.
+        Range of motion of its joints.
     first_layer
-        Layers that other linkages have below.
+        Number of layers that other linkages occupy below.
 
     """
     linkage = closure.linkage
@@ -114,7 +114,7 @@ def bodies(closure: Closure, found: Mapping[str, Span], first_layer: int = 0) ->
 
 
 def bar_width(closure: Closure) -> float:
-    """Return the width of bars, in [m]: a part of the length that links commonly have."""
+    """Return the width of bars, in [m]: a fraction of the typical length of links."""
     lengths = [
         max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
         for points in closure.linkage.links.values()
@@ -151,7 +151,7 @@ def _bars(closure: Closure, link: str, z: float, width: float) -> list[Solid]:
 
 
 def _turned(closure: Closure, link: str) -> float:
-    """Return the angle at which a block lies along its slider, in its own frame."""
+    """Return the angle of a block along its slider, in the block's own frame."""
     for slider in closure.linkage.sliders.values():
         if slider.block == link:
             return phase(complex(*slider.direction)) - slider.angle
@@ -174,7 +174,7 @@ def _rails(
             continue
         low, high = travel(closure, name, found)
         if link != GROUND:
-            low, high = min(low, 0.0), max(high, 0.0)  # it hangs together with the link's bars
+            low, high = min(low, 0.0), max(high, 0.0)  # the rail must reach the link's bars
         unit = complex(*slider.direction) / abs(complex(*slider.direction))
         start = complex(*closure.linkage.links[link][slider.through])
         centre = start + 0.5 * (low + high) * unit
@@ -186,7 +186,7 @@ def _rails(
 
 
 def travel(closure: Closure, slider: str, found: Mapping[str, Span]) -> tuple[float, float]:
-    """Return how far a slider's point goes along its line, in [m], as far as that is told."""
+    """Return the range of a slider's point along its line, in [m], as far as it is known."""
     for name, joint in named_joints(closure.linkage).items():
         if isinstance(joint, SlideJoint) and joint.slider == slider:
             return found[name].lowest, found[name].highest
