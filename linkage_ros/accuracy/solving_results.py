@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The part of the page on closing the loops: its diagrams, its tables and their conclusions."""
+"""Results of closing the loops: diagrams, tables and conclusions."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Tabl
 from linkage_ros.measuring import Spread
 
 FLOOR = 1e-18
-"""Where an answer in doubles that is exactly right is drawn, in [rad]."""
+"""Position in the diagram of an error of 0, in [rad]."""
 
 _TIME = Axis('time of a state', 'µs')
 _ERROR = 'greatest error'
 _UNIT = 'rad, or of the size'
 _LEAST = 1e-19
-"""Less is drawn on the edge: what has more digits than a double has would flatten all else."""
+"""Smaller errors, beyond the digits of a double, are drawn on the edge to save the scale."""
 
 _ERRORS = Axis(_ERROR, _UNIT, least=_LEAST)
 
 _WITH_PATH = ('easy', 'path')
-"""Integration goes along a path; it is shown with the easy poses."""
+"""Integration follows a path; it is shown with the easy poses."""
 
 
 def part_of(found: Sequence[Measured], quick: bool) -> Part:
-    """Return the part."""
+    """Return the results as a part of the page."""
     return Part(
         'solving',
         'Solving the loop',
@@ -213,7 +213,7 @@ def _knot_table(found: Sequence[Measured]) -> Table:
 
 
 def _distance_table(found: Sequence[Measured]) -> Table:
-    """Return the errors by the distance from trouble, a column for each method at its best."""
+    """Return errors by distance from the singular pose, one column for each method's best."""
     poses = found[0].poses
     best = list(best_of_each(found))
     rows = []
@@ -236,7 +236,7 @@ def _distance_table(found: Sequence[Measured]) -> Table:
 
 
 def best_of_each(found: Sequence[Measured]) -> Iterator[Measured]:
-    """Yield of each method the setting that fails least and is nearest to the truth."""
+    """Yield for each method the setting that fails least and has the smallest error."""
     for name in dict.fromkeys(one.method.name for one in found):
         yield min(
             (one for one in found if one.method.name == name),
@@ -271,7 +271,7 @@ WANTED = (1e-3, 1e-6, 1e-9, 1e-12)
 _TROUBLE = ('toggle', 'change_point')
 
 _IN_A_SCENE = (*NODE_DEFAULTS, FROM_KNOTS, TABLES['hermite'])
-"""The methods that ``solver`` of a scene can choose."""
+"""Methods that ``solver`` of a scene can choose."""
 
 
 def text(found: Sequence[Measured], quick: bool) -> list[str]:
@@ -345,7 +345,8 @@ def _cheapest(found: Sequence[Measured], wanted: float) -> Measured | None:
     """
     Return the fastest method of those that never fail and reach the accuracy.
 
-    Of those that are within each other's spreads what the node does wins, else what holds least.
+    If several are within each other's spread, the node's method wins, else the one with the
+    smallest memory.
     """
     able = [one for one in found if _keeps(one, wanted)]
     if not able:
@@ -370,7 +371,7 @@ def _compared(one: Measured, node: Measured) -> str:
 
 
 def _fails_in(found: Sequence[Measured], one: Measured, wanted: float) -> str:
-    """Return where a method does not keep the accuracy, with its setting if that was measured."""
+    """Return where a method misses the accuracy, with its setting if that was measured."""
     bad = []
     for key in _TROUBLE:
         there = [other for other in found if other.poses.key == key]
