@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-Subscribers of ``joint_states`` that come and go, each a DDS participant of its own, in turn.
+Subscribers of ``joint_states`` that come and go in turn, each a DDS participant of its own.
 
-Arguments: how many come, and for how long each listens, in [s]. At the end it prints a line of
-JSON: how many came, how many of them heard nothing, the messages that they heard, and those missed
-between the first and the last number of each.
+Arguments: the number of subscribers, and how long each listens, in [s]. At the end it prints a
+line of JSON: the number of subscribers, how many received nothing, the messages received, and
+those missed between the first and the last of each.
 """
 
 from __future__ import annotations

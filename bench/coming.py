@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-What subscribers that come and go cost the ticks, by how Fast DDS carries the messages.
+Cost of subscribers that come and go for the ticks, by the transport of Fast DDS.
 
-A publisher opens the shared-memory port of every subscriber that comes, on the thread that
-publishes. The check of a port that nobody has written to for long waits a third of the
-``healthy_check_timeout_ms`` of whoever made the port: 0.33 s (Fast-DDS issue 6535).
+A publisher opens the shared-memory port of every new subscriber, on the thread that publishes. If
+nobody has written to that port for long, its check waits for a third of the
+``healthy_check_timeout_ms`` of the process that created the port: 0.33 s (Fast-DDS issue 6535).
 """
 
 from __future__ import annotations

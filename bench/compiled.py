@@ -14,10 +14,10 @@
 
 
 """
-What compiling brings: shipped linkages beside their plain steps, chains of dyads, and arrays.
+Gain of compiling: shipped linkages against their uncompiled steps, chains of dyads, and arrays.
 
-Many states of each shipped linkage are solved by `solve` and by its emitted C, as fast as a
-compiler makes it. Both are written from the same tape and differ in what executes it.
+Many states of each shipped linkage are solved by `solve` and by its generated C with full
+optimisation. Both come from the same tape and differ only in what executes it.
 """
 
 from __future__ import annotations

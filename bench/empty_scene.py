@@ -14,12 +14,11 @@
 
 
 """
-What the empty scene costs beyond the formulas of its linkage and the packing of its message.
+Cost of the empty scene beyond the formulas of its linkage and the encoding of its message.
 
-The yardstick is what one would write by hand for this four-bar on a topic: the crank carried
-forward, the loop closed in a straight line, the bytes packed. The scene does the same, looks
-whether the loop closes, keeps angles running on over whole turns, and says for whoever asks what
-it came to.
+The yardstick is hand-written code for this four-bar on a topic: extrapolate the crank, close the
+loop in straight-line code, encode the bytes. The scene does the same. In addition it checks
+whether the loop closes, continues angles over whole turns, and keeps the result for its callers.
 """
 
 from __future__ import annotations

@@ -14,10 +14,10 @@
 
 
 """
-The same linkage as the rclpy tutorials have it: timer, callback, message, `rclpy.spin`.
+The same linkage in the style of the rclpy tutorials: timer, callback, message, `rclpy.spin`.
 
-It solves by the very closure of the package, carries the crank forward and publishes rates, as the
-benchmark's scene does; it neither counts, checks nor records.
+Like the benchmark's scene, it solves with the package's own closure, extrapolates the crank and
+publishes rates. It does not count, check or record.
 """
 
 from __future__ import annotations

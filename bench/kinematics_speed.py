@@ -14,10 +14,10 @@
 
 
 """
-How fast linkages are solved with acceleration: one state at a time, and a million at once.
+Speed of solving linkages with accelerations: one state at a time, and a million at once.
 
-They are compared with pylinkage, and with the formulas of a four-bar in one straight function: no
-status, no pose, no steps. That function serves linkages whose crank turns fully and passes no
+They are compared with pylinkage, and with the formulas of a four-bar in one straight-line function
+without status, pose and steps. That function serves linkages whose crank turns fully and passes no
 change point. Its arithmetic is that of `linkage_ros.kinematics.dyads.rrr` over
 `linkage_ros.kinematics.diagonals`.
 """

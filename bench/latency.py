@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""(c) How long a crank sample takes to come back as a joint state, against a relay of bytes."""
+"""(c) Latency from a crank sample to its joint state, against a relay of bytes."""
 
 from __future__ import annotations
 

@@ -14,12 +14,12 @@
 
 
 """
-Sends crank samples to several nodes in turn and measures when the joint state is back.
+Send crank samples to several nodes in turn and measure the time until the joint state arrives.
 
-The stamp tells which sample an answer is to. Arguments: the rate, in [Hz], of all samples
-together; how many for each node make a part; how many parts; then the namespaces of the nodes. For
-every part it prints a line of JSON: for each namespace the round trips, in [ns], and how many
-samples had no answer.
+The stamp assigns an answer to its sample. Arguments: the rate of all samples together, in [Hz];
+the number of samples per node in a part; the number of parts; then the namespaces of the nodes.
+For every part it prints a line of JSON: for each namespace the round trips, in [ns], and the
+number of samples without an answer.
 """
 
 from __future__ import annotations

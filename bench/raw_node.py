@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What the programs of the benchmark share: a node that takes and publishes bytes."""
+"""Base of the benchmark's programs: a node that takes and publishes bytes."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""(a), (b) What a tick costs, against the idiomatic node and the bare loop, and how late it is."""
+"""(a), (b) Cost and lateness of a tick, against the idiomatic node and the bare loop."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What all campaigns share: parts for several processes, progress lines, percentiles."""
+"""Shared by all campaigns: parts for several processes, progress lines, percentiles."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A command run in this process, bounded in time: to start Python takes longer than most do."""
+"""Run a command in this process with a time limit: starting Python would take longer."""
 
 from __future__ import annotations
 

@@ -17,8 +17,8 @@
 The hard cases, and why each is hard.
 
 Linkages of one loop are made from their lengths, with frames as one would draw them. There are
-four-bars and sliders that are hard, each in its own way, and what is hard for linkages of every
-kind: forced angles, large angles, sizes, and chains.
+four-bars and sliders that are hard, each in its own way, and difficulties that linkages of every
+kind share: forced angles, large angles, sizes, and chains.
 """
 
 from __future__ import annotations

@@ -14,10 +14,10 @@
 
 
 """
-One linkage, solved by the package and by the reference: by how much they differ.
+One linkage, solved by the package and by the reference, and the differences.
 
-Millions of errors are kept as histograms and a few worst cases, the same in whatever order they
-come.
+Millions of errors are kept as histograms and a few worst cases; the result does not depend on
+their order.
 """
 
 from __future__ import annotations

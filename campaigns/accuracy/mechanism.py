@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-A linkage as the reference sees it: links, sliders, and the dyads in the order they are solved in.
+A linkage for the reference: links, sliders, and the dyads in the order of solution.
 
-The package finds the dyads from the linkage file's terms; the reference is told them by whoever
-made the linkage, so that neither can inherit a mistake from the other.
+The package finds the dyads from the linkage file's terms. The reference gets them from the
+generator of the linkage, so that neither can inherit a mistake from the other.
 """
 
 from __future__ import annotations

@@ -21,13 +21,13 @@ Nothing is differentiated by hand: the crank's direction is the series of e^iφ(
 are read from their second and third coefficients. A ball encloses its exact value, so that the
 number of correct digits is proved with each result.
 
-**Condition numbers** are made of how a motion changes with each number of its linkage. The closing
-equation of a dyad, differentiated by a number, is linear in the changes of its two unknowns, at
-every time: a power series again, with the same determinant for all numbers. The directions of all
-links, the slides and the inverse of the determinant come from the reference and are right to the
-last digit of a double; nothing that cancels near a singularity is computed here. Sums remain that
-are as large as what they are compared with, so double precision is enough for a condition number;
-a test compares it with differences of fifty digits.
+**Condition numbers** follow from the derivative of a motion with respect to each number of its
+linkage. The closing equation of a dyad, differentiated by a number, is linear in the derivatives
+of its two unknowns, at every time: again a power series, with the same determinant for all
+numbers. The directions of all links, the slides and the inverse of the determinant come from the
+reference and are right to the last digit of a double; nothing that cancels near a singularity is
+computed here. The remaining sums are as large as their terms, so double precision is enough for a
+condition number; a test compares it with differences of fifty digits.
 
 Arrays are [power of time, case, number].
 """

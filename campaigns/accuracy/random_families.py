@@ -16,9 +16,9 @@
 """
 Random linkages: one dyad of each type on a crank, and chains of three.
 
-A linkage is made from a pose: pins are put where they shall be, and the links follow. So it closes
-at the crank angle that it was made at, whatever its dyads. Frames are plain (origin on the first
-pin, x axis towards the second) or anywhere: a file may have either.
+A linkage is made from a pose: pins are placed, and the links follow. So it closes at the crank
+angle of that pose, whatever its dyads. Frames are plain (origin on the first pin, x axis towards
+the second) or arbitrary: a file may have either.
 """
 
 from __future__ import annotations

@@ -14,10 +14,10 @@
 
 
 """
-The campaign: what there is to be done, done in parts, by as many processes as are wanted.
+The work of the campaign, in parts that any number of processes share.
 
-Each linkage has a generator of its own, seeded by the campaign's seed, its family and its number:
-what comes out does not depend on how the work was shared, and any linkage can be made again.
+Each linkage has a random generator of its own, seeded by the campaign's seed, its family and its
+number: the result does not depend on how the work was shared, and any linkage can be made again.
 """
 
 from __future__ import annotations

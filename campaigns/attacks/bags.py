@@ -14,12 +14,12 @@
 
 
 """
-Bags that are changed at random, through the commands that look at one.
+Bags that are changed at random, through the commands that read one.
 
-Bits are flipped, files cut, records taken out, doubled, put elsewhere and into other bags, lengths
-and numbers replaced; mostly without the checksums, which would tell at once. So are the texts
-that a bag carries, with checksums that fit. A command has to end in time and within memory, with
-what it could tell or with one line. Whatever else comes of it is a finding.
+Bits are flipped, files cut, records removed, doubled, moved and put into other bags, lengths and
+numbers replaced; mostly without checksums, which would reveal the change at once. The texts that a
+bag carries are changed too, with correct checksums. A command has to end in time and within
+memory, with the remaining content or with one line. Any other outcome is a finding.
 """
 
 from __future__ import annotations

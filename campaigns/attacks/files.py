@@ -16,8 +16,8 @@
 """
 Files that are changed at random, through every command that takes one.
 
-Each has to end in time and within memory: with what was asked for, or with exit code 2 and a
-line that is no longer than a screen. Whatever else comes of it is a finding.
+Each has to end in time and within memory: with its result, or with exit code 2 and a line that is
+no longer than a screen. Any other outcome is a finding.
 """
 
 from __future__ import annotations

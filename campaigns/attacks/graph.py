@@ -14,12 +14,12 @@
 
 
 """
-Floods and storms: a node that runs, and another that sends it whatever a graph can send.
+Floods and storms: a running node, and another that sends it whatever a graph can send.
 
-First messages as many and as large as they come, then calls of services, parameters and
+First come messages as many and as large as possible, then calls of services, parameters and
 transitions in any order. Nothing may end the node, every joint state is the pose of a crank that
-was sent, and every message is accounted for. ``python -m campaigns.attacks.graph`` is the one
-that attacks; `attack` starts both, each a process on a graph of its own.
+was sent, and every message is accounted for. ``python -m campaigns.attacks.graph`` is the
+attacking node; `attack` starts both, each a process on a graph of its own.
 """
 
 from __future__ import annotations

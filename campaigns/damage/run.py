@@ -14,9 +14,9 @@
 
 
 """
-Bags are damaged, read and recovered; a verdict holds the outcome against what is true of them.
+Bags are damaged, read and recovered; a verdict compares the outcome with the original.
 
-The bags are a node's own, and others as other writers leave them. The damages are shared among
+The bags are a node's own, and others in the style of other writers. The damages are shared among
 processes.
 """
 

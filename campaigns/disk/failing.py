@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Every call of a recording fails once, and from then on, in every way."""
+"""Every system call of a recording fails, once or from then on, in every way."""
 
 from __future__ import annotations
 

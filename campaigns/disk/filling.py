@@ -16,7 +16,7 @@
 """
 Recordings on a small disk that fills, by the recording itself or by another process.
 
-The disks have a few MiB and are mounted for a while, where that is permitted.
+The disks have a few MiB and are mounted temporarily, where that is permitted.
 """
 
 from __future__ import annotations

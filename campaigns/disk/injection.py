@@ -14,11 +14,11 @@
 
 
 """
-Run a recording in a process of its own, and answer its calls as a failing disk would.
+Run a recording in a process of its own, and answer its system calls as a failing disk would.
 
 System calls wait until another process answers them: Linux' ``seccomp_unotify(2)``. So a call
-fails where a disk makes it fail, in the kernel, whoever makes it: the interpreter, its buffered
-files, the C library. No compiler, no tracer and no privilege is needed.
+fails in the kernel, as with a failing disk, whoever makes it: the interpreter, its buffered files
+or the C library. No compiler, tracer or privilege is needed.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ _ARM: Mapping[int, Signature] = {
     83: Signature('fsync'),
     276: Signature('rename', 1),
 }
-# Of each machine the calls, and seccomp's own number.
+# System calls of each machine, and the number of seccomp itself.
 _MACHINES = {'x86_64': (_X86, 317), 'aarch64': (_ARM, 277)}
 
 _libc = ctypes.CDLL(None, use_errno=True)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A short recording that does all that a writer does, and its outcome held against its input."""
+"""A short recording that uses every function of a writer, and its outcome against its input."""
 
 from __future__ import annotations
 

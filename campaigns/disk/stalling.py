@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A node at work on a disk that stalls: what its ticks and its bag make of it."""
+"""A node at work on a disk that stalls: the effect on its ticks and its bag."""
 
 from __future__ import annotations
 

@@ -16,8 +16,8 @@
 """
 A day of ticks without the waiting: the node's tick loop and its recorder, on simulated time.
 
-The ticks wait for the recorder's queue now and then, so that nothing is dropped: in a real run
-the disk has the time that is left out here.
+Now and then the ticks wait for the recorder's queue, so that nothing is dropped: in a real run
+the disk has the time between ticks, which is left out here.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a process holds: memory, open files, threads; is it flat? And what a bag counts."""
+"""Memory, open files and threads of a process, whether they stay flat, and counts of a bag."""
 
 from __future__ import annotations
 

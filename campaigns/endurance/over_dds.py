@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Minutes over DDS: a node and a crank source, each a process; what the node holds and says."""
+"""Minutes over DDS: a node and a crank source in two processes; the node's memory and counts."""
 
 from __future__ import annotations
 

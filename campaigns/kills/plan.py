@@ -14,11 +14,11 @@
 
 
 """
-What is recorded, how, when it is killed; and the marks by which the killer knows its progress.
+The plan of a recording and of its kill, and the marks that show the killer its progress.
 
-Marks lie in the memory of a file that both processes have mapped. A value that is stored there is
-visible at once and stays when the process is killed; a pipe would hold back what was not yet
-written to it. Each number is eight aligned bytes, stored by one instruction.
+Marks lie in the memory of a file that both processes have mapped. A value stored there is visible
+at once and survives the kill; a pipe would lose data not yet written to it. Each number is eight
+aligned bytes, stored by one instruction.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Kill recordings, and hold what is left against what was offered."""
+"""Kill recordings, and compare the remaining bag with the messages offered."""
 
 from __future__ import annotations
 

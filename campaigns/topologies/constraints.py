@@ -15,9 +15,9 @@
 """
 A linkage as equations: pins coincide, points lie on lines, blocks keep angles, inputs are driven.
 
-The unknowns are the angle and the place of the frame of every moving link. Nothing is eliminated,
-there are no dyads and no sides: the equations hold in every assembly. Many states are evaluated at
-once, in the longest floats that numpy has; linear systems are solved in doubles and refined.
+The unknowns are the angle and the position of the frame of every moving link. Nothing is
+eliminated, and there are no dyads or sides: the equations hold in every assembly. Many states are
+evaluated at once, in numpy's longest floats; linear systems are solved in doubles and refined.
 """
 
 from __future__ import annotations

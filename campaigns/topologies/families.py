@@ -17,8 +17,8 @@
 The families: every dyad on every kind of link, chains, inputs of all kinds, and class III.
 
 Some families have exact change points: with every dyad, in both orientations, on a crank and in
-chains. All their lengths are whole multiples of 1/64, so that sums and differences of them are
-exact and the dyad lies flat to the last bit. Frames are those of textbooks; the ground's may stand
+chains. All their lengths are whole multiples of 1/64, so that their sums and differences are exact
+and the dyad lies flat to the last bit. Frames are those of textbooks; the ground's may be
 elsewhere.
 """
 

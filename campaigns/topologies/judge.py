@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""One linkage, solved by the package, and what the equations and the geometry say of it."""
+"""One linkage, solved by the package, against the equations and the geometry."""
 
 from __future__ import annotations
 
