@@ -31,14 +31,14 @@ from bench.raw_node import keep_last, node, subscription, taker
 from linkage_ros.signals import stop_on_signals
 
 _PATIENCE = 5.0
-"""How long one waits for its first message, in [s]."""
+"""Time limit for the first message, in [s]."""
 
 _POLL = 0.005
 _DEPTH = 2000
 
 
 def main() -> None:
-    """Come and go until all have been there, or a signal."""
+    """Create subscribers one after the other, until all are done or a signal comes."""
     stop = stop_on_signals()
     count, listens = int(sys.argv[1]), float(sys.argv[2])
     del sys.argv[1:]
@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def _listen(listens: float) -> Iterator[int]:
-    """Yield the numbers that the publisher gave the messages of so many seconds."""
+    """Yield the publisher's numbers of the messages received in so many seconds."""
     with node('comer') as comer:
         take = taker(subscription(comer, 'joint_states', keep_last(_DEPTH)))
         until = monotonic() + _PATIENCE

@@ -45,12 +45,12 @@ _CRANK = 0.3, 6.0
 @dataclass(frozen=True, slots=True)
 class EmptyPlan:
     """
-    How much is measured.
+    Amount of the measurement.
 
     Attributes
     ----------
     rounds
-        How often each is measured, in turn.
+        Number of measurements of each, in turn.
     ticks
         Ticks in a round.
 
@@ -61,7 +61,7 @@ class EmptyPlan:
 
 
 def measure_empty_scene(plan: EmptyPlan) -> Table:
-    """Measure a tick of the empty scene against the same by hand, and return the table."""
+    """Measure a tick of the empty scene against the hand-written one, and return the table."""
     empty, moving = _pipeline(''), _pipeline('effects: {velocity: {}}')
     by_hand = _by_hand(0.04, 0.12, 0.08, 0.1)
     (look,) = empty.tick(BEGIN).looks

@@ -80,11 +80,11 @@ def main() -> None:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except RuntimeError:
-        # rclpy's own, where its signal handler takes the context away while a message is taken.
+        # Raised by rclpy if its signal handler shuts the context down while a message is taken.
         if rclpy.ok():
             raise
     finally:
-        # The handler of the signal shuts down at the same time.
+        # The signal handler shuts down at the same time.
         with suppress(RuntimeError):
             rclpy.try_shutdown()
 

@@ -40,7 +40,7 @@ from linkage_ros.signals import stop_on_signals
 _POLL = 0.005
 _DEPTH = 2000
 _CHECK = 325_000_000, 355_000_000
-"""A third of the ``healthy_check_timeout_ms`` of 1000, and a bit, in [ns]."""
+"""Slightly more than a third of the ``healthy_check_timeout_ms`` of 1000, in [ns]."""
 
 
 def main() -> None:

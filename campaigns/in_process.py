@@ -41,7 +41,7 @@ class _TooLongError(BaseException):
 
 class Ended(NamedTuple):
     """
-    How a command ended.
+    The end of a command.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Ended(NamedTuple):
     said
         What it said on standard error, or in place of it where and how it ended.
     shown
-        What it said on standard output.
+        Its standard output.
 
     """
 

@@ -44,7 +44,7 @@ from campaigns.accuracy.random_families import (
 import numpy as np
 
 A, B, C, D = ('crank', 'A', 'x'), ('coupler', 'B', 'x'), ('rocker', 'B', 'x'), ('ground', 'D', 'x')
-"""Where the four lengths of a four-bar stand."""
+"""Positions of the four lengths of a four-bar."""
 
 
 def four_bar(
@@ -490,7 +490,7 @@ def _two_dyads(rng: random.Random) -> tuple[Builder, list[str]]:
 
 
 class Hard(NamedTuple):
-    """Why it is hard, and how a linkage with its input angles is made."""
+    """Why a case is hard, and a function that makes a linkage with its input angles."""
 
     why: str
     make: Callable[[random.Random], Case]

@@ -167,7 +167,7 @@ class Motion:
             self._behind = True
 
     def at(self, spot: Spot) -> Any:
-        """Return where a point of a placed link is."""
+        """Return the position of a point of a placed link."""
         z = self.constants.points[spot]
         if spot.link == GROUND:
             return acb_series([z])
@@ -177,7 +177,7 @@ class Motion:
         return place
 
     def vector(self, link: str, start: str, end: str) -> Any:
-        """Return what leads from one point of a link to another, in its frame."""
+        """Return the vector from one point of a link to another, in its frame."""
         return self.constants.points[Spot(link, end)] - self.constants.points[Spot(link, start)]
 
     def place(self, link: str, unit: Any, point: str, where: Any) -> None:
@@ -276,7 +276,7 @@ def times(series: Array, change: Array) -> Array:
 
 
 def handed_on(mechanism: Mechanism) -> tuple[Handed, ...]:
-    """Return what dyads hand on to the ones behind them: pins, then angles and slides in order."""
+    """Return what dyads pass to later ones: pins, then angles and slides in order."""
     if len(mechanism.dyads) < 2:
         return ()
     links = [link for link in mechanism.links if link not in {GROUND, CRANK}]
@@ -309,7 +309,7 @@ class Tangent:
     Parameters
     ----------
     mechanism
-        What is varied.
+        The quantity that varies.
     constants
         Its numbers as balls.
     numbers
@@ -404,7 +404,7 @@ class Tangent:
         return self._values[next(self._inverse)][..., None]
 
     def vector(self, link: str, start: str, end: str) -> tuple[complex, Array]:
-        """Return what leads from one point of a link to another, and its change."""
+        """Return the vector from one point of a link to another, and its change."""
         points = self._constants.points
         value = complex(points[Spot(link, end)] - points[Spot(link, start)])
         return value, self._vectors[link, end] - self._vectors[link, start]

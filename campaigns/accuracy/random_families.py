@@ -63,7 +63,7 @@ class Builder:
         self._names = 0
 
     def mechanism(self) -> Mechanism:
-        """Return what has been built."""
+        """Return the built linkage."""
         return Mechanism(self._links, self._sliders, tuple(self._dyads), self._joints)
 
     def is_first(self) -> bool:
@@ -112,7 +112,7 @@ class Builder:
         self._links[link][point] = (z.real, z.imag)
 
     def where(self, spot: Spot) -> complex:
-        """Return where a point is in the pose."""
+        """Return the position of a point in the pose."""
         origin, unit = self._frames[spot.link]
         return origin + unit * complex(*self._links[spot.link][spot.point])
 

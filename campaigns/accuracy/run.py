@@ -98,14 +98,14 @@ def run(
     work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
 ) -> dict[str, Tally]:
     """
-    Do all parts and return what was found by family.
+    Run all parts and return the findings by family.
 
     Parameters
     ----------
     work
         The parts.
     jobs
-        How many processes; 1: this one.
+        Number of processes; 1 runs in this one.
     progress
         Called with the number of linkages of each part that is done.
 

@@ -57,7 +57,7 @@ _COMMANDS = {
 
 
 def attack(count: int, seed: int) -> tuple[dict[str, int], list[str]]:
-    """Send signals; return how often a command ended how, and what must not be, a line each."""
+    """Send signals; return the counts of each kind of end, and the violations, one line each."""
     tried: Counter[str] = Counter()
     findings = []
     for number in range(count):

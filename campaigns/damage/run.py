@@ -145,7 +145,7 @@ KINDS: dict[str, Callable[..., Path]] = {
 
 
 FAULT = 'FAULT: '
-"""What a verdict that must not be begins with."""
+"""Prefix of a verdict that is a violation."""
 
 
 def judge_reading(subject: Subject, *, allow_truncated: bool) -> str:

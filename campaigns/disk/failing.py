@@ -47,14 +47,14 @@ class Part(NamedTuple):
 
 class Tried(NamedTuple):
     """
-    One recording, and what became of it.
+    One recording, and its outcome.
 
     Attributes
     ----------
     setting
         Name of one of `SETTINGS`.
     injection
-        What failed; None for nothing.
+        The injected fault; None for none.
     calls
         All calls that it made.
     outcome

@@ -69,7 +69,7 @@ ATTACHMENTS = {
 
 
 class Phase(IntEnum):
-    """What the recording was doing; in the order in which it comes to it."""
+    """Phases of the recording, in order."""
 
     STARTING = 0
     MAKING = 1
@@ -95,7 +95,7 @@ class Plan(NamedTuple):
     aim
         The phase whose beginning the delay counts from; MAKING, the first, for any instant.
     time
-        The how manyth time that the phase comes, from 1 on.
+        Which occurrence of the phase, counted from 1.
     delay
         From there to the kill [s].
 
@@ -229,7 +229,7 @@ class Marks:
 
     @property
     def phase(self) -> Phase:
-        """Return what is being done, or was when the process was killed."""
+        """Return the current phase, or the one in which the process was killed."""
         return Phase(self._numbers[_STATE] % _PHASES)
 
     @property

@@ -142,7 +142,7 @@ class _Parts:
         return Passing(side, 'crank', (GROUND, line), at, turns)
 
     def topology(self, line: complex, at: tuple[bool, bool]) -> Topology | None:
-        """Return what has been built; ``at`` says whether it lies flat at 0 and at π from it."""
+        """Return the built linkage; ``at`` says whether it lies flat at 0 and at π from it."""
         moving = [link for link in self.links if link != GROUND]
         joints: dict[str, RevoluteJoint | SlideJoint] = {
             f'a_{link}': RevoluteJoint(GROUND, link) for link in moving

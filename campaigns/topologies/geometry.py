@@ -71,7 +71,7 @@ Group = DrivenLink | DrivenRRR | RRR | RRP | RPR | PRP | RPP
 
 
 class Margin(NamedTuple):
-    """What a dyad has to spare in [m], less than 0 where it misses, and the size of its terms."""
+    """Margin of a dyad in [m], negative if it does not close, and the size of its terms."""
 
     spare: Array
     grain: Array
@@ -180,7 +180,7 @@ class Geometry:
         return Complex(x) + Complex(1j) * Complex(y)
 
     def at(self, places: Places, spot: Spot) -> Array:
-        """Return where a point is."""
+        """Return the position of a point."""
         return places.origins[spot.link] + places.units[spot.link] * self.point(*spot)
 
     def _side(self, closing: str, places: Places) -> Any:

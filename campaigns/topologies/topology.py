@@ -317,7 +317,7 @@ class TopologyBuilder(Builder):
         return new
 
     def topology(self) -> Topology:
-        """Return what has been built; every angle to the ground and every slide is published."""
+        """Return the built linkage; every angle to the ground and every slide is published."""
         moving = [link for link in self._links if link != GROUND]
         joints: dict[str, RevoluteJoint | SlideJoint] = {
             f'a_{link}': RevoluteJoint(GROUND, link) for link in moving
