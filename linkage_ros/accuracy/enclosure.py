@@ -155,13 +155,13 @@ class _Equations:
         if not position.joints:
             raise ValueError(f'{inputs}: the linkage is {position.status.name.lower()}')
         angles, points = closure.link_angles(position), closure.points(position)
-        found = [arb(1)]
+        unknowns = [arb(1)]
         for link in self._links:
             name, arm = next(iter(self._linkage.links[link].items()))
             direction = rect(1.0, angles[link])
             place = (points[link, name] - complex(*arm) * direction) / self.scale
-            found += [arb(x) for x in (direction.real, direction.imag, place.real, place.imag)]
-        return found
+            unknowns += [arb(x) for x in (direction.real, direction.imag, place.real, place.imag)]
+        return unknowns
 
     def values(self, motion: Sequence[Sequence[Any]]) -> list[Any]:
         """Return the residuals, differentiated as often as the motion has derivatives."""

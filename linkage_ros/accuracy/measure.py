@@ -66,7 +66,7 @@ def measure_accuracy(
         If parts of the scene cannot be combined, or a package is not installed.
 
     """
-    found: list[Part] = []
+    measured: list[Part] = []
     for name in PARTS:
         if name not in parts:
             continue
@@ -75,6 +75,6 @@ def measure_accuracy(
         where = (folder,) if name == 'recording' else ()
         part = measure(scene, *where, quick, lambda share, name=name: progress(name, share))
         if part is not None:
-            found.append(part)
+            measured.append(part)
         progress(name, 1.0)
-    return Results(scene.name, describe_machine(), found)
+    return Results(scene.name, describe_machine(), measured)

@@ -106,9 +106,9 @@ class Cost(NamedTuple):
 
 def settings(periods: Sequence[float], packed_at: float, folder: Path) -> list[Storage | None]:
     """Return the settings to compare: no bag, the flush periods, the installed compressions."""
-    found: list[Storage | None] = [None, *(Storage(flush_period=each) for each in periods)]
+    compared: list[Storage | None] = [None, *(Storage(flush_period=each) for each in periods)]
     here = [name for name in COMPRESSIONS if name != NONE and _is_here(name, folder)]
-    return found + [Storage(flush_period=packed_at, compression=name) for name in here]
+    return compared + [Storage(flush_period=packed_at, compression=name) for name in here]
 
 
 def measure_costs(

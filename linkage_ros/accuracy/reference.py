@@ -164,13 +164,13 @@ class Reference:
         """Return the unknowns as doubles."""
         angles, points = self._closure.link_angles(position), self._closure.points(position)
         slides = self._closure.slide_values(position)
-        found = []
+        unknowns = []
         for link in self._links:
             name, arm = next(iter(self._linkage.links[link].items()))
             turn = complex(*arm) * rect(1.0, angles[link])
             place = points[link, name] - turn
-            found += [angles[link], place.real, place.imag]
-        return [*found, *(slides[name] for name in self._sliders)]
+            unknowns += [angles[link], place.real, place.imag]
+        return [*unknowns, *(slides[name] for name in self._sliders)]
 
 
 def _near(
@@ -297,27 +297,27 @@ class ExactEquations:
 
         """
         order = len(motion) - 1
-        found: list[Any] = []
+        residuals: list[Any] = []
         for name, one, other in self._pins:
             between = self._place(motion, one, self._points[one, name])
             between -= self._place(motion, other, self._points[other, name])
-            found += [between.real, between.imag]
+            residuals += [between.real, between.imag]
         for name, slider in self._linkage.sliders.items():
             carrier = slider.block or self._carriers[slider.point]
             between = self._on_line(motion, name)
             between -= self._place(motion, carrier, self._points[carrier, slider.point])
-            found += [between.real, between.imag]
+            residuals += [between.real, between.imag]
             if slider.block:
                 apart = self._turn(motion, slider.block) - self._turn(motion, slider.along)
-                found.append(apart if order else self._wrapped(apart - slider.angle))
+                residuals.append(apart if order else self._wrapped(apart - slider.angle))
         for k, joint in enumerate(self._linkage.inputs):
             if joint.slider:
-                found.append(motion[-1][self._sliders[joint.slider]] - given[order][k])
+                residuals.append(motion[-1][self._sliders[joint.slider]] - given[order][k])
                 continue
             apart = self._turn(motion, joint.child) - self._turn(motion, joint.parent)
             apart -= given[order][k]
-            found.append(apart if order else self._wrapped(apart))
-        return found
+            residuals.append(apart if order else self._wrapped(apart))
+        return residuals
 
     def rows(self, values: list[Any]) -> list[Row]:
         """Return the derivatives of the equations with respect to the unknowns."""

@@ -91,12 +91,12 @@ def measure_solving(scene: Scene, quick: bool, progress: Progress) -> Part:
     """
     member = scene.members[0]
     sets = pose_sets(member.name or scene.name, member.linkage, 24 if quick else 128)
-    found: list[Measured] = []
+    results: list[Measured] = []
     for number, poses in enumerate(sets):
         progress(0.3 * number / len(sets))
-        found += judge(poses, quick)
-    take_times(found, 1.0 if quick else 40.0, lambda share: progress(0.3 + 0.7 * share))
-    return part_of(found, quick)
+        results += judge(poses, quick)
+    take_times(results, 1.0 if quick else 40.0, lambda share: progress(0.3 + 0.7 * share))
+    return part_of(results, quick)
 
 
 def judge(poses: Poses, quick: bool) -> list[Measured]:
@@ -112,17 +112,17 @@ def judge(poses: Poses, quick: bool) -> list[Measured]:
     truths = true_states(poses)
     confirmed(poses, truths)
     methods = methods_for(poses.linkage, poses.key, quick)
-    found = [_judged(method, poses, truths) for method in methods]
+    results = [_judged(method, poses, truths) for method in methods]
     if poses.key == 'easy':
-        found += _integrated(poses, quick)
-    return found
+        results += _integrated(poses, quick)
+    return results
 
 
 def take_times(
-    found: Sequence[Measured], seconds: float, progress: Progress = lambda _: None
+    results: Sequence[Measured], seconds: float, progress: Progress = lambda _: None
 ) -> None:
     """Time all judged methods in turn, for about a number of seconds."""
-    jobs = [(one, what, job) for one in found for what, job in _contenders(one)]
+    jobs = [(one, what, job) for one in results for what, job in _contenders(one)]
     times = in_turn([job for _, _, job in jobs], seconds, progress)
     for (one, what, _), time in zip(jobs, times, strict=True):
         one.times[what] = time

@@ -275,26 +275,26 @@ def measure_ticking(scene: Scene, quick: bool, progress: Progress) -> Part | Non
     rates = QUICK_RATES if quick else RATES
     seconds = 0.6 if quick else 2.0
     closure = Closure(linkage)
-    found: list[Used] = []
+    results: list[Used] = []
     with tempfile.TemporaryDirectory(prefix='linkage_ticking_') as folder:
         for number, rate in enumerate(rates):
             progress(number / len(rates))
-            found += use_states(Path(folder), linkage, rate, seconds)
+            results += use_states(Path(folder), linkage, rate, seconds)
     progress(1.0)
     unit = _UNIT[any(closure.turning)]
     return Part(
         'ticking',
         'What the rate of ticks buys',
-        _text(closure, seconds, found, unit),
+        _text(closure, seconds, results, unit),
         [
-            _diagram('ticking_rate', 'The faster the ticks, the nearer the state in use', found,
+            _diagram('ticking_rate', 'The faster the ticks, the nearer the state in use', results,
                      unit, Axis('ticks a second', 'Hz'), lambda used: used.rate),
-            _diagram('ticking_cpu', 'What that costs the processor', found, unit,
+            _diagram('ticking_cpu', 'What that costs the processor', results, unit,
                      Axis('processor time of the node', '% of a core'),
                      lambda used: 100.0 * used.cpu),
         ],
-        [_table(found, unit)],
-        list(_advice(found, unit)),
+        [_table(results, unit)],
+        list(_advice(results, unit)),
     )  # fmt: skip
 
 
@@ -306,16 +306,16 @@ def rms(values: Sequence[float]) -> float:
 def _diagram(
     key: str,
     title: str,
-    found: Sequence[Used],
+    results: Sequence[Used],
     unit: str,
     axis: Axis,
     place: Callable[[Used], float],
 ) -> Diagram:
     curves = []
-    for motion in dict.fromkeys(used.motion for used in found):
+    for motion in dict.fromkeys(used.motion for used in results):
         for way in (HELD, CARRIED):
             chosen = [
-                (used, spread_of(used.errors[way])) for used in found if used.motion == motion
+                (used, spread_of(used.errors[way])) for used in results if used.motion == motion
             ]
             points = [
                 Point(place(used), spread.middle, y_spread=spread, setting=f'{used.rate:g} Hz')
@@ -325,7 +325,7 @@ def _diagram(
     return Diagram(key, title, axis, Axis('error of a joint when used', unit), curves)
 
 
-def _table(found: Sequence[Used], unit: str) -> Table:
+def _table(results: Sequence[Used], unit: str) -> Table:
     return Table(
         'ticking',
         'The state that a subscriber has, when it uses it',
@@ -354,12 +354,12 @@ def _table(found: Sequence[Used], unit: str) -> Table:
                 len(used.age),
                 used.unused,
             )
-            for used in found
+            for used in results
         ],
     )
 
 
-def _text(closure: Closure, seconds: float, found: Sequence[Used], unit: str) -> list[str]:
+def _text(closure: Closure, seconds: float, results: Sequence[Used], unit: str) -> list[str]:
     greatest = motions_of(closure, seconds).greatest
     of = {True: 'rad', False: 'm'}[not closure.linkage.inputs[0].slider]
     moves = '; '.join(
@@ -374,12 +374,12 @@ def _text(closure: Closure, seconds: float, found: Sequence[Used], unit: str) ->
         'the worst joint against the linkage solved at the exact crank of that instant. So it has '
         'all in it: the crank sample on its way, the wait for the tick, the tick, the way back.'
     )
-    slow, fast = found[0].rate, found[-1].rate
+    slow, fast = results[0].rate, results[-1].rate
     said = []
     for motion in greatest:
         ends = {
             used.rate: used
-            for used in found
+            for used in results
             if used.motion == motion and used.rate in (slow, fast)
         }
         if len(ends) == 2:
@@ -400,10 +400,10 @@ def _gain(motion: str, slow: Used, fast: Used, unit: str) -> str:
     )
 
 
-def _advice(found: Sequence[Used], unit: str) -> Iterator[str]:
+def _advice(results: Sequence[Used], unit: str) -> Iterator[str]:
     """Yield the lowest tick rate that reaches each of several accuracies, in both motions."""
     for wanted in _WANTED:
-        held, carried = (_slowest(found, way, wanted) for way in (HELD, CARRIED))
+        held, carried = (_slowest(results, way, wanted) for way in (HELD, CARRIED))
         words = f'For {wanted:g} {unit} (rms) when used: '
         if carried is None and held is None:
             yield f'{words}none of these rates will do.'
@@ -414,6 +414,6 @@ def _advice(found: Sequence[Used], unit: str) -> Iterator[str]:
             yield f'{words}{held:g} ticks a second.'
 
 
-def _slowest(found: Sequence[Used], way: str, wanted: float) -> float | None:
-    poor = {used.rate for used in found if rms(used.errors[way]) > wanted}
-    return min((used.rate for used in found if used.rate not in poor), default=None)
+def _slowest(results: Sequence[Used], way: str, wanted: float) -> float | None:
+    poor = {used.rate for used in results if rms(used.errors[way]) > wanted}
+    return min((used.rate for used in results if used.rate not in poor), default=None)

@@ -208,10 +208,10 @@ class BagReading:
 def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, Any]:
     """Return the description of any bag, recorded by this package or not."""
     begin, end = contents.begin, contents.end
-    said: Mapping[str, Any] = information_of(bag.path) if bag.path.is_dir() else {}
+    metadata: Mapping[str, Any] = information_of(bag.path) if bag.path.is_dir() else {}
     within = next((layout.rosbag2 for layout in layouts if layout.rosbag2), None)
-    if not said and within is not None:
-        said = serialized_metadata(within)
+    if not metadata and within is not None:
+        metadata = serialized_metadata(within)
     run = run_said(bag)
     # Only bags that have metadata left out say so.
     let_go = counts_in(bag.custom, 'let_go')
@@ -254,8 +254,8 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
             'linkage_ros': _text(run.get('linkage_ros')),
             'python': _text(run.get('python')),
             'machine': _text(run.get('machine')),
-            'ros_distro': _text(said.get('ros_distro')),
-            'rosbag2_metadata': _whole(said.get('version')),
+            'ros_distro': _text(metadata.get('ros_distro')),
+            'rosbag2_metadata': _whole(metadata.get('version')),
             'written_by': ', '.join(dict.fromkeys(layout.library for layout in layouts)) or None,
         },
     }

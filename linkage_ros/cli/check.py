@@ -195,17 +195,19 @@ def _is_reached(way: InputSweep, value: float) -> bool:
 
 
 def _limits_text(limits: Limits, turning: bool) -> str:
-    said = []
+    texts = []
     if limits.bounded:
         low, high = (
             value_text(end, turning) if isfinite(end) else '' for end in (limits.low, limits.high)
         )
-        said.append(f'{low} to {high}' if low and high else f'from {low}' if low else f'to {high}')
+        texts.append(
+            f'{low} to {high}' if low and high else f'from {low}' if low else f'to {high}'
+        )
     if isfinite(limits.velocity):
-        said.append(f'at most {limits.velocity:.6g} {"rad" if turning else "m"}/s')
+        texts.append(f'at most {limits.velocity:.6g} {"rad" if turning else "m"}/s')
     if isfinite(limits.effort):
-        said.append(f'at most {limits.effort:.6g} {"N·m" if turning else "N"}')
-    return ', '.join(said)
+        texts.append(f'at most {limits.effort:.6g} {"N·m" if turning else "N"}')
+    return ', '.join(texts)
 
 
 def _range_text(interval: InputRange) -> str:
@@ -281,8 +283,8 @@ def _links(closure: Closure, number: int) -> str:
     return describe_group(closure, number)[1]
 
 
-def _extremes(closure: Closure, number: int, found: MinMaxCurve, turning: bool) -> tuple[str, ...]:
-    lowest, highest = found
+def _extremes(closure: Closure, number: int, curve: MinMaxCurve, turning: bool) -> tuple[str, ...]:
+    lowest, highest = curve
     return (
         str(number + 1),
         _links(closure, number),
@@ -304,6 +306,6 @@ def _conditioning(
 def _places(extreme: Extreme, turning: bool) -> str:
     if not extreme.at:
         return 'everywhere'
-    said = [angle_text(at, 2) if turning else f'{at + 0.0:.6g} m' for at in extreme.at[:_PLACES]]
+    places = [angle_text(at, 2) if turning else f'{at + 0.0:.6g} m' for at in extreme.at[:_PLACES]]
     more = len(extreme.at) - _PLACES
-    return ', '.join(said) + (f' and {more} more' if more > 0 else '')
+    return ', '.join(places) + (f' and {more} more' if more > 0 else '')

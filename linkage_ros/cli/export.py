@@ -131,7 +131,7 @@ class _Tick(NamedTuple):
     messages: dict[str, Values]
 
 
-def survey(source: Source, order: Sequence[str], told: ProgressCallback) -> Found:
+def survey(source: Source, order: Sequence[str], report_progress: ProgressCallback) -> Found:
     """
     Collect the columns of the rows (first pass).
 
@@ -141,7 +141,7 @@ def survey(source: Source, order: Sequence[str], told: ProgressCallback) -> Foun
         The origin of the rows.
     order
         Joints that come first, in this order; others follow in the order of the bag.
-    told
+    report_progress
         Called now and then with the number of bytes read; an exception from it ends the pass.
 
     Raises
@@ -150,25 +150,25 @@ def survey(source: Source, order: Sequence[str], told: ProgressCallback) -> Foun
         If the bag is damaged, or new joint names keep coming.
 
     """
-    found: dict[Key, None] = {}
+    columns: dict[Key, None] = {}
     known: set[tuple[Key, ...]] = set()
     counts: Counter[str] = Counter()
     left_out: Counter[tuple[str, str]] = Counter()
     rows = 0
-    for tick in _ticks(source, left_out, told):
+    for tick in _ticks(source, left_out, report_progress):
         rows += 1
         for topic, values in tick.messages.items():
             counts[topic] += 1
             if values.keys not in known:
                 known.add(values.keys)
-                found |= dict.fromkeys(values.keys)
-                if max(len(found), len(known)) > _MOST_COLUMNS:
+                columns |= dict.fromkeys(values.keys)
+                if max(len(columns), len(known)) > _MOST_COLUMNS:
                     raise BagError(
                         source.bag.path,
                         f'its joints take more than {_MOST_COLUMNS} columns',
                         'name one topic with --topic',
                     )
-    return Found(_sorted(found, order), rows, counts, left_out)
+    return Found(_sorted(columns, order), rows, counts, left_out)
 
 
 def _sorted(keys: Iterable[Key], order: Sequence[str]) -> tuple[Key, ...]:
@@ -185,13 +185,15 @@ def _sorted(keys: Iterable[Key], order: Sequence[str]) -> tuple[Key, ...]:
     return tuple(sorted(keys, key=rank))
 
 
-def rows_of(source: Source, keys: Sequence[Key], told: ProgressCallback) -> Iterator[Row]:
+def rows_of(
+    source: Source, keys: Sequence[Key], report_progress: ProgressCallback
+) -> Iterator[Row]:
     """Yield the rows of a bag: the first four columns, and the numbers under these keys."""
     places = {key: 4 + number for number, key in enumerate(keys)}
     placed: dict[tuple[Key, ...], tuple[int, ...]] = {}
     blank: Row = [None] * len(keys)
     begin: int | None = None
-    for published, logged, messages in _ticks(source, Counter(), told):
+    for published, logged, messages in _ticks(source, Counter(), report_progress):
         stamp = next(iter(messages.values())).stamp
         if begin is None:
             begin = stamp
@@ -208,7 +210,7 @@ def rows_of(source: Source, keys: Sequence[Key], told: ProgressCallback) -> Iter
 
 
 def _ticks(
-    source: Source, left_out: Counter[tuple[str, str]], told: ProgressCallback
+    source: Source, left_out: Counter[tuple[str, str]], report_progress: ProgressCallback
 ) -> Iterator[_Tick]:
     """Yield the ticks of a bag; count the messages that are left out."""
     readers = {
@@ -220,7 +222,7 @@ def _ticks(
     for number, (topic, logged, published, data) in enumerate(source.bag.messages(), 1):
         read += len(data)
         if not number % TOLD_EVERY:
-            told(read)
+            report_progress(read)
         reader = readers.get(topic)
         values = reader.read(data) if reader is not None else None
         if isinstance(values, str):
@@ -255,15 +257,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, stop: Event) -> int:
     """Write the file; return 1 if a signal stopped it."""
     try:
-        found = export(arguments.bag, arguments.output, arguments.topic, stop)
+        result = export(arguments.bag, arguments.output, arguments.topic, stop)
     except StoppedError:
         print('linkage export: stopped; nothing was written', file=sys.stderr)
         return 1
-    for (topic, reason), count in found.left_out.items():
+    for (topic, reason), count in result.left_out.items():
         line = f'linkage export: {topic}: {count} messages left out: {reason}'
         print(clean(line), file=sys.stderr)
-    of = ', '.join(f'{count} of {clean(topic)}' for topic, count in found.counts.items())
-    print(f'{arguments.output}: {found.rows} rows, {4 + len(found.keys)} columns ({of})')
+    of = ', '.join(f'{count} of {clean(topic)}' for topic, count in result.counts.items())
+    print(f'{arguments.output}: {result.rows} rows, {4 + len(result.keys)} columns ({of})')
     return 0
 
 
@@ -368,11 +370,13 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
 
 
 def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
-    found = [name for name, kind in readable.items() if kind == JOINT_STATE]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        raise BagError(bag.path, f'holds joint states on {listed(found)}', 'name one with --topic')
+    topics = [name for name, kind in readable.items() if kind == JOINT_STATE]
+    if len(topics) == 1:
+        return topics[0]
+    if topics:
+        raise BagError(
+            bag.path, f'holds joint states on {listed(topics)}', 'name one with --topic'
+        )
     raise BagError(
         bag.path,
         f'holds no topic of {JOINT_STATE}',
@@ -380,8 +384,8 @@ def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
     )
 
 
-def _nothing(source: Source, found: Found) -> BagError:
-    reasons = Counter(dict(found.left_out)).most_common(1)
+def _nothing(source: Source, result: Found) -> BagError:
+    reasons = Counter(dict(result.left_out)).most_common(1)
     why = f' ({reasons[0][1]} left out: {reasons[0][0][1]})' if reasons else ''
     return BagError(
         source.bag.path,
@@ -394,7 +398,7 @@ def _head(key: Key, turning: Mapping[str, bool]) -> str:
     """Return the heading of a column: joint, quantity and unit."""
     name, quantity = key
     angular, linear = UNITS[quantity]
-    told = name if quantity == POSITION else f'{name} {quantity}'
+    heading = name if quantity == POSITION else f'{name} {quantity}'
     if name in turning:
-        return f'{told} [{angular if turning[name] else linear}]'
-    return f'{told} [{angular}]' if angular == linear else f'{told} [{angular} or {linear}]'
+        return f'{heading} [{angular if turning[name] else linear}]'
+    return f'{heading} [{angular}]' if angular == linear else f'{heading} [{angular} or {linear}]'

@@ -112,19 +112,19 @@ def proof_account(
         Versions of the packages that wrote the ``bag``, and of those installed ``here``.
 
     """
-    found = proof.comparison
+    comparison = proof.comparison
     return {
         'verdict': proof.verdict,
         'ticks': proof.ticks,
-        'compared_ticks': found.ticks,
-        'different_ticks': found.differing,
-        'withheld_ticks': found.withheld,
+        'compared_ticks': comparison.ticks,
+        'different_ticks': comparison.differing,
+        'withheld_ticks': comparison.withheld,
         'untold_ticks': proof.untold,
         'beginning_missing': beginning_text(proof) if proof.beginning else None,
-        'topics': [topic_account(topic) for topic in found.topics],
-        'first_difference': first_account(found.first or proof.first_untold, turning),
-        'last_different_tick': at_account(found.last) if found.last else None,
-        'greatest': greatest(found, turning),
+        'topics': [topic_account(topic) for topic in comparison.topics],
+        'first_difference': first_account(comparison.first or proof.first_untold, turning),
+        'last_different_tick': at_account(comparison.last) if comparison.last else None,
+        'greatest': greatest(comparison, turning),
         'versions': {name: dict(of) for name, of in versions.items()},
     }
 
@@ -164,10 +164,10 @@ def at_account(at: At) -> dict[str, Any]:
     return {'tick': at.tick, 'time_ns': at.time}
 
 
-def greatest(found: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
+def greatest(comparison: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
     """Return the greatest difference of each quantity and unit that differs."""
     rows: dict[tuple[str, str], dict[str, Any]] = {}
-    for topic in found.topics:
+    for topic in comparison.topics:
         for (joint, quantity), deviation in topic.deviations.items():
             if not deviation.differing:
                 continue
@@ -185,10 +185,10 @@ def greatest(found: Comparison, turning: Mapping[str, bool]) -> list[dict[str, A
     ]
 
 
-def joints_account(found: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
+def joints_account(comparison: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
     """Return the differences of each number that both runs have, joint by joint."""
     rows: dict[tuple[str, str], dict[str, Any]] = {}
-    for topic in found.topics:
+    for topic in comparison.topics:
         for key, deviation in topic.deviations.items():
             joint, quantity = key
             # ~/motion repeats the positions and velocities of the joint states.
@@ -276,9 +276,9 @@ def versions_text(versions: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
 
 def _versions(said: Mapping[str, str]) -> str:
     words = {'linkage_ros': 'linkage_ros', 'python': 'Python', 'machine': 'on'}
-    told = [f'{word} {clean(said[key])}' for key, word in words.items() if key in said]
-    told += [f'{clean(key)} ({clean(said[key])})' for key in said if key not in words]
-    return ', '.join(told) or 'versions that it does not tell'
+    texts = [f'{word} {clean(said[key])}' for key, word in words.items() if key in said]
+    texts += [f'{clean(key)} ({clean(said[key])})' for key in said if key not in words]
+    return ', '.join(texts) or 'versions that it does not tell'
 
 
 def _place(where: Mapping[str, Any], begin: int) -> str:

@@ -135,14 +135,14 @@ def _of_pairs(
     return [_fitted(crank, rocker, ground, free)]
 
 
-def _worth(found: ThreePairs) -> list[tuple[str, str]]:
-    k1, k2, k3 = found.k
-    slopes = abs(found.gradient).max(-1) / abs(found.lengths) * radians(_SHIFT)
-    digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, found.digits, strict=True)]
+def _worth(pairs: ThreePairs) -> list[tuple[str, str]]:
+    k1, k2, k3 = pairs.k
+    slopes = abs(pairs.gradient).max(-1) / abs(pairs.lengths) * radians(_SHIFT)
+    digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, pairs.digits, strict=True)]
     moves = [f'{link} {value:.2g}' for link, value in zip(_LINKS, 100.0 * slopes, strict=True)]
     return [
         ('k1, k2, k3', f'{k1:.12g}, {k2:.12g}, {k3:.12g}'),
-        ('condition', f'{found.condition:.4g}'),
+        ('condition', f'{pairs.condition:.4g}'),
         ('digits to trust', f'{", ".join(digits)}, of lengths worked out from these angles'),
         (f'{_SHIFT}° on one angle', f'moves {" %, ".join(moves)} %, at most'),
     ]

@@ -113,8 +113,8 @@ def plotting_library() -> str:
 
 def _joined(name: str, parts: Parts) -> str:
     """Return the file that all pages share, followed by those of this page."""
-    found = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
-    return '\n'.join(file.read_text('utf-8') for file in found)
+    texts = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
+    return '\n'.join(file.read_text('utf-8') for file in texts)
 
 
 def _json(data: Any) -> str:

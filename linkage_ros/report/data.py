@@ -236,7 +236,7 @@ def page_data(run: Run, wrapped: bool) -> dict[str, Any]:
 
 def lanes(run: Run) -> dict[str, Lane]:
     """Return the lanes that have events, in the order of the page."""
-    found = dict(run.lanes)
+    shown = dict(run.lanes)
     silent = [each.silent for each in run.linkages]
     if silent:
         # Each linkage has its own silences; one lane shows those of all.
@@ -249,8 +249,8 @@ def lanes(run: Run) -> dict[str, Lane]:
         for span in sorted(spans):
             merged.add(*span)
         merged.count = sum(lane.count for lane in silent)
-        found['silent'] = merged
-    return {key: found[key] for key in LANES if key in found and found[key].count}
+        shown['silent'] = merged
+    return {key: shown[key] for key in LANES if key in shown and shown[key].count}
 
 
 def plots(run: Run) -> list[Plot]:
@@ -283,16 +283,16 @@ def plots(run: Run) -> list[Plot]:
 
 
 def _curves(curves: Curves) -> dict[str, Any]:
-    found = curves.intervals
-    single = found.rows == 1
+    intervals = curves.intervals
+    single = intervals.rows == 1
     return {
         'title': curves.title,
-        'rows': found.rows,
+        'rows': intervals.rows,
         'of': curves.rows,
-        'begins': _seconds(found.begins),
-        'ends': None if single else _seconds(found.ends),
-        'first': [_packed(column, '<f8') for column in found.first.T],
-        'second': None if single else [_packed(column, '<f8') for column in found.second.T],
+        'begins': _seconds(intervals.begins),
+        'ends': None if single else _seconds(intervals.ends),
+        'first': [_packed(column, '<f8') for column in intervals.first.T],
+        'second': None if single else [_packed(column, '<f8') for column in intervals.second.T],
     }
 
 
@@ -345,18 +345,18 @@ def _spans(lane: Lane) -> list[list[Any]]:
     return [[s.begin / 1e9, s.end / 1e9, s.count, s.text] for s in lane.in_order]
 
 
-def _histogram(found: Histogram) -> dict[str, Any]:
+def _histogram(histogram: Histogram) -> dict[str, Any]:
     """Return the bins that are not empty, and their edges in [s]."""
-    counts = found.counts
+    counts = histogram.counts
     (places,) = np.nonzero(counts)
     first, end = int(places[0]), int(places[-1]) + 1
     last_edge = end + 1
-    edges = [0.0, *(edge / 1e9 for edge in EDGES), max(found.greatest, EDGES[-1]) / 1e9]
+    edges = [0.0, *(edge / 1e9 for edge in EDGES), max(histogram.greatest, EDGES[-1]) / 1e9]
     return {
         'counts': counts[first:end].tolist(),
         'edges': edges[first:last_edge],
-        'percentiles': {f'p{p}': found.percentile(p) / 1e9 for p in (50, 90, 99)},
-        'greatest': found.greatest / 1e9,
+        'percentiles': {f'p{p}': histogram.percentile(p) / 1e9 for p in (50, 90, 99)},
+        'greatest': histogram.greatest / 1e9,
     }
 
 

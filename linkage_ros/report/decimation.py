@@ -192,8 +192,8 @@ class MinMaxCurve:
         if times.shape[1] == 1:
             self._first[start:end] = self._second[start:end] = values
         else:
-            found = _least_and_greatest(values.reshape(count, -1, values.shape[1]))
-            self._first[start:end], self._second[start:end] = found
+            extremes = _least_and_greatest(values.reshape(count, -1, values.shape[1]))
+            self._first[start:end], self._second[start:end] = extremes
         self._count = end
 
     def _merge(self) -> None:
@@ -203,8 +203,8 @@ class MinMaxCurve:
         self._begins[:half] = self._begins[0:n:2]
         self._ends[:half] = self._ends[1:n:2]
         both = np.stack([self._first[:n], self._second[:n]], axis=1)
-        found = _least_and_greatest(both.reshape(half, 4, -1))
-        self._first[:half], self._second[:half] = found
+        extremes = _least_and_greatest(both.reshape(half, 4, -1))
+        self._first[:half], self._second[:half] = extremes
         self._count = half
         self._rows *= 2
 

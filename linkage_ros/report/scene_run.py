@@ -55,8 +55,8 @@ def find_open_loop_spans(linkage: LinkageRun, times: Times, angles: Numbers, lan
     if not len(times):
         return
     status = linkage.closure.solve(*angles.T, derivatives=0).status
-    found = status >= CODES[Status.OPEN]
-    for time, given in zip(times[found].tolist(), angles[found].tolist(), strict=True):
+    is_open = status >= CODES[Status.OPEN]
+    for time, given in zip(times[is_open].tolist(), angles[is_open].tolist(), strict=True):
         text = ''
         # The first of the joined events gives the text.
         if not lane.spans or time - lane.spans[-1].end > lane.near:
@@ -223,15 +223,15 @@ class SceneRun:
 
     def _look_at_samples(self, samples: Rows, good: Flags, states: Rows, read: JointBlock) -> None:
         """Add the crank's curve, and find samples at which a loop does not close."""
-        told = self._samples.read(samples.data)
-        self._curves.add_samples(samples.passed[told.good], told.numbers[told.good])
+        decoded = self._samples.read(samples.data)
+        self._curves.add_samples(samples.passed[decoded.good], decoded.numbers[decoded.good])
         if self._stale.limit:
             self._stale.add(samples.passed[good])
         for number, crank in self._cranks.items():
-            own = crank.take(samples.numbers, told.stamps, good, told.numbers)
+            own = crank.take(samples.numbers, decoded.stamps, good, decoded.numbers)
             there = read.good & self._is_there(read.numbers, number)
             alone = own & ~np.isin(samples.logged, states.logged[there])
-            at = samples.logged if self._rate else told.stamps
+            at = samples.logged if self._rate else decoded.stamps
             angles, _ = crank.at(samples.numbers[alone] + 1, at[alone])
             find_open_loop_spans(
                 self._linkages[number], samples.passed[alone], angles, self._lanes['open']
@@ -261,8 +261,8 @@ class SceneRun:
 
     def _is_there(self, numbers: Numbers, linkage: int) -> Flags:
         """Return which joint states contain a linkage."""
-        found: Flags = ~np.isnan(numbers[:, 0, self._first_joints[linkage]])
-        return found
+        present: Flags = ~np.isnan(numbers[:, 0, self._first_joints[linkage]])
+        return present
 
 
 _NEVER = 2**62

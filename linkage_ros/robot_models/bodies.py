@@ -85,7 +85,7 @@ class Body(NamedTuple):
     solids: tuple[Solid, ...]
 
 
-def bodies(closure: Closure, found: Mapping[str, Span], first_layer: int = 0) -> dict[str, Body]:
+def bodies(closure: Closure, ranges: Mapping[str, Span], first_layer: int = 0) -> dict[str, Body]:
     """
     Return the shapes of each link.
 
@@ -93,7 +93,7 @@ def bodies(closure: Closure, found: Mapping[str, Span], first_layer: int = 0) ->
     ----------
     closure
         The linkage.
-    found
+    ranges
         Range of motion of its joints.
     first_layer
         Number of layers that other linkages occupy below.
@@ -108,7 +108,7 @@ def bodies(closure: Closure, found: Mapping[str, Span], first_layer: int = 0) ->
         layer = moving.index(link) + 1 if link != GROUND else 0
         z = 1.2 * height * (first_layer + layer)
         colour = _COLOURS[(layer - 1) % len(_COLOURS)] if layer else _GREY
-        solids = [*_bars(closure, link, z, width), *_rails(closure, link, found, z, width)]
+        solids = [*_bars(closure, link, z, width), *_rails(closure, link, ranges, z, width)]
         drawn[link] = Body(colour, tuple(solids))
     return drawn
 
@@ -166,13 +166,13 @@ def _turned(closure: Closure, link: str) -> float:
 
 
 def _rails(
-    closure: Closure, link: str, found: Mapping[str, Span], z: float, width: float
+    closure: Closure, link: str, ranges: Mapping[str, Span], z: float, width: float
 ) -> list[Solid]:
     rails = []
     for name, slider in closure.linkage.sliders.items():
         if slider.along != link:
             continue
-        low, high = travel(closure, name, found)
+        low, high = travel(closure, name, ranges)
         if link != GROUND:
             low, high = min(low, 0.0), max(high, 0.0)  # the rail must reach the link's bars
         unit = complex(*slider.direction) / abs(complex(*slider.direction))
@@ -185,10 +185,10 @@ def _rails(
     return rails
 
 
-def travel(closure: Closure, slider: str, found: Mapping[str, Span]) -> tuple[float, float]:
+def travel(closure: Closure, slider: str, ranges: Mapping[str, Span]) -> tuple[float, float]:
     """Return the range of a slider's point along its line, in [m], as far as it is known."""
     for name, joint in named_joints(closure.linkage).items():
         if isinstance(joint, SlideJoint) and joint.slider == slider:
-            return found[name].lowest, found[name].highest
+            return ranges[name].lowest, ranges[name].highest
     far = 0.5 * reach(closure)
     return -far, far

@@ -94,19 +94,19 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
     if len(keys) > _MANY:
         reason = f'{len(keys)} dyads are too many to try all their sides'
         raise DefinitionError('assembly', reason, 'import it in parts')
-    found = []
+    candidates = []
     choices = [
         ('ahead', 'behind') if key in linkage.sliders else ('left', 'right') for key in keys
     ]
     for sides in product(*choices):
         assembly: dict[str, Side] = dict(zip(keys, sides, strict=True))  # type: ignore[arg-type]
         closure = Closure(replace(linkage, assembly=assembly))
-        found.append((_off(closure, inputs, poses), closure))
-    found.sort(key=lambda each: each[0])
-    least, closure = found[0]
+        candidates.append((_off(closure, inputs, poses), closure))
+    candidates.sort(key=lambda each: each[0])
+    least, closure = candidates[0]
     if least > _FOUND:
         raise DefinitionError('assembly', f'no way to close it leads to the pose {where}', _REMEDY)
-    if len(found) > 1 and found[1][0] < least + _SAME:
+    if len(candidates) > 1 and candidates[1][0] < least + _SAME:
         raise DefinitionError('assembly', f'two ways to close it meet {where}', _REMEDY)
     if closure.linkage.pose is None and not _near(usual_inputs(closure), inputs):
         return replace(closure.linkage, pose=Pose(inputs, {}))

@@ -270,14 +270,14 @@ class Bodies:
         else:
             return 0.0  # the input's range is narrower than the step: it hardly moves
         before, after = closure.points(self._position), closure.points(there)
-        found = 0.0
+        inertia_sum = 0.0
         for link, mass in self._masses.items():
             squares = [
                 abs((after[link, point] - before[link, point]) / step) ** 2
                 for point in closure.structure.links[link]
             ]
-            found += mass * sum(squares) / len(squares)
-        return found
+            inertia_sum += mass * sum(squares) / len(squares)
+        return inertia_sum
 
     def _hang_on(self, parent: str) -> None:
         """Write the children of a link, depth first, in the order of the engine's joints."""
@@ -480,9 +480,9 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
 
 
 def _gravity(parts: Sequence[Part]) -> tuple[float, float]:
-    found = [part.loads.gravity if part.loads else (0.0, 0.0) for part in parts]
-    for count, gravity in enumerate(found):
-        if gravity != found[0]:
+    gravities = [part.loads.gravity if part.loads else (0.0, 0.0) for part in parts]
+    for count, gravity in enumerate(gravities):
+        if gravity != gravities[0]:
             raise PartError(
                 count,
                 'loads.gravity',
@@ -490,7 +490,7 @@ def _gravity(parts: Sequence[Part]) -> tuple[float, float]:
                 'give all linkages one gravity: MuJoCo has one',
                 of_linkage=False,
             )
-    return found[0]
+    return gravities[0]
 
 
 def _close(sections: Mapping[str, ET.Element], part: Part, bodies: Bodies) -> None:

@@ -116,20 +116,20 @@ class Orientations:
 
     def _from(self, link: str) -> dict[str, tuple[Turn, ...]]:
         """Search from a link, fewest joints first; a constant does not count as a joint."""
-        found: dict[str, tuple[Turn, ...]] = {}
+        paths: dict[str, tuple[Turn, ...]] = {}
         ahead: list[tuple[int, int, str, tuple[Turn, ...]]] = [(0, 0, link, ())]
         count = 0
         while ahead:
             joints, _, reached, turns = heappop(ahead)
-            if reached in found:
+            if reached in paths:
                 continue
-            found[reached] = turns
+            paths[reached] = turns
             for other, turn in self._next[reached]:
-                if other not in found:
+                if other not in paths:
                     count += 1
                     more = joints + bool(turn.joint)
                     heappush(ahead, (more, count, other, (*turns, turn)))
-        return found
+        return paths
 
 
 _SAMPLES = 2880
@@ -176,14 +176,14 @@ def spans(closure: Closure) -> dict[str, Span]:
     (start,) = usual_inputs(closure)
     interval = InputSweep(closure).range_about(start)
     assert interval is not None, 'what is usual lies in a range'
-    found = dict(zip(closure.linkage.joints, _published(closure, start, interval), strict=True))
+    ranges = dict(zip(closure.linkage.joints, _published(closure, start, interval), strict=True))
     (given,) = closure.linkage.inputs
     margin = _MARGIN * (1.0 if interval.turning else reach(closure))
     own = Span(interval.lowest - margin, interval.highest + margin)
     if interval.whole or (interval.turning and own.passes_pi):
         own = _ROUND
-    found.setdefault(given.joint, own)
-    return {name: found[name] for name in joints}
+    ranges.setdefault(given.joint, own)
+    return {name: ranges[name] for name in joints}
 
 
 def _published(closure: Closure, start: float, interval: InputRange) -> list[Span]:

@@ -215,8 +215,8 @@ def urdf(name: str, parts: Sequence[Part]) -> bytes:
         except DefinitionError as error:
             raise PartError(count, error.where, error.reason, error.remedy) from None
         cuts = add_frames(tree, its)
-        found = spans(part.closure)
-        models.append(_Model(part, its, tree, cuts, found, bodies(part.closure, found, layers)))
+        ranges = spans(part.closure)
+        models.append(_Model(part, its, tree, cuts, ranges, bodies(part.closure, ranges, layers)))
         layers += len(part.closure.linkage.links)
     robot = ET.Element('robot', name=name)
     robot.append(comment(list(_head(models))))
@@ -301,13 +301,13 @@ def _write(robot: ET.Element, model: _Model) -> None:
     for joint in model.tree.joints:
         if joint.child not in links:
             ET.SubElement(robot, 'link', name=joint.child)
-    found = {names.own(name): span for name, span in model.spans.items()}
+    ranges = {names.own(name): span for name, span in model.spans.items()}
     given = {names.own(name): limits for name, limits in linkage.limits.items()}
     computed: dict[str, dict[str, str]] = {}
     for joint in model.tree.joints:
         of = joint.mimics or joint.name
         limits = given.get(of, NO_LIMITS)
-        computed[of] = _joint(robot, joint, found.get(of), limits, model.part.wrapped)
+        computed[of] = _joint(robot, joint, ranges.get(of), limits, model.part.wrapped)
     _start(robot, model, computed)
 
 
@@ -403,7 +403,7 @@ def _start(robot: ET.Element, model: _Model, computed: Mapping[str, Mapping[str,
     element = ET.SubElement(robot, 'linkage_start')
     for name in named_joints(closure.linkage):
         kind = 'input' if name in [each.joint for each in closure.linkage.inputs] else 'joint'
-        own = names.own(name)
-        joint = ET.SubElement(element, kind, name=own, value=number(values[name]))
-        if own in computed:
-            ET.SubElement(joint, 'computed', dict(computed[own]))
+        named = names.own(name)
+        joint = ET.SubElement(element, kind, name=named, value=number(values[name]))
+        if named in computed:
+            ET.SubElement(joint, 'computed', dict(computed[named]))

@@ -78,17 +78,17 @@ def chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
 
     def grown(start: PlanarJoint) -> Iterator[tuple[PlanarJoint, ...]]:
         """Yield longer and longer chains that start with a joint."""
-        found = [start]
-        yield tuple(found)
+        chain = [start]
+        yield tuple(chain)
         while True:
-            body = found[-1].child
+            body = chain[-1].child
             onward = hung.get(body, [])
             if body in planar.bodied or body in marked or len(onward) != 1:
                 return
             if abs(onward[0].place) > near:
                 return
-            found.append(onward[0])
-            yield tuple(found)
+            chain.append(onward[0])
+            yield tuple(chain)
 
     made, ahead = [], [planar.root]
     for body in ahead:
@@ -105,12 +105,12 @@ def chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
 
 def symbols(planar: Planar) -> dict[str, Symbol]:
     """Return the angle of every body as a sum of joints."""
-    found: dict[str, Symbol] = {planar.root: ((), 0.0)}
+    angles: dict[str, Symbol] = {planar.root: ((), 0.0)}
     for joint in planar.joints:
-        found[joint.child] = found[joint.parent]
+        angles[joint.child] = angles[joint.parent]
         if joint.kind == 'R':
-            found[joint.child] = plus(found[joint.parent], joint)
-    return found
+            angles[joint.child] = plus(angles[joint.parent], joint)
+    return angles
 
 
 def plus(symbol: Symbol, joint: PlanarJoint) -> Symbol:
