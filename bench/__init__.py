@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``make bench``: what a tick costs, how late it is, how long a sample takes."""
+"""``make bench``: the cost of a tick, its lateness, and the latency of a sample."""
 
 from pathlib import Path
 

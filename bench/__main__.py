@@ -86,7 +86,7 @@ def main() -> int:
     try:
         with TemporaryDirectory(prefix='linkage_ros_bench_') as name:
             folder = Path(name)
-            # Below 102, so that the ports stay below those which the kernel hands out.
+            # Below 102, so that the ports stay below the kernel's ephemeral ones.
             graph = Graph(2 + os.getpid() % 100, folder)
             if 'c' in wanted:
                 plan = _LATENCY_QUICK if arguments.quick else _LATENCY
@@ -138,7 +138,7 @@ def _ticks(graph: Graph, folder: Path, wanted: str, quick: bool) -> list[Table]:
     slow_idiomatic, fast_idiomatic = idiomatic(folder, SLOW), idiomatic(folder, FAST)
     slow_bare, fast_bare = bare(SLOW), bare(FAST)
     slow_recording, fast_recording = ours(folder, SLOW, True), ours(folder, FAST, True)
-    # Those that are compared stand next to each other.
+    # Contenders that are compared run next to each other.
     contenders = [
         *([slow_idiomatic] if 'a' in wanted else []),
         slow,
@@ -169,7 +169,7 @@ def _ticks(graph: Graph, folder: Path, wanted: str, quick: bool) -> list[Table]:
 
 
 def _real_time(graph: Graph, folder: Path, rate: float, quick: bool) -> Table:
-    """Under load, what the system gives the ticks on request; where it refuses, that is told."""
+    """Measure ticks under load with real-time priority; report it if the system refuses."""
     busy = os.cpu_count() or 1
     say(f'{busy} busy processes, {rate:g} Hz')
     asked = ('thread_priority:=80', f'cpu_affinity:=[{busy - 1}]', 'lock_memory:=true')

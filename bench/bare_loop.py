@@ -14,10 +14,10 @@
 
 
 """
-The least that a tick can be: sleep to the instant, take bytes until none are left, publish.
+The minimum of a tick: sleep until it is due, take bytes until none are left, publish.
 
-Nothing is read out of the crank and nothing is solved; only the stamp is new in every message.
-What our node costs more than this is what it does.
+It decodes no crank sample and solves nothing; only the stamp of each message is new. The
+difference to this loop is the cost of the node's work.
 """
 
 from __future__ import annotations

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-Subscribers of ``joint_states`` that come and go, each a DDS participant of its own, in turn.
+Subscribers of ``joint_states`` that come and go in turn, each a DDS participant of its own.
 
-Arguments: how many come, and for how long each listens, in [s]. At the end it prints a line of
-JSON: how many came, how many of them heard nothing, the messages that they heard, and those missed
-between the first and the last number of each.
+Arguments: the number of subscribers, and how long each listens, in [s]. At the end it prints a
+line of JSON: the number of subscribers, how many received nothing, the messages received, and
+those missed between the first and the last of each.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from bench.raw_node import keep_last, node, subscription, taker
 from linkage_ros.signals import stop_on_signals
 
 _PATIENCE = 5.0
-"""How long one waits for its first message, in [s]."""
+"""Time limit for the first message, in [s]."""
 
 _POLL = 0.005
 _DEPTH = 2000
 
 
 def main() -> None:
-    """Come and go until all have been there, or a signal."""
+    """Create subscribers one after the other, until all are done or a signal comes."""
     stop = stop_on_signals()
     count, listens = int(sys.argv[1]), float(sys.argv[2])
     del sys.argv[1:]
@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def _listen(listens: float) -> Iterator[int]:
-    """Yield the numbers that the publisher gave the messages of so many seconds."""
+    """Yield the publisher's numbers of the messages received in so many seconds."""
     with node('comer') as comer:
         take = taker(subscription(comer, 'joint_states', keep_last(_DEPTH)))
         until = monotonic() + _PATIENCE

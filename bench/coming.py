@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-What subscribers that come and go cost the ticks, by how Fast DDS carries the messages.
+Cost of subscribers that come and go for the ticks, by the transport of Fast DDS.
 
-A publisher opens the shared-memory port of every subscriber that comes, on the thread that
-publishes. The check of a port that nobody has written to for long waits a third of the
-``healthy_check_timeout_ms`` of whoever made the port: 0.33 s (Fast-DDS issue 6535).
+A publisher opens the shared-memory port of every new subscriber, on the thread that publishes. If
+nobody has written to that port for long, its check waits for a third of the
+``healthy_check_timeout_ms`` of the process that created the port: 0.33 s (Fast-DDS issue 6535).
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from linkage_ros.processes import Graph, MeasurementError, Process
 from linkage_ros.resources import shipped
 
 _APPEARING = 15.0
-"""How long the node may take to tick, in [s]."""
+"""Time limit for the node's first tick, in [s]."""
 
 _TELLING = 1.3
-"""After so many [s] the node has published its diagnostics anew."""
+"""Time after which the node has published new diagnostics, in [s]."""
 
 _TIMEOUT = 30
-"""Of the profile that has a shorter one, in [ms]."""
+"""Health-check timeout of the profile with a shorter one, in [ms]."""
 
 _SHARED = f"""\
     <transport_descriptor>
@@ -55,16 +55,16 @@ _SHARED = f"""\
 @dataclass(frozen=True, slots=True)
 class ComersPlan:
     """
-    How much is measured.
+    Amount of the measurement.
 
     Attributes
     ----------
     comers
-        Subscribers that come and go, one after the other.
+        Number of subscribers that come and go, one after the other.
     listens
-        How long each hears messages, in [s].
+        Time for which each listens, in [s].
     busy
-        Processes that take a processor each where there is load.
+        Number of processes that each occupy a processor under load.
 
     """
 
@@ -77,18 +77,18 @@ def measure_comers(
     graph: Graph, folder: Path, rates: tuple[float, ...], plan: ComersPlan
 ) -> Table:
     """
-    Have subscribers come and go for each way, rate and load, and return the table.
+    Let subscribers come and go for each transport, rate and load, and return the table.
 
     Parameters
     ----------
     graph
         Where they run.
     folder
-        For scenes and profiles.
+        Folder of scenes and profiles.
     rates
-        Ticks a second.
+        Ticks per second.
     plan
-        How much is measured.
+        Amount of the measurement.
 
     """
     table = Table(
@@ -108,7 +108,7 @@ def measure_comers(
 
 
 def _ways(folder: Path) -> Mapping[str, Mapping[str, str]]:
-    """Return for each way to carry messages the node's environment; all stay on the machine."""
+    """Return the node's environment for each transport; all stay on the machine."""
     local = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}
     profile = shipped('fastdds/local.xml')
     text = profile.read_text('utf-8')
@@ -133,7 +133,7 @@ def _ways(folder: Path) -> Mapping[str, Mapping[str, str]]:
 def _measure(
     graph: Graph, scene: Path, more: Mapping[str, str], busy: int, plan: ComersPlan
 ) -> Sequence[str]:
-    """Return what one row of the table tells."""
+    """Return one row of the table."""
     with ExitStack() as stack:
         run = stack.enter_context
         listener = run(graph.run('bench.listener'))
@@ -167,7 +167,7 @@ def _measure(
 
 
 def _heard(listener: Process, node: Process) -> dict[str, Any]:
-    """Return what the listener has heard, as soon as there are diagnostics of the node."""
+    """Return the listener's report, as soon as it has diagnostics of the node."""
     until = time.monotonic() + _APPEARING
     while not (heard := listener.ask('?'))['health']:
         node.check()

@@ -14,10 +14,10 @@
 
 
 """
-What compiling brings: shipped linkages beside their plain steps, chains of dyads, and arrays.
+Gain of compiling: shipped linkages against their uncompiled steps, chains of dyads, and arrays.
 
-Many states of each shipped linkage are solved by `solve` and by its emitted C, as fast as a
-compiler makes it. Both are written from the same tape and differ in what executes it.
+Many states of each shipped linkage are solved by `solve` and by its generated C with full
+optimisation. Both come from the same tape and differ only in what executes it.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ import numpy as np
 RATE, ACCELERATION = 3.0, 0.5
 _DYADS = (1, 2, 4, 8, 16, 32)
 _ITERATED_STATES = 50
-"""A state that is iterated takes a hundred times as long."""
+"""An iterated state takes a hundred times as long."""
 
 Numbers = tuple[float, ...]
 
@@ -56,12 +56,12 @@ Numbers = tuple[float, ...]
 @dataclass(frozen=True, slots=True)
 class CompiledPlan:
     """
-    How much is measured.
+    Amount of the measurement.
 
     Attributes
     ----------
     rounds
-        How often each is measured, in turn.
+        Number of measurements of each, in turn.
     states
         In a round.
 
@@ -72,7 +72,7 @@ class CompiledPlan:
 
 
 def measure_gallery(plan: CompiledPlan) -> Table:
-    """Return for each shipped linkage what its motion takes, compiled and in plain steps."""
+    """Return the time of a motion for each shipped linkage, compiled and in plain steps."""
     table = Table(
         'shipped linkages with rates and accelerations, µs a state; one run, in turn',
         ('', 'compiled', 'plain steps', 'ratio', 'target', 'compiling, ms', 'target'),
@@ -106,14 +106,14 @@ def measure_gallery(plan: CompiledPlan) -> Table:
 
 def measure_chains(plan: CompiledPlan, picture: Path | None = None) -> Table:
     """
-    Return what chains of four-bars take by the number of their dyads.
+    Return the time of chains of four-bars by the number of their dyads.
 
     Parameters
     ----------
     plan
-        How much is measured.
+        Amount of the measurement.
     picture
-        Where the times are drawn, if they are.
+        File of the diagram; None for none.
 
     """
     table = Table(
@@ -174,7 +174,7 @@ def _closed_states(closure: Closure) -> Iterator[Numbers]:
 
 
 def input_bounds(closure: Closure) -> tuple[float, float]:
-    """Return from where to where the inputs of a linkage go, in [rad] or [m]."""
+    """Return the range of each input of a linkage, in [rad] or [m]."""
     ranges = closure.input_ranges if len(closure.linkage.inputs) == 1 else ()
     low = min((each.lowest for each in ranges), default=-3.0)
     return low, max((each.highest for each in ranges), default=3.0)
@@ -210,7 +210,7 @@ def _draw(found: dict[int, list[float]], picture: Path) -> None:
 _FLAGS = ('-O3', '-march=native', '-fno-math-errno', '-shared', '-fPIC')
 
 _AGREEMENT = 1e-9
-"""What results of both may differ by; else they did not do the same."""
+"""Maximum difference between the results of both; more means that one is wrong."""
 
 _LOOP = """\
 #include "{name}.h"
@@ -235,19 +235,19 @@ long solve_all(long n, const double *given, const double *rates, const double *a
 """
 
 _Solve = Callable[[Array, Array], int]
-"""Takes the inputs, (inputs, N), and where values, rates and accelerations go, (3, joints, N)."""
+"""Takes inputs, (inputs, N), and fills values, rates and accelerations, (3, joints, N)."""
 
 
 def measure_arrays(folder: Path, rounds: int, states: int) -> Table:
     """
-    Return how many closed states a second both solve with rates and accelerations.
+    Return the number of closed states per second, with rates and accelerations, for both.
 
     Parameters
     ----------
     folder
-        Where what is compiled goes.
+        Folder of the compiled files.
     rounds
-        How often each is measured, in turn.
+        Number of measurements of each, in turn.
     states
         In a round.
 
@@ -272,7 +272,7 @@ def measure_arrays(folder: Path, rounds: int, states: int) -> Table:
 def _measured(
     folder: Path, closure: Closure, file: Path, rounds: int, states: int
 ) -> tuple[str, str, str]:
-    """Return the states a second of both, and the ratio."""
+    """Return the states per second of both, and the ratio."""
     inputs = _closed(closure, states)
     values = np.empty((3, len(closure.linkage.joints), states))
     rates, accelerations = [RATE] * len(inputs), [ACCELERATION] * len(inputs)
@@ -296,7 +296,7 @@ def _measured(
 
 
 def _closed(closure: Closure, count: int) -> Array:
-    """Return inputs, (inputs, count), at which a linkage is closed, in no order."""
+    """Return inputs, (inputs, count), at which a linkage closes, in random order."""
     rng = np.random.default_rng(5)
     low, high = input_bounds(closure)
     found = np.empty((len(closure.linkage.inputs), 0))
@@ -337,7 +337,7 @@ def _compiled(folder: Path, closure: Closure, file: Path) -> _Solve:
 
 
 def _agree(name: str, one: Array, other: Array) -> None:
-    """Refuse results that differ by more than rounding and whole turns."""
+    """Raise if results differ by more than rounding and full turns."""
     off = np.abs(np.remainder(one - other + 1.0, 2.0 * np.pi) - 1.0) / (1.0 + np.abs(other))
     if not off.max() < _AGREEMENT:
         raise MeasurementError(f'{name}: solve and C differ by {off.max():.2g}')

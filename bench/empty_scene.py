@@ -14,12 +14,11 @@
 
 
 """
-What the empty scene costs beyond the formulas of its linkage and the packing of its message.
+Cost of the empty scene beyond the formulas of its linkage and the encoding of its message.
 
-The yardstick is what one would write by hand for this four-bar on a topic: the crank carried
-forward, the loop closed in a straight line, the bytes packed. The scene does the same, looks
-whether the loop closes, keeps angles running on over whole turns, and says for whoever asks what
-it came to.
+The yardstick is hand-written code for this four-bar on a topic: extrapolate the crank, close the
+loop in straight-line code, encode the bytes. The scene does the same. In addition it checks
+whether the loop closes, continues angles over whole turns, and keeps the result for its callers.
 """
 
 from __future__ import annotations
@@ -46,12 +45,12 @@ _CRANK = 0.3, 6.0
 @dataclass(frozen=True, slots=True)
 class EmptyPlan:
     """
-    How much is measured.
+    Amount of the measurement.
 
     Attributes
     ----------
     rounds
-        How often each is measured, in turn.
+        Number of measurements of each, in turn.
     ticks
         Ticks in a round.
 
@@ -62,7 +61,7 @@ class EmptyPlan:
 
 
 def measure_empty_scene(plan: EmptyPlan) -> Table:
-    """Measure a tick of the empty scene against the same by hand, and return the table."""
+    """Measure a tick of the empty scene against the hand-written one, and return the table."""
     empty, moving = _pipeline(''), _pipeline('effects: {velocity: {}}')
     by_hand = _by_hand(0.04, 0.12, 0.08, 0.1)
     (look,) = empty.tick(BEGIN).looks

@@ -14,10 +14,10 @@
 
 
 """
-The same linkage as the rclpy tutorials have it: timer, callback, message, `rclpy.spin`.
+The same linkage in the style of the rclpy tutorials: timer, callback, message, `rclpy.spin`.
 
-It solves by the very closure of the package, carries the crank forward and publishes rates, as the
-benchmark's scene does; it neither counts, checks nor records.
+Like the benchmark's scene, it solves with the package's own closure, extrapolates the crank and
+publishes rates. It does not count, check or record.
 """
 
 from __future__ import annotations
@@ -80,11 +80,11 @@ def main() -> None:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except RuntimeError:
-        # rclpy's own, where its signal handler takes the context away while a message is taken.
+        # Raised by rclpy if its signal handler shuts the context down while a message is taken.
         if rclpy.ok():
             raise
     finally:
-        # The handler of the signal shuts down at the same time.
+        # The signal handler shuts down at the same time.
         with suppress(RuntimeError):
             rclpy.try_shutdown()
 

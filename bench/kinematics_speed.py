@@ -14,10 +14,10 @@
 
 
 """
-How fast linkages are solved with acceleration: one state at a time, and a million at once.
+Speed of solving linkages with accelerations: one state at a time, and a million at once.
 
-They are compared with pylinkage, and with the formulas of a four-bar in one straight function: no
-status, no pose, no steps. That function serves linkages whose crank turns fully and passes no
+They are compared with pylinkage, and with the formulas of a four-bar in one straight-line function
+without status, pose and steps. That function serves linkages whose crank turns fully and passes no
 change point. Its arithmetic is that of `linkage_ros.kinematics.dyads.rrr` over
 `linkage_ros.kinematics.diagonals`.
 """
@@ -51,25 +51,25 @@ else:
     AVAILABLE = True
 
 HAS_NUMBA = find_spec('numba') is not None
-"""With it pylinkage compiles what finds all states in one call."""
+"""With this package pylinkage compiles the solution of all states in one call."""
 
 
 def stepping(
     a: float, b: float, c: float, d: float, steps: int, rate: float, acceleration: float
 ) -> tuple[Callable[[], object], Callable[[], object]]:
     """
-    Return two functions that turn a four-bar once: state by state, and all states in one call.
+    Return two functions that turn a four-bar once: state by state, and in one call.
 
-    Both find places, velocities and accelerations of its pins.
+    Both compute positions, velocities and accelerations of its pins.
 
     Parameters
     ----------
     a, b, c, d
         Lengths of crank, coupler, rocker and ground.
     steps
-        States of a turn.
+        Number of states per turn.
     rate, acceleration
-        The crank's, in [rad/s] and [rad/s²].
+        Of the crank, in [rad/s] and [rad/s²].
 
     """
     pivot, other = Ground(0.0, 0.0), Ground(d, 0.0)
@@ -90,7 +90,7 @@ def stepping(
 
 Joints = tuple[float, float]
 Solve = Callable[[float, float, float], tuple[Joints, Joints, Joints]]
-"""Takes the crank's angle, rate and acceleration and returns both joints' of each."""
+"""Takes angle, rate and acceleration of the crank and returns those of both joints."""
 
 
 def straight_line(a: float, b: float, c: float, d: float, sign: float) -> Solve:
@@ -144,22 +144,22 @@ LENGTHS = (0.04, 0.12, 0.08, 0.1)
 RATE, ACCELERATION = 3.0, 0.5
 
 _AGREEMENT = 1e-9
-"""What results of two contenders may differ by; else they did not do the same."""
+"""Maximum difference between the results of two contenders; more means that one is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpeedPlan:
     """
-    How much is measured.
+    Amount of the measurement.
 
     Attributes
     ----------
     rounds
-        How often each is measured, in turn.
+        Number of measurements of each, in turn.
     states
-        States that are solved one at a time, in a round.
+        Number of states solved one at a time, per round.
     batch
-        States of a batch.
+        Number of states of a batch.
 
     """
 

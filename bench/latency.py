@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""(c) How long a crank sample takes to come back as a joint state, against a relay of bytes."""
+"""(c) Latency from a crank sample to its joint state, against a relay of bytes."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ _OURS, _RELAY = 'linkage_node', 'raw_relay'
 @dataclass(frozen=True, slots=True)
 class LatencyPlan:
     """
-    How much is measured.
+    Amount of the measurement.
 
     Attributes
     ----------
     rate
-        Samples a second, for both nodes together.
+        Samples per second, for both nodes together.
     size
         Samples for each node in a part.
     parts
-        Parts, of each of which medians are taken; one more before them is not counted.
+        Number of parts with a median each; a first one in addition is not counted.
 
     """
 
@@ -62,9 +62,9 @@ def measure_latency(graph: Graph, folder: Path, plan: LatencyPlan) -> Table:
     graph
         Where they run.
     folder
-        Where the scene is written.
+        Folder of the scene.
     plan
-        How much is measured.
+        Amount of the measurement.
 
     """
     scene = write_scene(folder, rate=0.0)

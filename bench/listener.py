@@ -14,13 +14,13 @@
 
 
 """
-Listens to ``joint_states`` and ``/diagnostics`` and says on request what it has heard.
+Listen to ``joint_states`` and ``/diagnostics`` and report on request.
 
-For every line on its standard input it answers a line of JSON: the steady time, the number that
-the publisher gave its last message (so that none is missed by counting), how many arrived, and
-the last diagnostics; where the line is ``forget``, it forgets those first. ``stood`` is how many
-times the stamps of the joint states stood still as long as Fast DDS checks shared memory. It
-polls, so that its own wake-ups take little of the processor.
+For every line on its standard input it answers with a line of JSON: the monotonic time, the
+publisher's number of the last message (counting could miss some), how many arrived, and the last
+diagnostics. On the line ``forget`` it drops those first. ``stood`` counts how often the stamps of
+the joint states stood still for as long as Fast DDS checks shared memory. It polls, so that its
+own wake-ups take little processor time.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from linkage_ros.signals import stop_on_signals
 _POLL = 0.005
 _DEPTH = 2000
 _CHECK = 325_000_000, 355_000_000
-"""A third of the ``healthy_check_timeout_ms`` of 1000, and a bit, in [ns]."""
+"""Slightly more than a third of the ``healthy_check_timeout_ms`` of 1000, in [ns]."""
 
 
 def main() -> None:

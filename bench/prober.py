@@ -14,12 +14,12 @@
 
 
 """
-Sends crank samples to several nodes in turn and measures when the joint state is back.
+Send crank samples to several nodes in turn and measure the time until the joint state arrives.
 
-The stamp tells which sample an answer is to. Arguments: the rate, in [Hz], of all samples
-together; how many for each node make a part; how many parts; then the namespaces of the nodes. For
-every part it prints a line of JSON: for each namespace the round trips, in [ns], and how many
-samples had no answer.
+The stamp assigns an answer to its sample. Arguments: the rate of all samples together, in [Hz];
+the number of samples per node in a part; the number of parts; then the namespaces of the nodes.
+For every part it prints a line of JSON: for each namespace the round trips, in [ns], and the
+number of samples without an answer.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 
 _PATIENCE = 50_000_000
-"""How long an answer may take, in [ns]."""
+"""Time limit for an answer, in [ns]."""
 
 _MATCHING = 10.0
-"""How long the nodes may take to be found, in [s]."""
+"""Time limit for the discovery of the nodes, in [s]."""
 
 _SPEED = tau
 
 
 class Target:
-    """A node that is probed, by the namespace of its topics."""
+    """A node to probe, by the namespace of its topics."""
 
     def __init__(self, owner: Node, namespace: str) -> None:
         self._crank = publisher(owner, f'{namespace}/crank_states', qos_profile_sensor_data)
@@ -56,12 +56,12 @@ class Target:
         self._wait = waiter(owner, self._joints)
 
     def found(self) -> bool:
-        """Whether the node hears us and we hear it."""
+        """Whether discovery is complete in both directions."""
         heard = self._crank.get_subscription_count() > 0
         return heard and bool(self._joints.handle.get_publisher_count())
 
     def probe(self, message: bytes) -> int | None:
-        """Return the round trip of a message, in [ns]; nothing where no answer came."""
+        """Return the round trip of a message, in [ns]; None without an answer."""
         stamp = message[4:12]
         begin = monotonic_ns()
         self._publish(message)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What the programs of the benchmark share: a node that takes and publishes bytes."""
+"""Base of the benchmark's programs: a node that takes and publishes bytes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Take = Callable[[], 'tuple[bytes, dict[str, Any]] | None']
 
 @contextmanager
 def node(name: str) -> Iterator[Node]:
-    """Bring up ROS and a node; remappings come from the command line."""
+    """Initialise ROS and create a node; remappings come from the command line."""
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     made = rclpy.create_node(name)
     try:
@@ -61,13 +61,13 @@ def subscription(owner: Node, topic: str, qos: QoSProfile = CRANK_QOS) -> Any:
 
 
 def taker(source: Any) -> Take:
-    """Return a function that takes the next message of a subscription as bytes, or nothing."""
+    """Return a function that takes the next message of a subscription as bytes, or None."""
     take = source.handle.take_message
     return lambda: take(JointState, True)
 
 
 def waiter(owner: Node, source: Any) -> Callable[[int], bool]:
-    """Return a function that waits so many [ns] for a message and tells whether one has come."""
+    """Return a function that waits up to some [ns] for a message; it returns whether one came."""
     wait_set = _rclpy.WaitSet(1, 0, 0, 0, 0, 0, owner.context.handle)
 
     def wait(longest: int) -> bool:

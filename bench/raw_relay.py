@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The least that a node can do with a sample: wait for it, take its bytes, publish them."""
+"""The minimum of a node with samples: wait for one, take its bytes, publish them."""
 
 from __future__ import annotations
 

@@ -51,12 +51,12 @@ class Table:
     rows: list[Sequence[str]] = field(default_factory=list)
 
     def for_terminal(self) -> terminal.Table:
-        """Return it as a table for the terminal, with numbers aligned to the right."""
+        """Return the table for the terminal, with numbers aligned to the right."""
         name, *values = self.head
         return terminal.Table(self.title, [name, *(f'>{value}' for value in values)], self.rows)
 
     def markdown(self) -> str:
-        """Return it as Markdown."""
+        """Return the table as Markdown."""
         numbers = [False, *[True] * (len(self.head) - 1)]
         lines = table_lines(self.head, self.rows, numbers)
         return '\n'.join([f'## {self.title}', '', *lines, ''])
@@ -74,7 +74,7 @@ def show(table: Table) -> None:
 
 
 def machine_table(begun: datetime, *rows: tuple[str, str]) -> Table:
-    """Return what a reader has to know to compare the numbers with those of another machine."""
+    """Return the facts needed to compare the numbers with those of another machine."""
     cpu_load = ', '.join(
         f'{load:.1f} over {minutes} min'
         for load, minutes in zip(os.getloadavg(), (1, 5, 15), strict=True)
@@ -105,12 +105,12 @@ def spread(values: Sequence[float], digits: int = 1) -> str:
 
 
 def ratios(over: Sequence[float], under: Sequence[float]) -> list[float]:
-    """Return the ratios of what was measured in turn; the quotient of medians would mix turns."""
+    """Return the ratios of alternating measurements; a quotient of medians would mix rounds."""
     return [a / b for a, b in zip(over, under, strict=True)]
 
 
 def in_turn(contenders: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """Return for each how long it took, in [s], round by round."""
+    """Return the times of each, in [s], round by round."""
     found: dict[str, list[float]] = {name: [] for name in contenders}
     for run in contenders.values():
         run()
@@ -130,7 +130,7 @@ def compare(
     found: Mapping[str, Sequence[float]],
     target: str,
 ) -> None:
-    """Add a row to a table: the first over the second, of what was measured in turn."""
+    """Add a row to a table: the first over the second, measured alternately."""
     table.rows.append(
         (
             f'{what}: {first} / {second}',
@@ -189,4 +189,4 @@ PAGES = {
     'comers': ('Clients that come and go', _COMERS),
     'real_time': ('Ticks beside busy processes', _REAL_TIME),
 }
-"""Title and beginning of each page."""
+"""Title and introduction of each page."""

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""(a), (b) What a tick costs, against the idiomatic node and the bare loop, and how late it is."""
+"""(a), (b) Cost and lateness of a tick, against the idiomatic node and the bare loop."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from linkage_ros.processes import Graph, MeasurementError, Process
 
 
 def cpu_time(pid: int) -> tuple[int, int]:
-    """Return what all threads of a process have run, and waited for a processor, in [ns]."""
+    """Return run time and wait time of all threads of a process, in [ns]."""
     run = waited = 0
     for task in Path(f'/proc/{pid}/task').iterdir():
         ran, queued, _ = map(int, (task / 'schedstat').read_text().split())
@@ -47,11 +47,11 @@ def write_scene(folder: Path, rate: float, record: bool = False) -> Path:
     Parameters
     ----------
     folder
-        Where to; a bag goes there too.
+        Folder of the scene and its bag.
     rate
-        Ticks a second; 0 for one for every sample.
+        Ticks per second; 0 for one tick per sample.
     record
-        Whether it is recorded.
+        Whether the scene records a bag.
 
     """
     file = folder / f'four_bar_{rate:g}{"_recorded" if record else ""}.yaml'
@@ -87,9 +87,9 @@ def write_many(folder: Path, rate: float, count: int) -> Path:
     Parameters
     ----------
     folder
-        Where to.
+        The folder.
     rate
-        Ticks a second.
+        Ticks per second.
     count
         How many.
 
@@ -108,20 +108,20 @@ def write_many(folder: Path, rate: float, count: int) -> Path:
 
 
 _APPEARING = 15.0
-"""How long a node may take to publish its first joint state, in [s]."""
+"""Time limit for a node's first joint state, in [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class TickPlan:
     """
-    How much is measured.
+    Amount of the measurement.
 
     Attributes
     ----------
     rounds
-        How often each is measured, in turn.
+        Number of measurements of each, in turn.
     warm_up, window
-        Time before and of a measurement, in [s].
+        Time before a measurement and its duration, in [s].
 
     """
 
@@ -133,16 +133,16 @@ class TickPlan:
 @dataclass(frozen=True, slots=True)
 class Contender:
     """
-    Something that ticks.
+    A program that ticks.
 
     Attributes
     ----------
     name
-        What the tables call it.
+        Its name in tables.
     rate
-        Ticks wanted a second.
+        Requested ticks per second.
     module
-        What is run.
+        The Python module to run.
     arguments
         Its command line.
 
@@ -162,13 +162,13 @@ class Measurement:
     Attributes
     ----------
     cpu
-        Of all its threads, in [µs] a tick.
+        Processor time of all its threads, in [µs] per tick.
     rate
-        Ticks a second, as the listener tells.
+        Ticks per second, from the listener.
     waited
-        For how much of the time its threads waited for a processor, all together: others had it.
+        Fraction of the time that its threads waited for a processor, in total.
     health
-        The node's last diagnostics that arrived, counted from its start; empty where none did.
+        The node's last diagnostics, with counts since its start; empty if none arrived.
 
     """
 
@@ -235,7 +235,7 @@ def measure_ticks(
     contenders
         Whom to measure.
     plan
-        How much is measured.
+        Amount of the measurement.
     busy
         How many processes beside them take all that they get of a processor.
 

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Measurements that take long, and that are run when what they measure has changed."""
+"""Long measurements, run when the code that they measure has changed."""

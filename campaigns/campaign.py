@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What all campaigns share: parts for several processes, progress lines, percentiles."""
+"""Shared by all campaigns: parts for several processes, progress lines, percentiles."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _PERIOD = 10.0
 
 
 def results_of(do: Callable[[Part], Result], work: Sequence[Part], jobs: int) -> Iterator[Result]:
-    """Yield what all parts come to, as they are done; one job is this process."""
+    """Yield the results of all parts as they are done; one job runs in this process."""
     if jobs == 1:
         yield from map(do, work)
         return
@@ -56,20 +56,20 @@ def tried_in_parts(
     Parameters
     ----------
     do
-        Tries those of a seed from a number to another; returns what it tried, and its findings.
+        Tries the inputs of a seed in a range of numbers; returns the inputs and the findings.
     count, seed
-        How many, and of which seed.
+        The number of inputs, and their seed.
     part
-        How many a process takes before it tells.
+        Number of inputs after which a process reports.
     jobs
-        How many processes share them.
+        Number of processes that share them.
 
     Returns
     -------
     tried : dict
-        How often what was tried.
+        Number of tries, by kind.
     findings : list
-        What must not be, a line each.
+        The violations, one line each.
 
     """
     parts = [(seed, begin, min(begin + part, count)) for begin in range(0, count, part)]

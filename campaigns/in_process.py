@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A command run in this process, bounded in time: to start Python takes longer than most do."""
+"""Run a command in this process with a time limit: starting Python would take longer."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class _TooLongError(BaseException):
 
 class Ended(NamedTuple):
     """
-    How a command ended.
+    The end of a command.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Ended(NamedTuple):
     said
         What it said on standard error, or in place of it where and how it ended.
     shown
-        What it said on standard output.
+        Its standard output.
 
     """
 

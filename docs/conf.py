@@ -16,8 +16,8 @@
 """
 The documentation site: Sphinx, pages in MyST's Markdown, the theme Furo.
 
-``make docs`` builds it into build/docs. All pages are read as they are on a forge, too; what a
-page of reference says between ``made`` comments is put in while the site is built.
+``make docs`` builds it into build/docs. All pages are also readable on a forge. Reference text
+between ``made`` comments is inserted while the site is built.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from pathlib import Path
 import sys
 from typing import Any
 
-# Sphinx is started anywhere.
+# Sphinx may be started in any folder.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from linkage_ros import __version__

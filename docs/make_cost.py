@@ -14,7 +14,7 @@
 
 
 """
-Measure what every effect costs on this machine, and write it into docs/cost.md.
+Measure the cost of every effect on this machine, and write it into docs/cost.md.
 
 Run it in the checkout's own folder, as `make cost` does: ``python -m docs.make_cost``.
 """

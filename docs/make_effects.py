@@ -16,9 +16,9 @@
 """
 Make the pictures, lists and tables of docs/effects.md.
 
-Its text is written by hand. What stands between two marks is made of what the code declares, and
-every picture of runs of the scene that stands beside it. Run it in the checkout's own folder, as
-`make effects` does: ``python -m docs.make_effects``.
+Its text is written by hand. The text between two marks comes from the declarations in the code,
+and every picture from runs of the scene beside it. Run it in the checkout's own folder, as `make
+effects` does: ``python -m docs.make_effects``.
 """
 
 from __future__ import annotations

@@ -16,8 +16,8 @@
 """
 Make docs/gallery.md and its pictures from the linkage files that come with the package.
 
-What the page says of a linkage is the comment at the head of its file, and what `linkage check`
-measures. Run it from anywhere: ``python docs/make_gallery.py``.
+The text on a linkage is the comment at the head of its file, with the results of `linkage check`.
+Run it from anywhere: ``python docs/make_gallery.py``.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@
 
 
 """
-Make docs/report.png: the page of a run, as a browser shows it.
+Make docs/report.png: a report page as a browser shows it.
 
 The run is the fault drill, as ``linkage demo`` runs it; the page is `linkage report`'s. Run it in
 the checkout's own folder, as `make report` does: ``python -m docs.make_report``.

@@ -14,9 +14,9 @@
 
 
 """
-Make docs/synthesis.md and its pictures: what accuracy costs in design work.
+Make docs/synthesis.md and its pictures: the cost of accuracy in design work.
 
-Every number of the page is worked out here. Run it in the checkout's own folder, as
+Every number of the page is computed here. Run it in the checkout's own folder, as
 `make synthesis` does: ``python -m docs.make_synthesis``.
 """
 

@@ -14,11 +14,11 @@
 
 
 """
-What each effect of a scene costs: the scene's own pipeline, with and without it.
+Cost of each effect of a scene: the tick of the scene's own pipeline, with and without the effect.
 
-A stage is not timed by itself, since its cost includes what it changes in the message and what it
-brings in. Variants of the scene tick in turn, a block of ticks each, over the same simulated times
-and crank messages: a disturbance of the machine affects them alike.
+A stage is not timed alone: its cost includes what it changes in the message and the stages that it
+requires. Variants of the scene take turns, a block of ticks each, over the same simulated times
+and crank messages, so that a disturbance of the machine affects all of them alike.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ from linkage_ros.scene.scene import Scene, SceneLinkage
 _BEGIN = 1_000_000_000
 _USUAL_RATE = 1000.0
 _CRANK_RATE = 1.0
-"""Turns, or swings, of the crank a second."""
+"""Turns, or oscillations, of the crank per second."""
 
 
 def feed(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[int, bytes]]:
-    """Yield times, in [ns], each with a crank message, or b'' where nobody listens."""
+    """Yield times in [ns], each with a crank message, or b'' if the drives listen to no topic."""
     period = 1e9 / (scene.rate or _USUAL_RATE)
     names = [name for member in scene.members for name in member.inputs]
     write = JointStateWriter(names).write
@@ -70,7 +70,7 @@ Path = Callable[[float], tuple[float, float]]
 
 
 def _paths(closure: Closure) -> list[Path]:
-    """Return for each input where it is, and its rate, at a time in [s]: round, or to and fro."""
+    """Return for each input its value and rate at a time in [s]: a rotation or an oscillation."""
     centers = usual_inputs(closure)
     speed = tau * _CRANK_RATE
     if len(centers) > 1:
@@ -91,18 +91,18 @@ def _swing(center: float, amplitude: float, speed: float) -> Path:
 
 
 _FAULT = 'fault '
-"""With the name of a fault, what stands in the place of an effect for it: it is not injected."""
+"""Prefix of a fault's name among the names of effects; the fault is not injected."""
 
 Names = frozenset[str]
 
 
 def faults_of(scene: Scene) -> Names:
-    """Return the faults of a scene, as they stand among the names of effects."""
+    """Return the faults of a scene under their names among the effects."""
     return Names(f'{_FAULT}{name}' for name in scene.faults)
 
 
 class Variant:
-    """A variant of the scene at work, and how long its ticks took, in [ns]."""
+    """A running variant of the scene, and the durations of its ticks, in [ns]."""
 
     def __init__(self, pipeline: Pipeline) -> None:
         self.pipeline = pipeline
@@ -111,14 +111,14 @@ class Variant:
         self.published = 0
 
     def run(self, nows: Sequence[int], messages: Sequence[bytes]) -> None:
-        """Tick at these times, in [ns], each after its message, as the node does."""
+        """Tick at these times, in [ns], each after its message, in the same order as the node."""
         offer, tick, clock = self.pipeline.offer, self.pipeline.tick, perf_counter_ns
         injection = self.pipeline.injection
         for now, message in zip(nows, messages, strict=True):
             begin = clock()
             if injection is not None:
                 injection.advance(now)
-                now = injection.clock(now)  # noqa: PLW2901 (the time by which the tick goes)
+                now = injection.clock(now)  # noqa: PLW2901 (a clock fault changes the tick's time)
             if message:
                 offer(message, now)
                 self.offers.append(clock() - begin)
@@ -127,14 +127,14 @@ class Variant:
             self.published += bool(done.message)
 
     def forget(self) -> None:
-        """Begin to count."""
+        """Discard the durations measured so far."""
         self.ticks.clear()
         self.offers.clear()
         self.published = 0
 
 
 class Variants:
-    """Variants of a scene, by the effects that they have."""
+    """Variants of a scene, keyed by the effects that they have."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -142,32 +142,32 @@ class Variants:
         self._closures: dict[bool, list[Closure]] = {}
 
     def build(self, named: Names) -> Variant:
-        """Return the scene with these of its effects, and without its recording; one of each."""
+        """Return the variant with these effects and without recording; built once."""
         if named not in self.built:
             self.built[named] = Variant(self.pipeline(named))
         return self.built[named]
 
     def pipeline(self, named: Names) -> Pipeline:
-        """Return the scene with these of its effects at its start; another one each time."""
+        """Return a new pipeline of the scene with these effects, at its start."""
         scene = replace(
             self.scene,
             members=tuple(_with(member, named) for member in self.scene.members),
             faults={
-                # Nobody injects it, nor does a timeline.
+                # The fault is present but never injected, by nobody and no timeline.
                 name: replace(fault, at=(), seconds=0.0)
                 for name, fault in self.scene.faults.items()
                 if f'{_FAULT}{name}' in named
             },
             record=None,
         )
-        # To solve a linkage for the first time may take a second where it is iterated.
+        # The first solution of an iterated linkage may take a second.
         altered = 'tolerance' in named
         pipeline = Pipeline(scene, self._closures.get(altered))
         self._closures.setdefault(altered, pipeline.closures)
         return pipeline
 
     def attempt(self, named: Names) -> Variant | None:
-        """Return the scene with these effects; None if they do not go together."""
+        """Return the variant with these effects; None if they cannot be combined."""
         try:
             return self.build(named)
         except FileError:
@@ -175,7 +175,7 @@ class Variants:
 
 
 def _with(member: SceneLinkage, named: Names) -> SceneLinkage:
-    """Return a linkage with these effects, of those that it has or that they bring in."""
+    """Return a linkage with only these of its effects and of those that they require."""
     own = member.effects
     brought = {need for effect in own for need in dependencies(effect)}
     effects = {
@@ -188,7 +188,7 @@ def _with(member: SceneLinkage, named: Names) -> SceneLinkage:
 
 
 _BLOCK = 100
-"""Ticks of a variant in one go: long enough for the caches, short beside a drift."""
+"""Ticks of a variant per block: long enough to warm the caches, short compared with a drift."""
 
 _WARM_UP = 200
 _THOUSAND = 1000
@@ -196,17 +196,17 @@ _THOUSAND = 1000
 
 class Times(NamedTuple):
     """
-    How long ticks take.
+    Durations of ticks.
 
     Attributes
     ----------
     median
-        Of all ticks, in [µs].
+        Median of all ticks, in [µs].
     p99
-        The 99th percentile of a thousand ticks on end: of those of all thousands the median, so
-        that it is not what else the machine did for a moment, in [µs].
+        The 99th percentile of 1000 consecutive ticks, in [µs]; of all thousands the median, so
+        that a short disturbance of the machine does not count.
     low, high
-        Quartiles of the medians of a hundred ticks on end, in [µs].
+        Quartiles of the medians of 100 consecutive ticks, in [µs].
 
     """
 
@@ -224,19 +224,19 @@ class EffectCost:
     Attributes
     ----------
     name
-        Of the effect; of a fault, which nobody injects, one of `faults_of`.
+        Name of the effect; for a fault, which is not injected, one of `faults_of`.
     adds
-        What it, and what it starts from, add to the scene without effects; nothing where it
-        cannot be measured alone.
+        What the effect, with the effects it requires, adds to the scene without effects; None if
+        it cannot be measured alone.
     beside
-        The effect beside which that was measured, since alone it acts on nothing; '' for none.
+        The effect beside which ``adds`` was measured, since alone it acts on nothing; '' if none.
     saves
-        By how much the median of the whole scene's tick is shorter without it, in [µs]; nothing
-        where it cannot be left out.
+        By how much the median tick of the whole scene is shorter without it, in [µs]; None if
+        it cannot be left out.
     left_out_with
-        The effect that would act on nothing then and is left out too; '' for none.
+        The effect that would then act on nothing and is left out too; '' if none.
     needed_by
-        The effects that bring it in anyway.
+        The effects that require it.
 
     """
 
@@ -256,15 +256,15 @@ class SceneCost:
     Attributes
     ----------
     offer
-        A crank message, read and taken; None if the drives listen to no topic.
+        Reading and accepting a crank message; None if the drives listen to no topic.
     bare
-        A tick of the scene without effects, its crank message with it.
+        A tick of the scene without effects, including its crank message.
     whole
-        A tick of the scene, its crank message with it.
+        A tick of the scene, including its crank message.
     effects
-        What is between the two, in physical order.
+        Costs of the effects, in physical order.
     published
-        The part of all ticks that published something.
+        The fraction of all ticks that published something.
 
     """
 
@@ -290,16 +290,16 @@ def measure(
     scene
         The scene.
     ticks
-        How often each variant ticks.
+        Ticks of each variant.
     leave_out
-        Whether to measure also what leaving an effect out saves.
+        Whether to measure also how much leaving each effect out saves.
     stopped
-        Asked now and then whether to give up; then nothing is returned.
+        Called now and then; if it returns True, the measurement ends and returns None.
 
     Raises
     ------
     FileError
-        Where something in the scene does not go together.
+        If parts of the scene cannot be combined.
 
     """
     named = Names(name for member in scene.members for name in member.effects)
@@ -347,7 +347,7 @@ def measure(
 def _added(
     name: str, named: Names, variants: Variants
 ) -> tuple[Variant | None, Variant | None, str]:
-    """Return the scene without and with an effect alone, or beside another; and which."""
+    """Return the variants without and with an effect, and the effect beside it, if any."""
     for beside in (
         '',
         *(loaded for loaded in FORCE_EFFECTS if loaded in named and loaded != name),
@@ -360,7 +360,7 @@ def _added(
 
 
 def _left_out(name: str, named: Names, variants: Variants) -> tuple[Variant | None, str]:
-    """Return the scene without an effect, and what has to go with it."""
+    """Return the variant without an effect, and the effect that has to go with it."""
     for other in ('', 'friction'):
         less = variants.attempt(named - {name, other})
         if less is not None:
@@ -376,21 +376,21 @@ def compare(
     stopped: Callable[[], bool] = lambda: False,
 ) -> dict[str, Times] | None:
     """
-    Measure by how much the ticks of scenes differ from those of a bare one.
+    Measure by how much the ticks of other scenes differ from those of a bare one.
 
     Parameters
     ----------
     bare
         The scene to compare with.
     others
-        Scenes that differ from it in one thing each, by a name for each; of the same rate.
+        Scenes that differ from it in one thing each, by name; all at the same rate.
     ticks, stopped
-        As for `measure`.
+        See `measure`.
 
     Returns
     -------
     differences
-        By the names of the others; None where it was stopped.
+        Differences by name; None if stopped.
 
     """
     variants = {name: Variant(Pipeline(scene)) for name, scene in others.items()}
@@ -408,14 +408,14 @@ def _run(
     stopped: Callable[[], bool],
 ) -> bool:
     """
-    Let variants tick in turn; return whether nobody stopped it.
+    Let variants tick in turn; return False if stopped.
 
     Parameters
     ----------
     fed
-        Times with crank messages, and the variants that tick by them.
+        Times with crank messages, each with the variants that tick by them.
     ticks, stopped
-        As for `measure`.
+        See `measure`.
 
     """
     contenders = [(number, one) for number, (_, ones) in enumerate(fed) for one in ones]
@@ -424,7 +424,7 @@ def _run(
         if stopped():
             return False
         blocks = [tuple(zip(*[next(times) for _ in range(size)], strict=True)) for times, _ in fed]
-        # Who runs first, or behind a slow one, finds the caches cold: nobody always does.
+        # The first variant, or one behind a slow one, finds cold caches: the order changes.
         shuffle(contenders)
         for by, contender in contenders:
             contender.run(*blocks[by])
@@ -467,7 +467,7 @@ def _p99(nanoseconds: Sequence[int]) -> int:
 
 
 def _difference(one: Sequence[int], other: Sequence[int]) -> Times:
-    """Return what one takes beyond another; both have ticked in turn, block by block."""
+    """Return how much longer one takes than the other; both ticked in turn, block by block."""
     middle = [a - b for a, b in zip(_middle(one), _middle(other), strict=True)]
     blocks = [a - b for a, b in zip(_medians(one), _medians(other), strict=True)]
     return Times(middle[0], middle[1], *_quartiles(blocks))

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Every error that a user can meet: one root, and one line of text each.
+The errors that a user can meet: one root class, and one line of text each.
 
 ``str(error)`` is exactly what the user reads: where (file, key or topic), what is wrong with the
-value, and the remedy. It is printable, on one line, and not without end, whatever it is about.
+value, and the remedy. The line is printable and of bounded length.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ _LONGEST_LIST = 800
 _LONGEST_PART = 2000
 
 _PYTHON_PACKAGES = {'mcap': 'mcap', 'numpy': 'numpy', 'yaml': 'PyYAML'}
-"""What every installation needs beside ROS: name of the import, and of the package."""
+"""Packages that every installation needs beside ROS: import name and package name."""
 
 
 class LinkageError(Exception):
     """
-    The root of all errors that this package raises on purpose.
+    Root of all errors that this package raises on purpose.
 
     Parameters
     ----------
     where
         The file, key, folder or topic that is at fault.
     reason
-        What is wrong, with the value.
+        The fault, with the value.
     remedy
-        What would help.
+        The action that would help.
 
     """
 
@@ -59,8 +59,8 @@ class LinkageError(Exception):
         super().__init__(f'{self.where}: {self.reason}; {self.remedy}')
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # An exception is else made anew from its text alone, which none of these is: what a
-        # process of workers raises would not come back.
+        # By default an exception is unpickled from its text alone, which does not fit these
+        # constructors: an error raised in a worker process would not reach its parent.
         return __newobj__, (type(self), *self.args), vars(self)
 
 
@@ -69,7 +69,7 @@ class DefinitionError(LinkageError):
 
 
 class SynthesisError(LinkageError):
-    """A linkage that was asked for and does not exist; ``where`` is what was asked, in words."""
+    """A linkage that does not exist; ``where`` is the task in words."""
 
 
 class FileError(LinkageError):
@@ -83,9 +83,9 @@ class FileError(LinkageError):
     key
         Dotted key of the offending value, '' for the file as a whole.
     reason, remedy
-        As in `LinkageError`.
+        See `LinkageError`.
     line
-        Line of the key in the file, counted from 1; 0 where there is none.
+        Line of the key in the file, counted from 1; 0 if there is none.
 
     """
 
@@ -110,15 +110,15 @@ class BagError(LinkageError):
 @contextmanager
 def missing_packages_reported() -> Iterator[None]:
     """
-    Raise an error of one line where a package that cannot be done without is not installed.
+    Raise an error of one line if a required package is not installed.
 
-    Packages of one kind of work alone are looked for where that work begins, with their own
-    remedies: so what is missing here is one of Python's that all installations need, or ROS.
+    Packages that only one kind of work needs are imported where that work begins, with their own
+    remedies. So a missing package here is ROS, or a Python package that all installations need.
 
     Raises
     ------
     LinkageError
-        Where an import within finds no such package.
+        If an import within the context finds no such package.
 
     """
     try:
@@ -138,22 +138,22 @@ def missing_packages_reported() -> Iterator[None]:
 
 
 def did_you_mean(name: str, names: Iterable[str], otherwise: str) -> str:
-    """Return the remedy for a name that is none of these: the nearest, or what else there is."""
+    """Return the remedy for an unknown name: the nearest known name, or ``otherwise``."""
     near = get_close_matches(name, list(names), n=1)
     return f'did you mean {near[0]!r}?' if near else otherwise
 
 
 def quoted(value: Any) -> str:
     """
-    Return a value as an error message shows it: on one line, and not without end.
+    Return a value as an error message shows it: on one line of bounded length.
 
-    What is too long loses its middle: a path ends with the name that matters.
+    A text that is too long loses its middle: a path ends with the name that matters.
     """
     return shortened(repr(value), _LONGEST_VALUE)
 
 
 def listed(names: Iterable[str], between: str = ', ') -> str:
-    """Return names as an error message lists them: not without end, whoever has made them."""
+    """Return names as an error message lists them, with a bounded length."""
     names, shown, letters = list(names), [], 0
     for name in names:
         shown.append(shortened(clean(name), _LONGEST_VALUE))
@@ -165,17 +165,17 @@ def listed(names: Iterable[str], between: str = ', ') -> str:
 
 
 def shortened(text: str, most: int) -> str:
-    """Return a text of no more than so many letters, without its middle where it is longer."""
+    """Return a text of at most ``most`` characters; a longer one loses its middle."""
     half = (most - 1) // 2
     return text if len(text) <= most else f'{text[:half]}…{text[-half:]}'
 
 
 def clean(text: str) -> str:
     r"""
-    Return a text without what a terminal would obey: names come from anywhere.
+    Escape characters that a terminal would obey: names can come from anywhere.
 
-    Whatever is not printable, line breaks and letters that turn the direction of writing among it,
-    is written as Python writes it in a text: ``\x1b``, ``\u202e``.
+    Characters that are not printable, among them line breaks and those that change the direction
+    of writing, are written as Python escapes: ``\x1b``, ``\u202e``.
     """
     if text.isprintable():
         return text

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Functions that are written as text, and compiled when they are first bound."""
+"""Functions that are generated as source text and compiled when they are first bound."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 _MOST = 128
-"""So many texts are kept compiled."""
+"""Number of texts that are kept compiled."""
 
 
 class Lines(NamedTuple):
@@ -33,7 +33,7 @@ class Lines(NamedTuple):
     lines
         Lines of Python.
     bound
-        What they name.
+        Objects that the lines refer to by name.
 
     """
 
@@ -43,10 +43,10 @@ class Lines(NamedTuple):
 
 def written(source: str, name: str, bound: Mapping[str, Any]) -> Any:
     """
-    Return the function of that name that a text defines.
+    Return the function of that name that a source text defines.
 
-    What it names in ``bound`` it finds among its own variables, which is faster than a global
-    name. A text is compiled once, however often it is bound: not when a running node is reset.
+    Names in ``bound`` become local variables of an enclosing function, which are faster than
+    globals. A text is compiled once, even if it is bound again when a running node is reset.
     """
     return _binding(source, name, tuple(bound))(**bound)
 

@@ -14,12 +14,12 @@
 
 
 """
-What every measurement shares: quartiles, taking turns, and the description of the machine.
+Quartiles, alternating blocks and the description of the machine, shared by all measurements.
 
-Contenders take turns in one process: they run in blocks, forward in one round and backward in the
+Contenders alternate in one process: they run in blocks, forward in one round and backward in the
 next, so that a drift of the machine favours none. A time is the median of its blocks, with the
-quartiles. It is the processor time of the thread, so other load on the machine adds nothing to it
-but what that load does to the caches.
+quartiles. It is the processor time of the thread: other load on the machine affects it only
+through the caches.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ from linkage_ros import __version__
 Item = TypeVar('Item')
 
 Progress = Callable[[float], None]
-"""Takes the share of a measurement that is done, 0 to 1; what it raises ends the measurement."""
+"""Takes the fraction of a measurement that is done, 0 to 1; an exception ends the measurement."""
 
 
 class Spread(NamedTuple):
-    """The quartiles of what was measured several times."""
+    """The quartiles of repeated measurements."""
 
     low: float
     middle: float
@@ -64,28 +64,28 @@ def percentile(values: Sequence[float], percent: float) -> float:
 
 
 def alternating(items: Sequence[Item], rounds: int) -> Iterator[Item]:
-    """Yield items forward in one round and backward in the next: no drift favours one of them."""
+    """Yield items forward in one round and backward in the next, so that drift favours none."""
     for number in range(rounds):
         yield from items if number % 2 == 0 else reversed(items)
 
 
 def spread_of(values: Sequence[float]) -> Spread:
-    """Return the quartiles of some values; of a single one, that."""
+    """Return the quartiles of some values; of a single value, that value."""
     return Spread(*(percentile(values, percent) for percent in (25.0, 50.0, 75.0)))
 
 
 BLOCK = 1e-3
-"""How long a block is to be at least, in [s]: hundreds of times what reading the clock takes."""
+"""Minimum duration of a block, in [s]: hundreds of times the duration of reading the clock."""
 
 _FINE = 20e-6
-"""How often a clock has to go on, in [s]."""
+"""Coarsest acceptable resolution of a clock, in [s]."""
 
 FEWEST, MOST = 5, 200
-"""Rounds."""
+"""Minimum number of rounds."""
 
 
 class Contender(NamedTuple):
-    """What is timed: a call, and how many states it solves."""
+    """A call to be timed, and the number of states that it solves."""
 
     run: Callable[[], object]
     states: int
@@ -98,18 +98,18 @@ def in_turn(
     clock: Callable[[], float] | None = None,
 ) -> list[Spread]:
     """
-    Return how long each takes for a state, in [s].
+    Return the time that each contender takes per state, in [s].
 
     Parameters
     ----------
     contenders
-        What is timed; each is run once before.
+        The contenders; each is run once before.
     seconds
-        About how long all may take; the fewest rounds are made even if that takes longer.
+        Approximate duration of all; the minimum number of rounds is made even if it takes longer.
     progress
-        Called after each block with the share that is done, 0 to 1.
+        Called after each block with the fraction that is done, 0 to 1.
     clock
-        Tells the time, in [s]; that of the thread, if not said.
+        Returns the time, in [s]; by default the processor time of the thread.
 
     """
     clock = clock or _thread_clock()
@@ -144,7 +144,7 @@ def in_turn(
 
 
 def _thread_clock() -> Callable[[], float]:
-    """Return the clock of this thread's processor time; where that is too coarse, the wall's."""
+    """Return the clock of this thread's processor time; if it is too coarse, the wall clock."""
     begun, first = perf_counter(), thread_time()
     while thread_time() == first:
         if perf_counter() - begun > _FINE:
@@ -157,7 +157,7 @@ _GOVERNOR = Path('/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor')
 
 
 def describe_machine() -> list[tuple[str, str]]:
-    """Return names and values: the processor, the system, and the versions that count."""
+    """Return names and values: the processor, the system, and the versions that matter."""
     model = None
     with suppress(OSError):
         model = re.search(r'^model name\s*: (.+)$', _CPU.read_text(), re.MULTILINE)

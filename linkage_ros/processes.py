@@ -14,10 +14,10 @@
 
 
 """
-Processes on a ROS graph of their own: started, asked, and ended by their pid.
+Processes on a private ROS graph: start them, ask them, end them by their pid.
 
-Each lives for a bounded time: an alarm outlives the change of program and any parent, so that no
-process is left running.
+Each process has a limited life: an alarm survives ``exec`` and the end of any parent, so that no
+process keeps running.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ import time
 from typing import Any
 
 _PATIENCE = 15.0
-"""How long a process may take to answer, in [s]."""
+"""Time limit for an answer of a process, in [s]."""
 
 _LONGEST = 600
-"""How long a process may live where nothing else is said, in [s]."""
+"""Default time limit for a process, in [s]."""
 
 _MOST = 5 + (os.cpu_count() or 1)
-"""How many processes may live at once."""
+"""Maximum number of processes at once."""
 
 
 _BOUNDED = (
     'import os, signal, sys; signal.alarm(int(sys.argv[1])); '
     'os.execv(sys.executable, [sys.executable, *sys.argv[2:]])'
 )
-"""Runs Python with the arguments behind the first, for so many seconds at most."""
+"""Runs Python with the arguments after the first, for at most that many seconds."""
 
 
 class MeasurementError(Exception):
-    """A process, or something else that is measured, did not do its part."""
+    """A process, or another part of a measurement, failed."""
 
 
 class Process:
@@ -62,9 +62,9 @@ class Process:
     Attributes
     ----------
     name
-        What it is called in messages.
+        Name in messages.
     pid
-        Its process id.
+        Process id.
 
     """
 
@@ -76,7 +76,7 @@ class Process:
         self._rest = b''
 
     def ask(self, question: str) -> Any:
-        """Write a line and return the line of JSON that answers it."""
+        """Write a line; return its answer, a line of JSON."""
         assert self._popen.stdin is not None
         try:
             self._popen.stdin.write(question.encode() + b'\n')
@@ -87,7 +87,7 @@ class Process:
         return self.read()
 
     def read(self, patience: float = _PATIENCE) -> Any:
-        """Return the next line of JSON; patience in [s]."""
+        """Return the next line of JSON; ``patience`` is the time limit in [s]."""
         assert self._popen.stdout is not None
         until = time.monotonic() + patience
         while b'\n' not in self._rest:
@@ -104,12 +104,12 @@ class Process:
         return json.loads(line)
 
     def check(self) -> None:
-        """Raise where it has ended by itself."""
+        """Raise if the process has ended by itself."""
         if (code := self._popen.poll()) is not None:
             raise MeasurementError(f'{self.name}: ended with {code}{self._last_words()}')
 
     def end(self) -> None:
-        """End it: ask, insist, and kill; only this very process."""
+        """End the process: ask, then SIGTERM, then SIGKILL; only this very process."""
         for stop in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
             if self._popen.poll() is None:
                 self._popen.send_signal(stop)
@@ -122,7 +122,7 @@ class Process:
                 pipe.close()
 
     def check_end(self, *well: int) -> None:
-        """Raise where it has ended otherwise than well: with 0, or another code that is given."""
+        """Raise if the process has ended with a code other than 0 and those given."""
         if self._popen.returncode not in (0, *well):
             raise MeasurementError(
                 f'{self.name}: ended with {self._popen.returncode}{self._last_words()}'
@@ -135,16 +135,16 @@ class Process:
 
 class Graph:
     """
-    A ROS graph that no one else hears.
+    A ROS graph that is isolated from others.
 
     Parameters
     ----------
     domain
-        Its ``ROS_DOMAIN_ID``.
+        The ``ROS_DOMAIN_ID``.
     folder
-        Where logs go.
+        Folder of the logs.
     longest
-        How long a process may live, in [s], whatever becomes of us.
+        Time limit for each process, in [s], even if this process dies.
 
     """
 
@@ -158,7 +158,7 @@ class Graph:
             'ROS_DOMAIN_ID': str(domain),
             'ROS_LOG_DIR': str(folder),
         }
-        # With this one inherited, the rclpy wheels believe that their library path is set already.
+        # If this variable were inherited, the rclpy wheels would not set their library path.
         self._environment.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
 
     @contextmanager
@@ -171,11 +171,11 @@ class Graph:
         Parameters
         ----------
         module
-            The module.
+            The module, by its dotted name.
         arguments
             Its command line.
         more
-            Variables of its environment beside those of the graph, or in their place.
+            Further environment variables; they override those of the graph.
 
         """
         if len(self._alive) >= _MOST:
@@ -186,13 +186,13 @@ class Graph:
         with log.open('wb') as errors:
             popen = subprocess.Popen(
                 [sys.executable, *command],
-                # Where the modules of a checkout are found.
+                # The folder of the checkout's modules.
                 cwd=Path(__file__).parents[1],
                 env={**self._environment, **(more or {})},
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,
-                # Ctrl-C is for us; they are ended in order.
+                # Ctrl-C is for this process, which ends the others in order.
                 start_new_session=True,
             )
         process = Process(name, popen, log)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Where the files lie that come with this package, and with others that are installed."""
+"""Paths of the files that come with this package and with other installed packages."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from linkage_ros.errors import FileError, listed, quoted
 
 def share_folders(package: str) -> list[Path]:
     """
-    Return where a ROS package's files may lie: under a robot's prefixes, then the interpreter's.
+    Return folders that may hold a ROS package's files: the robot's prefixes, then Python's.
 
     Parameters
     ----------
@@ -43,12 +43,12 @@ def shipped(name: str) -> Path:
     """
     Return the path of a file or folder under ``config/``.
 
-    A checkout comes first, since an editable install's copies go stale.
+    A checkout comes first, since copies made by an editable install become outdated.
 
     Raises
     ------
     FileError
-        Where it is not installed.
+        If it is not installed.
 
     """
     checkout = Path(__file__).parent.parent
@@ -73,21 +73,21 @@ def scene_names() -> list[str]:
 
 def named_file(named: str | PathLike[str], folder: str) -> Path:
     """
-    Return the path of a file that is named by its path, or comes with the package.
+    Return the path of a file given by its path, or by the name of a shipped file.
 
     Parameters
     ----------
     named
-        A path; or the name of a shipped file, without folder and ending.
+        A path; or the name of a shipped file, without folder and suffix.
     folder
-        Where that file lies under ``config/``.
+        Folder of that file under ``config/``.
 
     Raises
     ------
     FileError
-        Where it is neither.
+        If it is neither.
     TypeError
-        Where it cannot be a path.
+        If ``named`` cannot be a path.
 
     """
     try:

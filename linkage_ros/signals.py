@@ -16,10 +16,10 @@
 """
 Signals that end a program: SIGINT, SIGTERM and SIGHUP.
 
-A node looks at the wish to stop in good time: a signal sets it, and nothing else. Python's own
-handler would raise KeyboardInterrupt wherever the program happens to be, and rclpy's would take
-the context away from under a bag that is being closed. A command that reads or computes does not
-look at it all the time: there a signal raises `StoppedError`, wherever it happens to be.
+In a node a signal only sets the stop event, which the node checks often. Python's own handler
+would raise KeyboardInterrupt anywhere in the program, and rclpy's handler would shut down the
+context while a bag is being closed. A command that reads or computes does not check the event all
+the time: there a signal raises `StoppedError`, wherever the program happens to be.
 """
 
 from __future__ import annotations
@@ -39,32 +39,32 @@ from typing import Any, NoReturn
 
 class StoppedError(BaseException):
     """
-    A signal has asked for an end where nothing was done yet that is worth telling.
+    A signal asked a command to end before it had a result to show.
 
-    It comes out of the middle of anything, so that no ``except Exception`` may take it for a
-    defect of what was done there.
+    It can be raised anywhere. It derives from BaseException, so that no ``except Exception`` takes
+    it for a defect of the code that it interrupts.
     """
 
 
 _SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 _LONGEST_END = 10
-"""How long the end of a process may take, in [s]; it takes a fraction of one."""
+"""Time limit for the end of a process, in [s]; usually it takes a fraction of a second."""
 
 _LONGEST_UNWINDING = 2.0
-"""How long what is raised may take until it is met, in [s]; then it is raised again."""
+"""Time until a raised `StoppedError` must be caught, in [s]; then it is raised again."""
 
 _LONGEST_GOODBYE = 1.0
-"""How long a command that was stopped may take to end, in [s]."""
+"""Time limit for a stopped command to end, in [s]."""
 
 
 class Stop(Event):
     """
-    The wish to stop.
+    The stop request.
 
-    A signal is handled between any two steps of the main thread. It may be about to wait for this
-    event then, and hold the lock of an `Event`: to set that takes the lock, for which the thread
-    would wait for ever. So this one has none.
+    A signal handler runs between two steps of the main thread. At that moment the thread may be
+    about to wait for this event and hold the lock of an `Event`. Setting an `Event` takes the same
+    lock, so the thread would wait for ever. This class therefore has no lock.
     """
 
     def __init__(self) -> None:
@@ -73,29 +73,29 @@ class Stop(Event):
         self._wakes: SimpleQueue[None] = SimpleQueue()
 
     def is_set(self) -> bool:
-        """Return whether there is the wish."""
+        """Return whether a stop was requested."""
         return self._wished
 
     def set(self) -> None:  # noqa: A003 (an event has it)
-        """Wish it; from a handler of signals too."""
+        """Request a stop; safe in a signal handler."""
         self._wished = True
         self._wakes.put(None)
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait for the wish, for at most a time in [s]; return whether there is one."""
+        """Wait for the request, for at most a time in [s]; return whether there is one."""
         if not self._wished:
             with suppress(Empty):
                 self._wakes.get(timeout=timeout)
-                self._wakes.put(None)  # for the next who waits
+                self._wakes.put(None)  # for the next thread that waits
         return self._wished
 
 
 class _Raising:
-    """Whether a signal raises; of a process, as its signals are."""
+    """Whether a signal raises `StoppedError`; one state for the whole process."""
 
     now = False
     last = -inf
-    """When it last did, in [s]."""
+    """Time of the last raise, in [s]."""
 
 
 def stop_on_signals() -> Stop:
@@ -104,12 +104,12 @@ def stop_on_signals() -> Stop:
 
     def handle(number: int, _frame: object) -> None:
         stop.set()
-        # An impatient user's second signal does not interrupt how things are left in order.
+        # A second signal of an impatient user does not interrupt the clean-up.
         again = number == signal.SIGALRM or monotonic() - _Raising.last > _LONGEST_UNWINDING
         if not (_Raising.now and again):
             return
         _Raising.last = monotonic()
-        # What is raised where Python can only say so, as in __del__, is lost: once more then.
+        # Python only prints what is raised in __del__ and the like: raise once more then.
         sys.unraisablehook = _unraisable
         signal.signal(signal.SIGALRM, handle)
         signal.setitimer(signal.ITIMER_REAL, _LONGEST_UNWINDING)
@@ -117,14 +117,14 @@ def stop_on_signals() -> Stop:
 
     for number in _SIGNALS:
         signal.signal(number, handle)
-    # Python gives up its handlers some time before the process ends: a signal would kill it then.
+    # Python removes its handlers before the process ends: a signal would kill the process then.
     atexit.register(_ignore)
     return stop
 
 
 @contextmanager
 def raising() -> Iterator[None]:
-    """Have a signal raise `StoppedError` within, in the main thread."""
+    """Let a signal raise `StoppedError` in the main thread while the context lasts."""
     _Raising.now, _Raising.last = True, -inf
     try:
         yield
@@ -134,7 +134,7 @@ def raising() -> Iterator[None]:
 
 @contextmanager
 def heeded() -> Iterator[None]:
-    """Have a signal set the wish alone: who is within looks at it in good time."""
+    """Let a signal only set the stop event; the code within the context checks it often."""
     before, _Raising.now = _Raising.now, False
     try:
         yield
@@ -143,7 +143,7 @@ def heeded() -> Iterator[None]:
 
 
 def end_soon(code: int) -> None:
-    """Have the process end with this code, whatever holds it up: who reads it, or threads."""
+    """Make the process end with this code, even if threads or the reader of its output block."""
 
     def end(_number: int, _frame: object) -> NoReturn:
         os._exit(code)
@@ -155,13 +155,13 @@ def end_soon(code: int) -> None:
 @contextmanager
 def bounded_end() -> Iterator[None]:
     """
-    Have SIGALRM end the process where what is done within, its end, does not come to its own.
+    Let SIGALRM end the process if the code within the context, its shutdown, hangs.
 
-    Of some thousand nodes one was seen that did not end by its signal; where it stayed is not
-    known. Where threads of the middleware wait for each other, they may do so with the
-    interpreter's lock: then no thread of Python ends that.
+    Of some thousand nodes one did not end after its signal; where it hung is unknown. If threads
+    of the middleware deadlock while they hold the interpreter's lock, no Python thread can end
+    the process.
     """
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)  # a signal while it configured may have taken it
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)  # configuring may have been given another
     signal.alarm(_LONGEST_END)
     try:
         yield
@@ -175,7 +175,7 @@ def _unraisable(unraisable: Any) -> None:
 
 
 def _ignore() -> None:
-    # For what the interpreter and libraries do when Python is gone, and its handlers with it.
+    # For clean-up by the interpreter and libraries after Python has removed its handlers.
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.alarm(_LONGEST_END)
     for number in _SIGNALS:

@@ -13,12 +13,12 @@
 # limitations under the License.
 
 
-"""What holds for all tests: how examples are judged, and which files come first."""
+"""Settings for all tests: how Hypothesis judges examples, and which files run first."""
 
 from hypothesis import HealthCheck, settings
 import pytest
 
-# A property is not judged by how long an example takes.
+# A property is not judged by the duration of an example.
 settings.register_profile('unhurried', deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('unhurried')
 

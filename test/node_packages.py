@@ -52,8 +52,8 @@ _FONTS = """\
 </fontconfig>
 """
 
-# As npm and Node.js name what goes wrong between here and there. All else is a fault: a package
-# that is not there any more, or another than the lock file knows.
+# Network errors as npm and Node.js name them. Any other error is a failure: a package that is no
+# longer there, or differs from the lock file.
 _NO_WAY_THERE = re.compile(
     r'\b(ENOTFOUND|EAI_AGAIN|ECONNREFUSED|ECONNRESET|ETIMEDOUT|EHOSTUNREACH|ENETUNREACH'
     r'|ERR_SOCKET_TIMEOUT|E403|E407|E5\d\d'

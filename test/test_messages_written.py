@@ -41,7 +41,7 @@ times = st.integers(0, LAST)
 doubles = st.floats(width=64)
 finite = st.floats(allow_nan=False, allow_infinity=False)
 places = st.tuples(finite, finite, finite)
-# What a float32 holds comes back as it was.
+# A value that a float32 can hold is read back unchanged.
 share = st.sampled_from([0.0, 0.25, 0.5, 1.0])
 markers_ = st.builds(
     Marker,

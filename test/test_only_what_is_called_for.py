@@ -118,8 +118,8 @@ SOLVER_SCENES = {
     'table': 'solver: {table: {tolerance: 1.0e-3}}',
 }
 
-# Run in a process of its own: builds the scene, says what was imported, what the tick then
-# published, and which files it passed through.
+# Run in a process of its own: build the scene, and print the imported modules, the topics that the
+# tick then published, and the files it passed through.
 PROGRAM = """
 import json, sys
 from linkage_ros.pipeline.pipeline import Pipeline

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How accurate the kinematics are: millions of cases against balls of more than fifty digits."""
+"""Accuracy of the kinematics: millions of cases against balls of more than fifty digits."""

@@ -123,7 +123,7 @@ def worst_table(tallies: Mapping[str, Tally], over: float) -> Table:
 
 
 def families_table() -> Table:
-    """Return what each family is."""
+    """Return the description of each family."""
     table = Table('Families', ('family', 'what it is'))
     for family in RANDOM:
         what = f'one random {family} dyad on a crank' if len(family) == 3 else 'three random dyads'
@@ -159,7 +159,7 @@ def draw(tallies: Mapping[str, Tally], file: Path, limit: float) -> None:
     families = list(tallies)
     figure = Figure(figsize=(13, 1.6 + 0.24 * len(families)), layout='constrained')
     panels = figure.subplots(1, len(QUANTITIES), sharey=True)
-    # Four bins to an octave are what the eye can tell apart.
+    # Four bins per octave are as fine as the eye can distinguish.
     step = OCTAVE // 4
     borders = edges()[::step]
     image: Any = None

@@ -17,8 +17,8 @@
 The hard cases, and why each is hard.
 
 Linkages of one loop are made from their lengths, with frames as one would draw them. There are
-four-bars and sliders that are hard, each in its own way, and what is hard for linkages of every
-kind: forced angles, large angles, sizes, and chains.
+four-bars and sliders that are hard, each in its own way, and difficulties that linkages of every
+kind share: forced angles, large angles, sizes, and chains.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from campaigns.accuracy.random_families import (
 import numpy as np
 
 A, B, C, D = ('crank', 'A', 'x'), ('coupler', 'B', 'x'), ('rocker', 'B', 'x'), ('ground', 'D', 'x')
-"""Where the four lengths of a four-bar stand."""
+"""Positions of the four lengths of a four-bar."""
 
 
 def four_bar(
@@ -490,7 +490,7 @@ def _two_dyads(rng: random.Random) -> tuple[Builder, list[str]]:
 
 
 class Hard(NamedTuple):
-    """Why it is hard, and how a linkage with its input angles is made."""
+    """Why a case is hard, and a function that makes a linkage with its input angles."""
 
     why: str
     make: Callable[[random.Random], Case]

@@ -107,7 +107,7 @@ class RPR:
         return base + arm * motion.constants.twists[self.slider]
 
     def margin(self, motion: Motion) -> Any:
-        """Return what the pins are farther apart than they must, in the constants' unit."""
+        """Return by how much the pins are too far apart, in the constants' unit."""
         diagonal = motion.at(self.d) - motion.at(self.a)
         base = self._base(motion) * motion.constants.directions[self.slider].conjugate()
         return abs(diagonal[0]) - abs(base.imag)
@@ -303,7 +303,7 @@ class RRR:
         return side
 
     def margin(self, motion: Motion) -> Any:
-        """Return what the links reach farther than they must, in the unit of the constants."""
+        """Return by how much the links reach farther than needed, in the unit of the constants."""
         diagonal = motion.at(self.d) - motion.at(self.a)
         s = abs(diagonal[0])
         b = abs(motion.vector(self.one, self.a.point, self.pin))

@@ -14,10 +14,10 @@
 
 
 """
-One linkage, solved by the package and by the reference: by how much they differ.
+One linkage, solved by the package and by the reference, and the differences.
 
-Millions of errors are kept as histograms and a few worst cases, the same in whatever order they
-come.
+Millions of errors are kept as histograms and a few worst cases; the result does not depend on
+their order.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ Nearer to a toggle a rate has no correct digit, whichever status is told.
 """
 
 _CORRECT = 2.0**-163
-"""What the enclosure of a result may be wide, as a part of κ, u being 2⁻⁵³: fifty digits."""
+"""Maximum width of a result's enclosure, relative to κ, with u = 2⁻⁵³: fifty digits."""
 
 _LEAST = 2.0**-960
 """Below this κ, u·κ is no normal number."""
@@ -75,7 +75,7 @@ Answer = tuple[tuple[float, ...], ...]
 @dataclass
 class Findings:
     """
-    What a linkage's cases came to.
+    The results of a linkage's cases.
 
     Attributes
     ----------
@@ -271,7 +271,7 @@ class Worst(NamedTuple):
 
 
 class Note(NamedTuple):
-    """What else was not as it should be, and where."""
+    """Other faults, and their places."""
 
     linkage: int
     case: int
@@ -340,7 +340,7 @@ class Tally:
         self._keep([Note(linkage, case, text) for case, text in findings.notes])
 
     def merge(self, other: Tally) -> None:
-        """Add what another part of the campaign has found."""
+        """Add the findings of another part of the campaign."""
         self.counts += other.counts
         for quantity, found in other.quantities.items():
             self.quantities.setdefault(quantity, Quantity()).merge(found)

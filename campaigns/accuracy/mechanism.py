@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-A linkage as the reference sees it: links, sliders, and the dyads in the order they are solved in.
+A linkage for the reference: links, sliders, and the dyads in the order of solution.
 
-The package finds the dyads from the linkage file's terms; the reference is told them by whoever
-made the linkage, so that neither can inherit a mistake from the other.
+The package finds the dyads from the linkage file's terms. The reference gets them from the
+generator of the linkage, so that neither can inherit a mistake from the other.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class Mechanism:
     dyads
         In the order in which they are solved.
     joints
-        What is published: a turn, or the name of a slider.
+        The published joint: an angle, or the name of a slider.
     ties
         Where lengths hang together (a parallelogram's), the free ways for them to change; None:
         each number changes by itself.
@@ -146,7 +146,7 @@ class Mechanism:
         return found
 
     def start(self, slider: str) -> Spot:
-        """Return where the line of a slider starts."""
+        """Return the origin of a slider's line."""
         slide = self.sliders[slider]
         return Spot(slide.along, slide.through)
 

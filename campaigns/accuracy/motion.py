@@ -21,13 +21,13 @@ Nothing is differentiated by hand: the crank's direction is the series of e^iφ(
 are read from their second and third coefficients. A ball encloses its exact value, so that the
 number of correct digits is proved with each result.
 
-**Condition numbers** are made of how a motion changes with each number of its linkage. The closing
-equation of a dyad, differentiated by a number, is linear in the changes of its two unknowns, at
-every time: a power series again, with the same determinant for all numbers. The directions of all
-links, the slides and the inverse of the determinant come from the reference and are right to the
-last digit of a double; nothing that cancels near a singularity is computed here. Sums remain that
-are as large as what they are compared with, so double precision is enough for a condition number;
-a test compares it with differences of fifty digits.
+**Condition numbers** follow from the derivative of a motion with respect to each number of its
+linkage. The closing equation of a dyad, differentiated by a number, is linear in the derivatives
+of its two unknowns, at every time: again a power series, with the same determinant for all
+numbers. The directions of all links, the slides and the inverse of the determinant come from the
+reference and are right to the last digit of a double; nothing that cancels near a singularity is
+computed here. The remaining sums are as large as their terms, so double precision is enough for a
+condition number; a test compares it with differences of fifty digits.
 
 Arrays are [power of time, case, number].
 """
@@ -167,7 +167,7 @@ class Motion:
             self._behind = True
 
     def at(self, spot: Spot) -> Any:
-        """Return where a point of a placed link is."""
+        """Return the position of a point of a placed link."""
         z = self.constants.points[spot]
         if spot.link == GROUND:
             return acb_series([z])
@@ -177,7 +177,7 @@ class Motion:
         return place
 
     def vector(self, link: str, start: str, end: str) -> Any:
-        """Return what leads from one point of a link to another, in its frame."""
+        """Return the vector from one point of a link to another, in its frame."""
         return self.constants.points[Spot(link, end)] - self.constants.points[Spot(link, start)]
 
     def place(self, link: str, unit: Any, point: str, where: Any) -> None:
@@ -276,7 +276,7 @@ def times(series: Array, change: Array) -> Array:
 
 
 def handed_on(mechanism: Mechanism) -> tuple[Handed, ...]:
-    """Return what dyads hand on to the ones behind them: pins, then angles and slides in order."""
+    """Return what dyads pass to later ones: pins, then angles and slides in order."""
     if len(mechanism.dyads) < 2:
         return ()
     links = [link for link in mechanism.links if link not in {GROUND, CRANK}]
@@ -309,7 +309,7 @@ class Tangent:
     Parameters
     ----------
     mechanism
-        What is varied.
+        The quantity that varies.
     constants
         Its numbers as balls.
     numbers
@@ -404,7 +404,7 @@ class Tangent:
         return self._values[next(self._inverse)][..., None]
 
     def vector(self, link: str, start: str, end: str) -> tuple[complex, Array]:
-        """Return what leads from one point of a link to another, and its change."""
+        """Return the vector from one point of a link to another, and its change."""
         points = self._constants.points
         value = complex(points[Spot(link, end)] - points[Spot(link, start)])
         return value, self._vectors[link, end] - self._vectors[link, start]

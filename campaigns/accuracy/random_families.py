@@ -16,9 +16,9 @@
 """
 Random linkages: one dyad of each type on a crank, and chains of three.
 
-A linkage is made from a pose: pins are put where they shall be, and the links follow. So it closes
-at the crank angle that it was made at, whatever its dyads. Frames are plain (origin on the first
-pin, x axis towards the second) or anywhere: a file may have either.
+A linkage is made from a pose: pins are placed, and the links follow. So it closes at the crank
+angle of that pose, whatever its dyads. Frames are plain (origin on the first pin, x axis towards
+the second) or arbitrary: a file may have either.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Builder:
         self._names = 0
 
     def mechanism(self) -> Mechanism:
-        """Return what has been built."""
+        """Return the built linkage."""
         return Mechanism(self._links, self._sliders, tuple(self._dyads), self._joints)
 
     def is_first(self) -> bool:
@@ -112,7 +112,7 @@ class Builder:
         self._links[link][point] = (z.real, z.imag)
 
     def where(self, spot: Spot) -> complex:
-        """Return where a point is in the pose."""
+        """Return the position of a point in the pose."""
         origin, unit = self._frames[spot.link]
         return origin + unit * complex(*self._links[spot.link][spot.point])
 

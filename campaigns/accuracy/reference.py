@@ -14,30 +14,31 @@
 
 
 """
-The truth at one input angle, to fifty digits and more, with its condition numbers.
+Reference at one input angle, to fifty digits and more, with its condition numbers.
 
-Where there is no solution, the reference says so. Where rounding of the inputs may decide whether
-there is one, the case is at a limit.
+If there is no solution, the reference says so. If rounding of the inputs may decide whether there
+is one, the case is at a limit.
 
 Condition numbers κ = Σ|xᵢ ∂y/∂xᵢ| + |y| of positions, velocities and accelerations.
 
 The sum goes over all coordinates, directions and angles of the linkage, the input angle at its
 size within (-π, π], its rate and its acceleration. A published angle counts as π at least: a
-direction is a sum of angles of up to half a turn, and where they cancel, rounding stays. |y| is
-the sum of the sizes of what a joint is the difference of: the angles of two links, or their rates.
+direction is a sum of angles of up to half a turn, and where they cancel, rounding remains. |y| is
+the sum of the sizes of the two terms whose difference a joint is: the angles of two links, or
+their rates.
 
-A linkage of several dyads is solved one after the other, and what one hands on is a double. So it
-is a datum of all that follow. Let a stage return zₖ with an error of at most C·u·κₖ, κₖ its own
-condition. To first order the error of y is then at most C·u·Σ|∂y/∂zₖ|·κₖ: a sum over stages joins
-that over numbers, and a solver whose dyads are each within C·u·κ stays within it as a whole. No
-solver can do without: two data that come from one number are rounded each by itself, and what
-would cancel between them does not. The stages are
+The dyads of a linkage are solved one after the other, and each passes doubles on. So the results
+of a dyad are data of all that follow. Let a stage return zₖ with an error of at most C·u·κₖ, κₖ
+its own condition. To first order the error of y is then at most C·u·Σ|∂y/∂zₖ|·κₖ: a sum over
+stages joins that over numbers, and a solver whose dyads are each within C·u·κ stays within it as a
+whole. No solver can avoid this: two data that come from one number are rounded independently, and
+errors that would cancel between them do not. The stages are
 
-- the angle between what the first dyad sees on crank and ground: φ and a direction of the file,
-  where that is not 0, at the size of the sum;
+- the angle of the first dyad between crank and ground: φ and a direction of the file, where that
+  is not 0, at the size of the sum;
 - the angles and slides that a dyad finds, their rates and accelerations, with the κ of each;
-- the pins by which links are held, and the points that a later dyad is given, with their
-  velocities and accelerations, each coordinate at its own size: sums of what has been counted.
+- the pins by which links are held, and the points that are given to a later dyad, with their
+  velocities and accelerations, each coordinate at its own size: sums of terms already counted.
 
 All of it is the reference's: ∂y/∂zₖ is found by changing zₖ between two of its dyads.
 """

@@ -14,10 +14,10 @@
 
 
 """
-The campaign: what there is to be done, done in parts, by as many processes as are wanted.
+The work of the campaign, in parts that any number of processes share.
 
-Each linkage has a generator of its own, seeded by the campaign's seed, its family and its number:
-what comes out does not depend on how the work was shared, and any linkage can be made again.
+Each linkage has a random generator of its own, seeded by the campaign's seed, its family and its
+number: the result does not depend on how the work was shared, and any linkage can be made again.
 """
 
 from __future__ import annotations
@@ -98,14 +98,14 @@ def run(
     work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
 ) -> dict[str, Tally]:
     """
-    Do all parts and return what was found by family.
+    Run all parts and return the findings by family.
 
     Parameters
     ----------
     work
         The parts.
     jobs
-        How many processes; 1: this one.
+        Number of processes; 1 runs in this one.
     progress
         Called with the number of linkages of each part that is done.
 

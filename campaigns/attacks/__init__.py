@@ -13,4 +13,4 @@
 # limitations under the License.
 
 
-"""Input that is meant to break something: files, bags, messages and calls, drawn at random."""
+"""Hostile input: files, bags, messages and calls, drawn at random."""

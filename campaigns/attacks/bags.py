@@ -14,12 +14,12 @@
 
 
 """
-Bags that are changed at random, through the commands that look at one.
+Bags that are changed at random, through the commands that read one.
 
-Bits are flipped, files cut, records taken out, doubled, put elsewhere and into other bags, lengths
-and numbers replaced; mostly without the checksums, which would tell at once. So are the texts
-that a bag carries, with checksums that fit. A command has to end in time and within memory, with
-what it could tell or with one line. Whatever else comes of it is a finding.
+Bits are flipped, files cut, records removed, doubled, moved and put into other bags, lengths and
+numbers replaced; mostly without checksums, which would reveal the change at once. The texts that a
+bag carries are changed too, with correct checksums. A command has to end in time and within
+memory, with the remaining content or with one line. Any other outcome is a finding.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ COMMANDS = {
     'export': ['-o', 'x.csv'],
     'plot': ['-o', 'x.png'],
 }
-"""What is tried on each bag, and what is typed behind its name."""
+"""Commands to try on each bag, with the arguments after its name."""
 
 _PART = 10
 """Bags that a process takes."""
@@ -79,7 +79,7 @@ _WORDS = (
     *(b'9' * 5000, b'x' * 50_000, b'\xff\xfe', b'\x1b[31m', '\u202e'.encode(), b'os.path: {}'),
 )
 _AT_CHECKSUM = {Opcode.CHUNK: 33, Opcode.DATA_END: 9, Opcode.FOOTER: 25}
-"""Where in a record its checksum stands; an attachment's stands at its end."""
+"""Offset of the checksum in each record; an attachment has it at its end."""
 
 
 def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[str]]:
@@ -89,18 +89,18 @@ def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[s
     Parameters
     ----------
     count
-        How many bags.
+        Number of bags.
     seed
         Another seed changes them otherwise.
     jobs
-        How many processes share them.
+        Number of processes that share them.
 
     Returns
     -------
     tried : dict
         By command and how it ended how often it did.
     findings : list
-        What must not be, a line each.
+        The violations, one line each.
 
     """
     return tried_in_parts(_part, count, seed, _PART, jobs)
@@ -125,9 +125,9 @@ def _part(part: tuple[int, int, int]) -> tuple[Counter[str], list[str]]:
 
 
 def judged(ended: Ended) -> str:
-    """Return what is wrong with an end, in a line; nothing where it is as it should be."""
+    """Return the fault of an end, in a line; None if it is correct."""
     code, said, out = ended
-    # That a bag has no end is said beside what else is.
+    # A missing end is reported in addition to other damage.
     lines = [line for line in said.splitlines() if ': unfinished: ' not in line]
     wrong = ''
     if code not in (0, 1, 2):

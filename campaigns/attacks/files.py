@@ -16,8 +16,8 @@
 """
 Files that are changed at random, through every command that takes one.
 
-Each has to end in time and within memory: with what was asked for, or with exit code 2 and a
-line that is no longer than a screen. Whatever else comes of it is a finding.
+Each has to end in time and within memory: with its result, or with exit code 2 and a line that is
+no longer than a screen. Any other outcome is a finding.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ _BYTES = (
 
 
 def mutated(data: bytes, rng: random.Random) -> tuple[str, bytes]:
-    """Return what was done, in words, and a file that it was done to, once or a few times."""
+    """Return a description of the changes, and a file with one or a few of them."""
     done = []
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         change = rng.choice(_CHANGES)
@@ -190,7 +190,7 @@ COMMANDS = {
     'replay': ['bag', '--scene', _FILE],
     'run': [_FILE, '--plain', '--seconds', '0.1', '--runs', 'runs'],
 }
-"""What is typed behind each command."""
+"""Arguments of each command."""
 
 _SCENE = ('scene', 'cost', 'urdf', 'mjcf', 'accuracy', 'replay', 'run')
 _TABLES = {
@@ -210,14 +210,14 @@ def attack(count: int, seed: int, jobs: int = 1) -> tuple[dict[str, int], list[s
     seed
         Another seed changes them otherwise.
     jobs
-        How many processes share them.
+        Number of processes that share them.
 
     Returns
     -------
     tried : dict
         By command and how it ended how often it did.
     findings : list
-        What must not be, a line each.
+        The violations, one line each.
 
     """
     return tried_in_parts(_part, count, seed, _PART, jobs)
@@ -276,7 +276,7 @@ def _record(linkages: Mapping[str, bytes]) -> None:
 
 
 def _try(originals: dict[str, dict[str, bytes]], seed: str) -> tuple[str, str]:
-    """Try a file; return the command and how it ended, and what must not be."""
+    """Try a file; return the command, its end, and the violations."""
     rng = random.Random(seed)
     kind = rng.choice(('linkage', 'linkage', 'linkage', 'scene', 'scene', 'urdf', 'table'))
     name = rng.choice(sorted(originals[kind]))
@@ -312,13 +312,13 @@ def _node(arguments: list[str]) -> tuple[Any, str]:
         )
     except subprocess.TimeoutExpired:
         return 'no end', f'more than {_SECONDS} s'
-    # What a node says as it goes is no answer.
+    # Log lines of the node are no answer.
     lines = [line for line in ended.stderr.splitlines() if not line.startswith(('INFO', 'WARN'))]
     return ended.returncode, '\n'.join(lines)
 
 
 def judged(command: str, code: Any, said: str) -> str:
-    """Return what is wrong with an end, in a line; nothing where it is as it should be."""
+    """Return the fault of an end, in a line; None if it is correct."""
     lines = [line for line in said.splitlines() if not line.startswith(_BESIDE)]
     if command == 'replay' and code == 0:
         lines = [line for line in lines if not line.startswith('linkage replay: ')]
@@ -327,7 +327,7 @@ def judged(command: str, code: Any, said: str) -> str:
     if code != 2:
         return f'{code}: {said.strip()[:300]}'
     longest = max(map(len, lines), default=0)
-    # With jsonschema a scene is told all that is wrong with it.
+    # With jsonschema, all errors of a scene are reported.
     if not lines or (len(lines) > 1 and command != 'scene'):
         return f'{len(lines)} lines: {said.strip()[:300]}'
     return f'a line of {longest} letters: {said[:100]}' if longest > _LONGEST_LINE else ''

@@ -14,12 +14,12 @@
 
 
 """
-Floods and storms: a node that runs, and another that sends it whatever a graph can send.
+Floods and storms: a running node, and another that sends it whatever a graph can send.
 
-First messages as many and as large as they come, then calls of services, parameters and
+First come messages as many and as large as possible, then calls of services, parameters and
 transitions in any order. Nothing may end the node, every joint state is the pose of a crank that
-was sent, and every message is accounted for. ``python -m campaigns.attacks.graph`` is the one
-that attacks; `attack` starts both, each a process on a graph of its own.
+was sent, and every message is accounted for. ``python -m campaigns.attacks.graph`` is the
+attacking node; `attack` starts both, each a process on a graph of its own.
 """
 
 from __future__ import annotations
@@ -176,16 +176,16 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
     Parameters
     ----------
     seconds
-        How long floods and storms last together, in [s].
+        Total duration of floods and storms, in [s].
     seed
         Of all that is drawn.
 
     Returns
     -------
     tried : dict
-        How much of what was tried.
+        Number of tries, by kind.
     findings : list
-        What must not be, a line each.
+        The violations, one line each.
 
     """
     with TemporaryDirectory(prefix='linkage_ros_attack_') as name:
@@ -213,7 +213,7 @@ def attack(seconds: float, seed: int) -> tuple[dict[str, int], list[str]]:
 
 
 def _judged(log: str, tried: dict[str, int]) -> list[str]:
-    """Return what is wrong with what a node has said."""
+    """Return the faults in a node's output."""
     closings = [
         {key: int(value or 0) for key, value in found.groupdict().items()}
         for found in _CLOSING.finditer(log)
@@ -243,7 +243,7 @@ def crank(angle: float, *, joints: int = 1, rate: float = 0.0) -> bytes:
 
 
 def malformed(random: Random) -> bytes:
-    """Return what is no good message of a crank, of any size."""
+    """Return an invalid crank message, of any size."""
     joints = int(LARGEST ** random.random())
     message = crank(BAD, joints=joints)
     kind = random.randrange(7)
@@ -279,7 +279,7 @@ class Attacker:
     Parameters
     ----------
     seconds
-        How long it does so, in [s].
+        Duration, in [s].
     seed
         Of all that is drawn.
 

@@ -15,8 +15,8 @@
 """
 Signals at random instants of every command that starts no node: each ends it, or comes too late.
 
-From when its handlers are there a command ends within seconds, with exit code 1 and a line, and
-leaves no file but what it was asked for. Before, Python starts, and no program can do anything.
+Once its handlers are installed, a command ends within seconds, with exit code 1 and one line, and
+leaves no file but its result. Before that Python is starting, and no program can react.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _COMMANDS = {
 
 
 def attack(count: int, seed: int) -> tuple[dict[str, int], list[str]]:
-    """Send signals; return how often a command ended how, and what must not be, a line each."""
+    """Send signals; return the counts of each kind of end, and the violations, one line each."""
     tried: Counter[str] = Counter()
     findings = []
     for number in range(count):

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Bags that are cut at every byte, and of which every bit is flipped, one at a time."""
+"""Bags cut at every byte, and bags with every single bit flipped, one at a time."""

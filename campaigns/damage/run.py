@@ -14,9 +14,9 @@
 
 
 """
-Bags are damaged, read and recovered; a verdict holds the outcome against what is true of them.
+Bags are damaged, read and recovered; a verdict compares the outcome with the original.
 
-The bags are a node's own, and others as other writers leave them. The damages are shared among
+The bags are a node's own, and others in the style of other writers. The damages are shared among
 processes.
 """
 
@@ -145,7 +145,7 @@ KINDS: dict[str, Callable[..., Path]] = {
 
 
 FAULT = 'FAULT: '
-"""What a verdict that must not be begins with."""
+"""Prefix of a verdict that is a violation."""
 
 
 def judge_reading(subject: Subject, *, allow_truncated: bool) -> str:

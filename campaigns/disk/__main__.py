@@ -134,7 +134,7 @@ def filling_table(filled: Sequence[Filled]) -> Table:
 
 
 def stalling_tables(runs: Sequence[Stalled]) -> list[Table]:
-    """Return what became of the ticks, and of the messages."""
+    """Return the outcome for the ticks and for the messages."""
     ticks = Table(
         'Disks that stall: ticks',
         (

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Every call of a recording fails once, and from then on, in every way."""
+"""Every system call of a recording fails, once or from then on, in every way."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ class Part(NamedTuple):
 
 class Tried(NamedTuple):
     """
-    One recording, and what became of it.
+    One recording, and its outcome.
 
     Attributes
     ----------
     setting
         Name of one of `SETTINGS`.
     injection
-        What failed; None for nothing.
+        The injected fault; None for none.
     calls
         All calls that it made.
     outcome

@@ -16,7 +16,7 @@
 """
 Recordings on a small disk that fills, by the recording itself or by another process.
 
-The disks have a few MiB and are mounted for a while, where that is permitted.
+The disks have a few MiB and are mounted temporarily, where that is permitted.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Disk(NamedTuple):
     Attributes
     ----------
     name
-        What it is called in reports.
+        Its name in reports.
     kind
         'tmpfs' or 'ext4'; the latter is an image on a loop device.
     size
@@ -184,7 +184,7 @@ FILLERS: Mapping[str, Filler | None] = {
 
 class Filled(NamedTuple):
     """
-    A recording, and what became of it.
+    A recording, and its outcome.
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ class Filled(NamedTuple):
     least_free, free
         The least that was free while it was made, and what was at its end [bytes].
     failure
-        What it said; '' for nothing.
+        Its output; '' if none.
 
     """
 

@@ -14,11 +14,11 @@
 
 
 """
-Run a recording in a process of its own, and answer its calls as a failing disk would.
+Run a recording in a process of its own, and answer its system calls as a failing disk would.
 
 System calls wait until another process answers them: Linux' ``seccomp_unotify(2)``. So a call
-fails where a disk makes it fail, in the kernel, whoever makes it: the interpreter, its buffered
-files, the C library. No compiler, no tracer and no privilege is needed.
+fails in the kernel, as with a failing disk, whoever makes it: the interpreter, its buffered files
+or the C library. No compiler, tracer or privilege is needed.
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ _ALL = _CHANGE | {'open', 'close', 'rmdir', 'statfs'}
 
 class Fault(NamedTuple):
     """
-    What a call comes to.
+    A fault of a system call.
 
     Attributes
     ----------
     calls
         The calls that it can befall.
     error
-        Its error number; 0 where it is none.
+        Its error number; 0 if there is none.
     short
         Whether it writes less than it was given.
     loses
@@ -152,7 +152,7 @@ _ARM: Mapping[int, Signature] = {
     83: Signature('fsync'),
     276: Signature('rename', 1),
 }
-# Of each machine the calls, and seccomp's own number.
+# System calls of each machine, and the number of seccomp itself.
 _MACHINES = {'x86_64': (_X86, 317), 'aarch64': (_ARM, 277)}
 
 _libc = ctypes.CDLL(None, use_errno=True)
@@ -171,7 +171,7 @@ class Call(NamedTuple):
     name
         What it does.
     path
-        The file that it is about; '' where that is none.
+        The file concerned; '' if none.
     arguments
         As they stand in the registers.
 
@@ -185,7 +185,7 @@ class Call(NamedTuple):
 
 
 def why_not() -> str:
-    """Return why calls cannot be answered on this machine; '' where they can."""
+    """Return why calls cannot be answered on this machine; '' if they can."""
     if platform.system() != 'Linux' or platform.machine() not in _MACHINES:
         return f'no table of system calls for {platform.system()} on {platform.machine()}'
     if tuple(map(int, platform.release().split('.')[:2])) < (5, 6):
@@ -266,7 +266,7 @@ class Listener:
         self._answer(call, value, 0, 0)
 
     def data(self, call: Call) -> bytes:
-        """Return what is to be written."""
+        """Return the data to write."""
         with open(f'/proc/{call.thread}/mem', 'rb', buffering=0) as memory:  # noqa: PTH123
             memory.seek(call.arguments[1])
             return memory.read(call.arguments[2])
@@ -368,12 +368,12 @@ def run(do: Do, folder: Path, injection: Injection | None) -> tuple[Recorded | N
     folder
         The bag's; calls about others are let pass.
     injection
-        What fails; None for nothing.
+        The fault to inject; None for none.
 
     Returns
     -------
     tuple
-        How it went, None where it did not come to an end; and all its calls.
+        Its outcome, None if it did not end; and all its calls.
 
     """
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -427,7 +427,7 @@ class _Supervisor:
         self._injection = injection
         self._phase = 'beginning'
         self._seen: list[Seen] = []
-        # Where the last fsync that succeeded has left each file.
+        # Size of each file at its last successful fsync.
         self._safe: dict[str, int] = {}
 
     def supervise(self) -> tuple[Recorded | None, list[Seen]]:
@@ -490,7 +490,7 @@ class _Supervisor:
             os.close(file)
 
     def _write_half(self, call: Call) -> int:
-        """Write the first half of the data, for real, and return how much that is."""
+        """Write the first half of the data to the disk, and return its size."""
         data = self._listener.data(call)
         file = self._listener.file_of(call)
         try:

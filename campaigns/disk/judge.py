@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A short recording that does all that a writer does, and its outcome held against its input."""
+"""A short recording that uses every function of a writer, and its outcome against its input."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ SETTINGS: Mapping[str, Storage] = {
 @dataclass(slots=True)
 class Recorded:
     """
-    How a recording went, as whoever made it sees it.
+    The outcome of a recording, as its caller sees it.
 
     Attributes
     ----------
     refused
         Why it could not begin; '' where it did.
     escaped
-        What came out that is no RecordingError; '' for nothing.
+        An exception other than RecordingError; '' if none.
     offered
         Messages.
     counts
@@ -219,14 +219,14 @@ AT_RECOVERY = 'ended early and said so; all that was counted, by recover'
 @dataclass(slots=True)
 class Outcome:
     """
-    What became of a recording.
+    The outcome of a recording.
 
     Attributes
     ----------
     verdict
         In words; '' where there is no more than faults.
     faults
-        What must not be.
+        The violations.
     offered, recorded, let_go
         Messages.
 
@@ -241,14 +241,14 @@ class Outcome:
 
 class Expectation:
     """
-    What is expected of a recording.
+    The expected outcome of a recording.
 
     Parameters
     ----------
     messages
         What it was offered, in order.
     keeps_all
-        Whether nothing may go wrong.
+        Whether the recording may lose nothing.
     may_leave
         Whether what is not wanted any more may lie there still: it could not be removed.
     loses_pages
@@ -275,7 +275,7 @@ class Expectation:
         self._numbers = {message.log_time: at for at, message in enumerate(messages)}
 
     def run_of(self, found: Sequence[BagMessage]) -> range | None:
-        """Return which these are, in a row and byte for byte; None where they are others."""
+        """Return the numbers of these consecutive messages, byte for byte; None if they differ."""
         if not found:
             return range(0)
         first = self._numbers.get(found[0].log_time, 0)
@@ -292,7 +292,7 @@ def judge(
     Parameters
     ----------
     done
-        How it went; None where it did not come to an end.
+        Its outcome; None if it did not end.
     folder
         The bag's.
     expectation
@@ -336,7 +336,7 @@ def judge(
 
 
 def _is_line(said: str, folder: Path) -> bool:
-    """Return whether it says where, what, and what would help, on one line."""
+    """Return whether it has place, reason and remedy, on one line."""
     where, _, rest = said.partition(': ')
     reason, _, remedy = rest.partition('; ')
     return (
@@ -407,7 +407,7 @@ def _ended_early(
 
 
 def _recovered(counted: range, folder: Path, expectation: Expectation, target: Path) -> list[str]:
-    """Return what recover lost of what was counted."""
+    """Return the counted messages that recover lost."""
     try:
         recover(folder, target)
         found = list(read_bag(target).messages())
@@ -431,7 +431,7 @@ def _holds(run: range, counted: range) -> bool:
 
 
 def _metadata(folder: Path) -> list[str]:
-    """Return what is wrong with ``metadata.yaml``."""
+    """Return the faults of ``metadata.yaml``."""
     try:
         said: Any = yaml.safe_load((folder / METADATA_FILE).read_text(encoding='utf-8'))
         named = said[ROOT_KEY]['relative_file_paths']

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A node at work on a disk that stalls: what its ticks and its bag make of it."""
+"""A node at work on a disk that stalls: the effect on its ticks and its bag."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ class Plan(NamedTuple):
     Attributes
     ----------
     name
-        What it is called in reports.
+        Its name in reports.
     seconds
         How long it is.
     stall
-        How long the disk stalls, from the middle on [s]; 0 for never.
+        Duration of the stall, from the middle of the run [s]; 0 for none.
     queue
         Messages that may wait.
     comes_back
@@ -111,11 +111,11 @@ class Stalled:
     gaps
         Ticks that are missing in the bag between its first and last.
     ended
-        How long the node took to end, from the signal on [s].
+        Time from the signal to the end of the node [s].
     said
         Its last line about the recording.
     faults
-        What must not be.
+        The violations.
 
     """
 
@@ -295,7 +295,7 @@ def _look(done: Stalled, folder: Path, begin: int, end: int) -> None:
 
 def _lateness(times: Sequence[int], period: int) -> list[int]:
     """
-    Return by how much each tick was late [ns].
+    Return the lateness of each tick [ns].
 
     Ticks are due a period apart; which are due when is told by the most punctual one of a second,
     or of what lies between two gaps.

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Long runs: a day in minutes, and ten minutes over DDS; what they hold of memory, and count."""
+"""Long runs, a day in minutes and ten minutes over DDS: memory use and message counts."""

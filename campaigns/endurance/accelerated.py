@@ -16,8 +16,8 @@
 """
 A day of ticks without the waiting: the node's tick loop and its recorder, on simulated time.
 
-The ticks wait for the recorder's queue now and then, so that nothing is dropped: in a real run
-the disk has the time that is left out here.
+Now and then the ticks wait for the recorder's queue, so that nothing is dropped: in a real run
+the disk has the time between ticks, which is left out here.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Plan(NamedTuple):
     scene
         Name of a scene that comes with the package.
     hours
-        How long, in simulated time.
+        Duration, in simulated time.
     rate
         Ticks a second, instead of the scene's own.
     split_seconds, keep_files
@@ -82,7 +82,7 @@ class Plan(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return what it is called in tables."""
+        """Return its name in tables."""
         return self.scene if self.split_seconds else f'{self.scene}, one file'
 
 
@@ -98,13 +98,13 @@ class Run:
     samples
         What the process held, from the beginning to the end.
     summary
-        What became of the messages.
+        The outcome for the messages.
     published
         Joint states that the tick loop has counted.
     seconds
-        How long it took.
+        Its duration.
     faults
-        What must not be.
+        The violations.
 
     """
 
@@ -123,7 +123,7 @@ def run_all(plans: Sequence[Plan], jobs: int) -> list[Run]:
 
 
 def run(plan: Plan) -> Run:
-    """Run, and hold the bag against what was counted."""
+    """Run, and compare the bag with the counts."""
     say(f'{plan.name}: {plan.hours:g} h at {plan.rate:g} Hz')
     with TemporaryDirectory(prefix='linkage_ros_endurance_') as name:
         return _run(plan, Path(name))

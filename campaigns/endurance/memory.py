@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a process holds: memory, open files, threads; is it flat? And what a bag counts."""
+"""Memory, open files and threads of a process, whether they stay flat, and counts of a bag."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def account_of(folder: Path) -> Account:
 
 
 def shortcomings(folder: Path) -> list[str]:
-    """Return what does not add up in a bag, or is not there."""
+    """Return the inconsistencies and missing parts of a bag."""
     try:
         bag = read_bag(folder)
         counts = Counter(message.topic for message in bag.messages())
@@ -72,7 +72,7 @@ MOST_GROWTH = 1024
 
 class Usage(NamedTuple):
     """
-    What a process holds at a time.
+    Memory, open files and threads of a process at one time.
 
     Attributes
     ----------

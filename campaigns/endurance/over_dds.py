@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Minutes over DDS: a node and a crank source, each a process; what the node holds and says."""
+"""Minutes over DDS: a node and a crank source in two processes; the node's memory and counts."""
 
 from __future__ import annotations
 
@@ -54,13 +54,13 @@ class DdsRun:
     samples
         What the node's process held.
     ticks
-        What the last diagnostics say of them.
+        Their counts in the last diagnostics.
     account
         What the bag says of its messages.
     replayed
         The account of ``linkage replay``.
     faults
-        What must not be.
+        The violations.
 
     """
 
@@ -134,7 +134,7 @@ def _scene(folder: Path, split_seconds: float) -> Path:
 
 
 def _ticks(bag: Path) -> dict[str, str]:
-    """Return what the last diagnostics in a bag say of the ticks and of the crank."""
+    """Return the last diagnostics in a bag on the ticks and the crank."""
     store = get_typestore(Stores.ROS2_JAZZY)
     last = b''
     for message in read_bag(bag).messages():

@@ -14,11 +14,11 @@
 
 
 """
-What is recorded, how, when it is killed; and the marks by which the killer knows its progress.
+The plan of a recording and of its kill, and the marks that show the killer its progress.
 
-Marks lie in the memory of a file that both processes have mapped. A value that is stored there is
-visible at once and stays when the process is killed; a pipe would hold back what was not yet
-written to it. Each number is eight aligned bytes, stored by one instruction.
+Marks lie in the memory of a file that both processes have mapped. A value stored there is visible
+at once and survives the kill; a pipe would lose data not yet written to it. Each number is eight
+aligned bytes, stored by one instruction.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ ATTACHMENTS = {
 
 
 class Phase(IntEnum):
-    """What the recording was doing; in the order in which it comes to it."""
+    """Phases of the recording, in order."""
 
     STARTING = 0
     MAKING = 1
@@ -95,7 +95,7 @@ class Plan(NamedTuple):
     aim
         The phase whose beginning the delay counts from; MAKING, the first, for any instant.
     time
-        The how manyth time that the phase comes, from 1 on.
+        Which occurrence of the phase, counted from 1.
     delay
         From there to the kill [s].
 
@@ -229,7 +229,7 @@ class Marks:
 
     @property
     def phase(self) -> Phase:
-        """Return what is being done, or was when the process was killed."""
+        """Return the current phase, or the one in which the process was killed."""
         return Phase(self._numbers[_STATE] % _PHASES)
 
     @property

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Kill recordings, and hold what is left against what was offered."""
+"""Kill recordings, and compare the remaining bag with the messages offered."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from rosbags.highlevel import AnyReader
 import yaml
 
 FAULT = 'FAULT: '
-"""What a verdict that must not be begins with."""
+"""Prefix of a verdict that is a violation."""
 
 NO_FOLDER = 'no folder yet'
 NO_FILE = 'nothing whole yet, and says so'
@@ -53,14 +53,14 @@ GONE_FILE = 'a file that made way there, no longer named'
 @dataclass(slots=True)
 class Outcome:
     """
-    What became of one recording.
+    The outcome of one recording.
 
     Attributes
     ----------
     plan
-        How it was killed.
+        The kind of kill.
     phase
-        What it was doing then.
+        The phase that it was in.
     offered, found, let_go
         Messages: that the recorder was given, that are in the bag, and that were in files which
         made way for newer ones.
@@ -76,7 +76,7 @@ class Outcome:
     verdicts
         Of the bag as it lies there, of its metadata, and of what was recovered of it.
     leftovers
-        What else lay in the folder.
+        Other files in the folder.
 
     """
 
@@ -113,16 +113,16 @@ class Outcome:
 
 def judge(plan: Plan, folder: Path, marks: Marks, killed: int) -> Outcome:
     """
-    Judge what a kill has left.
+    Judge the bag after a kill.
 
     Parameters
     ----------
     plan
-        How it was killed.
+        The kind of kill.
     folder
         The bag's.
     marks
-        What the process had done by then.
+        Progress of the process by then.
     killed
         When, in [ns] of the steady clock.
 
@@ -176,7 +176,7 @@ def _read(outcome: Outcome, folder: Path, marks: Marks) -> list[BagMessage] | No
 
 
 def _is_run(messages: Sequence[BagMessage], first: int, marks: Marks) -> bool:
-    """Say whether these are what was offered, byte for byte, from one number on without a gap."""
+    """Return whether these are the offered messages, byte for byte, consecutive without a gap."""
     return first + len(messages) <= marks.offered and all(
         message == expected(number, marks.times[number // len(TOPICS)])
         for number, message in enumerate(messages, first)

@@ -158,12 +158,12 @@ class Case(NamedTuple):
 
 class Family(NamedTuple):
     """
-    What is drawn at random, and why.
+    The random quantities, and their purpose.
 
     Attributes
     ----------
     why
-        What is hard about it.
+        Why it is hard.
     lengths
         Draws the links.
     angles
@@ -341,7 +341,7 @@ NONE = Worst(0.0, -1)
 @dataclass
 class Tally:
     """
-    What was found in one family.
+    The findings for a family.
 
     Attributes
     ----------
@@ -372,7 +372,7 @@ class Tally:
     kappa: tuple[float, float] = (np.inf, 0.0)
 
     def merge(self, other: Tally) -> None:
-        """Add what another part of the campaign has found."""
+        """Add the findings of another part of the campaign."""
         self.cases += other.cases
         self.flagged += other.flagged
         self.digits += other.digits
@@ -425,14 +425,14 @@ def run(
     work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
 ) -> dict[str, Tally]:
     """
-    Do all parts and return what was found by family.
+    Run all parts and return the findings by family.
 
     Parameters
     ----------
     work
         The parts.
     jobs
-        How many processes; 1: this one.
+        Number of processes; 1 runs in this one.
     progress
         Called with the number of linkages of each part that is done.
 

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Random linkages of every topology against constraint equations of their own."""
+"""Random linkages of every topology against independent constraint equations."""

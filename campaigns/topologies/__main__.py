@@ -109,7 +109,7 @@ def _worst(tally: Tally, name: str) -> str:
 
 
 def findings_table(tallies: Mapping[str, Mapping[str, Tally]]) -> Table:
-    """Return what was found, with how many linkages of which families, and one to look at."""
+    """Return the findings, with the number of linkages by family, and one example."""
     table = Table('Findings', ('finding', 'linkages', 'of', 'families', 'for example'))
     for what, families in tallies.items():
         names: Counter[str] = Counter()
@@ -164,7 +164,7 @@ def commands_table(tallies: Mapping[str, Mapping[str, Tally]]) -> Table:
 
 
 def families_table(names: Sequence[str]) -> Table:
-    """Return what each family is."""
+    """Return the description of each family."""
     return Table('Families', ('family', 'what it is'), [(n, FAMILIES[n].why) for n in names])
 
 

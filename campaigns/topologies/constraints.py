@@ -15,9 +15,9 @@
 """
 A linkage as equations: pins coincide, points lie on lines, blocks keep angles, inputs are driven.
 
-The unknowns are the angle and the place of the frame of every moving link. Nothing is eliminated,
-there are no dyads and no sides: the equations hold in every assembly. Many states are evaluated at
-once, in the longest floats that numpy has; linear systems are solved in doubles and refined.
+The unknowns are the angle and the position of the frame of every moving link. Nothing is
+eliminated, and there are no dyads or sides: the equations hold in every assembly. Many states are
+evaluated at once, in numpy's longest floats; linear systems are solved in doubles and refined.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ class Equations:
 
     def residuals(self, unknowns: Array, inputs: Array) -> tuple[Array, Array, Array]:
         """
-        Return what the equations are off by, their Jacobian, and the sizes of their terms.
+        Return the residuals of the equations, their Jacobian, and the sizes of their terms.
 
         Parameters
         ----------
@@ -364,7 +364,7 @@ class Equations:
         unknowns, inputs
             (n, N) and (inputs, N).
         shift
-            What the equations are to be off by, (n, N); 0 if not given.
+            Residuals to reach, (n, N); 0 if not given.
         steps
             Corrections at most.
 
@@ -412,7 +412,7 @@ def condition_numbers(
     linkage: Linkage, motion: Motion, inputs: Array, rates: Array, accelerations: Array, seed: int
 ) -> tuple[Array, Array, Array]:
     """
-    Return what the joints change by, relative to how much everything is rounded, (joints, N) each.
+    Return the change of the joints relative to the rounding of all data, (joints, N) each.
 
     All numbers of the linkage, the inputs and the terms of every equation are varied by the same
     part with random signs, some times over; the greatest change counts, and the value itself. That

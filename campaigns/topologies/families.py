@@ -17,8 +17,8 @@
 The families: every dyad on every kind of link, chains, inputs of all kinds, and class III.
 
 Some families have exact change points: with every dyad, in both orientations, on a crank and in
-chains. All their lengths are whole multiples of 1/64, so that sums and differences of them are
-exact and the dyad lies flat to the last bit. Frames are those of textbooks; the ground's may stand
+chains. All their lengths are whole multiples of 1/64, so that their sums and differences are exact
+and the dyad lies flat to the last bit. Frames are those of textbooks; the ground's may be
 elsewhere.
 """
 
@@ -142,7 +142,7 @@ class _Parts:
         return Passing(side, 'crank', (GROUND, line), at, turns)
 
     def topology(self, line: complex, at: tuple[bool, bool]) -> Topology | None:
-        """Return what has been built; ``at`` says whether it lies flat at 0 and at π from it."""
+        """Return the built linkage; ``at`` says whether it lies flat at 0 and at π from it."""
         moving = [link for link in self.links if link != GROUND]
         joints: dict[str, RevoluteJoint | SlideJoint] = {
             f'a_{link}': RevoluteJoint(GROUND, link) for link in moving

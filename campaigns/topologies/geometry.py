@@ -14,12 +14,12 @@
 
 
 """
-A linkage by plain geometry: circles and lines that meet, one dyad after the other.
+A linkage by plain geometry: intersections of circles and lines, one dyad after the other.
 
-It says which states close, by how much others miss, and where the links lie in the assembly that
-the conventions name; `constraints` corrects that to the solution. Whoever made the linkage says
-what its dyads are and in which order they stand, so that nothing is inherited from the package.
-Everything is worked out for many states at once, in the longest floats that numpy has.
+It gives the states that close, the distance by which others fail, and the positions of the links
+in the assembly that the conventions name; `constraints` corrects these to the solution. The
+generator of the linkage gives its dyads and their order, so that nothing is inherited from the
+package. Many states are computed at once, in numpy's longest floats.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ Group = DrivenLink | DrivenRRR | RRR | RRP | RPR | PRP | RPP
 
 
 class Margin(NamedTuple):
-    """What a dyad has to spare in [m], less than 0 where it misses, and the size of its terms."""
+    """Margin of a dyad in [m], negative if it does not close, and the size of its terms."""
 
     spare: Array
     grain: Array
@@ -180,7 +180,7 @@ class Geometry:
         return Complex(x) + Complex(1j) * Complex(y)
 
     def at(self, places: Places, spot: Spot) -> Array:
-        """Return where a point is."""
+        """Return the position of a point."""
         return places.origins[spot.link] + places.units[spot.link] * self.point(*spot)
 
     def _side(self, closing: str, places: Places) -> Any:

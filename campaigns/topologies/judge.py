@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""One linkage, solved by the package, and what the equations and the geometry say of it."""
+"""One linkage, solved by the package, against the equations and the geometry."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ CLOSED, OPEN, AT_LIMIT, UNKNOWN = 'closed', 'open', 'at limit', 'unknown'
 @dataclass
 class Findings:
     """
-    What was found with a linkage.
+    The findings for a linkage.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Findings:
 
 
 class Truth:
-    """What the equations say of some states: which close, and how the linkage moves there."""
+    """Solution of the equations for some states: which close, and the linkage's motion there."""
 
     def __init__(self, topology: Topology, inputs: Array, walks: Walks | None = None) -> None:
         self.equations = Equations(topology.linkage)
@@ -253,7 +253,7 @@ def _compare_arrays(
             if not one:
                 continue
             off = np.abs(many[:, k] - np.array(one))
-            # What the two differ by is rounding: that of a state far from a toggle.
+            # The difference is rounding, for a state far from a toggle.
             if not (off <= 1e-6 * (1.0 + np.abs(one).max())).all():
                 findings.find(f'arrays: {name}', f'at {inputs[:, k].tolist()}: {off.max():.2g}')
 

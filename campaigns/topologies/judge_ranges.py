@@ -290,7 +290,7 @@ def _spare_at(geometry: Geometry, values: Array) -> Array:
 
 
 def _spare(margins: list[Margin], count: int) -> Array:
-    """Return what each dyad has to spare, of its lengths, (dyads, N)."""
+    """Return the margin of each dyad, relative to its lengths, (dyads, N)."""
     if not margins:
         return np.ones((1, count))
     found = np.array([margin.spare / margin.grain for margin in margins])
@@ -332,7 +332,7 @@ def _flat(
 def _parallel(
     geometry: Geometry, crossings: list[Array], values: Array, closes: Array
 ) -> list[float]:
-    """Return where two lines of a dyad are parallel."""
+    """Return the inputs at which two lines of a dyad are parallel."""
     found: list[float] = []
     for k, row in enumerate(crossings):
         both = closes[:-1] & closes[1:]

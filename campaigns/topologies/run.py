@@ -14,13 +14,13 @@
 
 
 """
-The campaign: what there is to be done, done in parts, by as many processes as are wanted.
+The work of the campaign, in parts that any number of processes share.
 
-Each linkage has a generator of its own, seeded by the campaign's seed, its family and its number:
-what comes out does not depend on how the work was shared, and any linkage can be made again.
+Each linkage has a random generator of its own, seeded by the campaign's seed, its family and its
+number: the result does not depend on how the work was shared, and any linkage can be made again.
 
 The commands of ``linkage`` are tried on the file of any linkage: they do their work, or print one
-line that says why not.
+line with the reason why not.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ KINEMATICS, CHECK, CHECK_SPOILT, FILE, ACCURACY = (
 
 
 class Part(NamedTuple):
-    """Some linkages of a family, and what is to be tried with them."""
+    """Some linkages of a family, and the tests to run on them."""
 
     seed: int
     family: str
@@ -144,7 +144,7 @@ class Note(NamedTuple):
 
 @dataclass
 class Tally:
-    """What was found in a family, in whatever order its parts were done."""
+    """The findings for a family, independent of the order of its parts."""
 
     counts: Counter[str] = field(default_factory=Counter)
     found_with: Counter[str] = field(default_factory=Counter)
@@ -272,14 +272,14 @@ def run(
     work: list[Part], jobs: int, progress: Callable[[int], None] = lambda _: None
 ) -> dict[str, dict[str, Tally]]:
     """
-    Do all parts and return what was found, by what was tried and by family.
+    Run all parts and return the findings, by test and by family.
 
     Parameters
     ----------
     work
         The parts.
     jobs
-        How many processes; 1: this one.
+        Number of processes; 1 runs in this one.
     progress
         Called with the number of linkages of each part that is done.
 

@@ -14,16 +14,16 @@
 
 
 """
-Linkages of any topology, made from a pose: they close at the inputs that they were made at.
+Linkages of any topology, made from a pose, and followed from it by their equations alone.
 
 Links and dyads are those of the accuracy campaign's builder. Here inputs turn or slide, stand on
-the ground, on each other or between moving links, and links may have no dyad at all.
+the ground, on each other or between moving links, and links may have no dyad at all. Every linkage
+closes at the inputs of its pose.
 
-Linkages followed from the pose that they were made in, by their equations alone.
-
-A step predicts by rates and accelerations and corrects by Newton's method. It is taken where the
-correction is small beside the step, and, unless the linkage has exact change points, where the
-determinant keeps its sign; else it is halved. Where it gets too small the linkage is at its limit.
+A step along the motion predicts by rates and accelerations and corrects by Newton's method. It is
+accepted if the correction is small compared with the step, and, unless the linkage has exact
+change points, if the determinant keeps its sign; else it is halved. When it gets too small, the
+linkage is at its limit.
 """
 
 from __future__ import annotations
@@ -317,7 +317,7 @@ class TopologyBuilder(Builder):
         return new
 
     def topology(self) -> Topology:
-        """Return what has been built; every angle to the ground and every slide is published."""
+        """Return the built linkage; every angle to the ground and every slide is published."""
         moving = [link for link in self._links if link != GROUND]
         joints: dict[str, RevoluteJoint | SlideJoint] = {
             f'a_{link}': RevoluteJoint(GROUND, link) for link in moving

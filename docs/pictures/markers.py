@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What ~/markers shows, drawn from the messages alone, as RViz draws them."""
+"""The content of ~/markers, drawn from the messages alone, as RViz draws it."""
 
 from __future__ import annotations
 

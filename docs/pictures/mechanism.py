@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Pictures of what the mechanism does and how it yields, over a turn of the crank."""
+"""Pictures of the mechanism's effects, motion and compliance, over a turn of the crank."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What the pictures look like: size, colours, and how they are stored."""
+"""The style of the pictures: size, colours and file format."""
 
 from __future__ import annotations
 

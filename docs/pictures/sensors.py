@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Pictures of what the sensors make of a rocker that moves."""
+"""Pictures of sensor readings of a moving rocker."""
 
 from __future__ import annotations
 

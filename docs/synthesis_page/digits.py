@@ -14,10 +14,10 @@
 
 
 """
-What rounding costs three-point synthesis: Freudenstein's equation in as few digits as one likes.
+Cost of rounding in three-point synthesis: Freudenstein's equation with any number of digits.
 
-All else is worked out with 50 digits, so that what is off is off by what was rounded. Working with
-few digits is for docs/synthesis.md only; the package has no such mode.
+All other steps are computed with 50 digits, so that the error comes from the rounding alone. Few
+digits are used for docs/synthesis.md only; the package has no such mode.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Row = tuple[mpf, mpf, mpf]
 PRECISION = 50
 COUPLER = 1
 
-# The designs by random.
+# The random designs.
 SEED = 5
 SPAN = (20.0, 120.0)
 MIDDLE = (0.25, 0.75)

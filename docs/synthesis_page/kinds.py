@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The chapter of docs/synthesis.md on kinds of tasks: what `linkage synthesize` makes of each."""
+"""The chapter of docs/synthesis.md on kinds of tasks: results of `linkage synthesize` for each."""
 
 from __future__ import annotations
 

@@ -13,4 +13,4 @@
 # limitations under the License.
 
 
-"""What the documentation site makes of the code: pages of reference, and the tutorial, run."""
+"""Pages of the site that are made from the code: the reference, and the executed tutorial."""

@@ -14,11 +14,11 @@
 
 
 """
-The pages of reference, made from the code while the site is built.
+Reference pages, made from the code while the site is built.
 
-A page names what it takes in a comment of its own line, ``<!-- made: commands -->``. On a forge
-there is only the comment; `linkage scene --list`, `linkage COMMAND --help` and config/schema say
-the same. Links into the checkout, which a forge follows, become downloads.
+A page requests a part by a comment on a line of its own, ``<!-- made: commands -->``. A forge
+shows none of it; `linkage scene --list`, `linkage COMMAND --help` and config/schema have the same
+content. Links into the checkout, which work on a forge, become downloads.
 """
 
 from __future__ import annotations

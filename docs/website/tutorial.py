@@ -14,11 +14,11 @@
 
 
 """
-A Python file in cells, ``# %%``, as a page: its text, its code, and what came of running it.
+A Python file in cells, ``# %%``, as a page with its text, its code and the output of the code.
 
 ``# %% [markdown]`` begins a cell of text, in comments. Editors, and Jupyter with jupytext, open
-such a file as a notebook; Python runs it as it is. A page shows what a cell has printed, the value
-of its last line, and the pictures that it has drawn.
+such a file as a notebook; Python runs it unchanged. A page shows the printed output of a cell, the
+value of its last line, and its pictures.
 """
 
 from __future__ import annotations

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What accuracy costs in time, measured on a scene."""
+"""The cost of accuracy in time, measured on a scene."""

@@ -14,11 +14,11 @@
 
 
 """
-What the steps of the torque drive cost: error and drift against time, for each method.
+Error and energy drift of the torque drive against time, for each method and step.
 
 The test is a motion whose end is known. The linkage moves under its weight and its springs alone:
-with other forces there is no solution to compare with. Where its input can turn round, it starts
-with enough rate to keep turning; otherwise it is released where it swings clear of its stops.
+with other forces there is no reference solution. If its input can turn fully, it starts with
+enough rate to keep turning; otherwise it is released where it swings clear of its stops.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from linkage_ros.scene.scene import Scene, SceneLinkage
 SECONDS = 10.0
 
 _LOOKS = 100
-"""How often the energy is looked at."""
+"""Number of times at which the energy is evaluated."""
 
 
 class FreeMotion(NamedTuple):
@@ -60,17 +60,17 @@ class FreeMotion(NamedTuple):
     Attributes
     ----------
     mechanics
-        The linkage and what acts on it.
+        The linkage and its loads.
     start
-        Where it begins.
+        State at the start.
     end
-        Where it is after `SECONDS`.
+        State after `SECONDS`.
     scale
-        Range of its potential energy, in [J]; a drift is given as a part of it.
+        Range of its potential energy, in [J]; a drift is given as a fraction of it.
     unit
-        Of the input: 'rad' or 'm'.
+        Unit of the input: 'rad' or 'm'.
     words
-        What it does.
+        Description of the motion.
 
     """
 
@@ -84,18 +84,18 @@ class FreeMotion(NamedTuple):
 
 class Integrated(NamedTuple):
     """
-    The result of a method with one length of step.
+    The result of a method with one step.
 
     Attributes
     ----------
     method, step
         The method's name, and its step in [s].
     error
-        Of the input after `SECONDS`, in [rad] or [m].
+        Error of the input after `SECONDS`, in [rad] or [m].
     drift
-        The greatest that the energy was off by, of the motion's scale.
+        Greatest error of the energy, as a fraction of the motion's scale.
     times
-        Processor time for a second of motion, in [s], round by round.
+        Processor time per second of motion, in [s], one for each round.
 
     """
 
@@ -113,7 +113,7 @@ def free_motion(member: SceneLinkage) -> FreeMotion:
     Raises
     ------
     NoReferenceError
-        Where it has none that stays off its stops, or no reference for it.
+        If no free motion stays off its stops, or has a reference.
 
     """
     given = member.loads or Loads()
@@ -129,7 +129,7 @@ def free_motion(member: SceneLinkage) -> FreeMotion:
         heights = [_potential(mechanics, place) for place in places]
         climb = max(heights) - heights[0]
         inertia = _inertia(mechanics, start)
-        # Three times the climb over the highest place, and a turn a second at least.
+        # Three times the energy to pass the highest position, and at least one turn per second.
         rate = max(sqrt(2.0 * 4.0 * climb / inertia), tau)
         begin = State(start, rate)
         scale = 0.5 * inertia * rate * rate + heights[0] - min(heights)
@@ -189,7 +189,7 @@ def _holds(interval: InputRange, value: float) -> bool:
 
 
 def _swing(mechanics: Mechanics, interval: InputRange) -> tuple[float, float, float]:
-    """Return two places as high between which it is lower, and by how much, in [J]."""
+    """Return two inputs of equal potential with a lower one between, and its depth in [J]."""
     width = interval.highest - interval.lowest
     places = [interval.lowest + width * k / 1000 for k in range(50, 951)]
     heights = [_potential(mechanics, place) for place in places]
@@ -209,7 +209,7 @@ STEPS = {
     'rk4': (2e-2, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4),
     'gauss_legendre': (5e-2, 2e-2, 1e-2, 5e-3, 2e-3, 1e-3),
 }
-"""For each method lengths of its step, in [s]."""
+"""Steps of each method, in [s]."""
 
 _QUICK = 4
 """Number of steps in a quick measurement, the longest first."""
@@ -228,9 +228,9 @@ def measure_dynamics(scene: Scene, quick: bool, progress: Progress) -> Part | No
     scene
         The scene.
     quick
-        Whether a few seconds are to do.
+        Whether to measure for a few seconds only.
     progress
-        Called now and then with the share that is done, 0 to 1.
+        Called now and then with the fraction that is done, 0 to 1.
 
     """
     driven = [member for member in scene.members if member.drive[0] == 'torque']
@@ -366,14 +366,14 @@ def _slopes(results: Sequence[Integrated]) -> Table:
 
 def slope(errors: Sequence[tuple[float, float]]) -> float | None:
     """
-    Return the order of an error in the step, from the two shortest steps that show it.
+    Return the order of convergence, from the two shortest steps that show it.
 
-    Errors near what rounding does tell nothing.
+    Errors near the rounding error do not count.
 
     Parameters
     ----------
     errors
-        Steps, from the longest on, and errors.
+        Steps, longest first, and errors.
 
     """
     points = [(log10(step), log10(error)) for step, error in errors if error > _ROUNDED]
@@ -404,7 +404,7 @@ def _text(motion: FreeMotion, own: Integrated, rounds: int) -> list[str]:
 
 
 def _advice(results: Sequence[Integrated], unit: str) -> Iterator[str]:
-    """Yield the fastest setting for each of some accuracies."""
+    """Yield the fastest setting for each of several accuracies."""
     for wanted in _WANTED:
         enough = [result for result in results if result.error <= wanted]
         words = f'For {wanted:g} {unit} after {SECONDS:g} s'

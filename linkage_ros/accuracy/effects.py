@@ -14,12 +14,12 @@
 
 
 """
-What each effect of a scene adds to the time of a tick, and how far it moves the output.
+Cost of each effect of a scene per tick, and the error that it adds to the output.
 
-The truth is the scene without its effects: the linkage as it is drawn, at the crank angle that its
+The truth is the scene without its effects: the linkage as defined, at the crank angle that its
 drive gives at the time of the tick. Both pipelines run over the same times and the same crank
-messages. A delayed message is compared at the time of the tick, not of its stamp: this is what a
-consumer sees.
+messages. A delayed message is compared at the time of the tick, not of its stamp: this is the
+error that a consumer sees.
 """
 
 from __future__ import annotations
@@ -48,15 +48,15 @@ from linkage_ros.scene.scene import Scene
 
 class Departure(NamedTuple):
     """
-    The error of what is published.
+    The error of the published states.
 
     Attributes
     ----------
     angles, slides, rates
-        Root of the mean square and greatest, in [rad], in [m], in [rad/s] or [m/s]; None if
-        none is published.
+        Root mean square and maximum, in [rad], in [m], in [rad/s] or [m/s]; None if none is
+        published.
     silent
-        Share of the ticks at which the truth is known but no state is published.
+        Fraction of the ticks at which the truth is known but no state is published.
 
     """
 
@@ -67,7 +67,7 @@ class Departure(NamedTuple):
 
 
 class _Errors:
-    """Accumulate errors: root of the mean square, and the greatest."""
+    """Accumulates errors: root mean square and maximum."""
 
     def __init__(self) -> None:
         self._count, self._squares, self._worst = 0, 0.0, 0.0
@@ -83,16 +83,16 @@ class _Errors:
 
 def departure(true: Pipeline, real: Pipeline, fed: Iterable[tuple[int, bytes]]) -> Departure:
     """
-    Return the error of what one pipeline publishes against another.
+    Return the error of the states that a pipeline publishes against the true ones.
 
     Parameters
     ----------
     true
         The pipeline that gives the truth, with rates.
     real
-        The pipeline that is judged.
+        The pipeline to judge.
     fed
-        Times, in [ns], each with its crank message; b'' where nobody listens.
+        Times, in [ns], each with its crank message; b'' if the drives listen to no topic.
 
     """
     angles, slides, rates = _Errors(), _Errors(), _Errors()
@@ -142,14 +142,14 @@ def measure_effects(scene: Scene, quick: bool, progress: Progress) -> Part | Non
     scene
         The scene.
     quick
-        Whether a few seconds are to do.
+        Whether to measure for a few seconds only.
     progress
-        Called now and then with the share that is done, 0 to 1.
+        Called now and then with the fraction that is done, 0 to 1.
 
     Raises
     ------
     FileError
-        Where something in the scene does not go together.
+        If parts of the scene cannot be combined.
 
     """
     named = Names(name for member in scene.members for name in member.effects)
@@ -228,7 +228,7 @@ def _table(
 
 
 def _diagram(rows: Sequence[tuple[str, Times | None, Departure | None, str]]) -> Diagram:
-    """Return the error of positions against cost; effects that change no angle are left out."""
+    """Return the error of positions against cost, without effects that change no angle."""
     curves = [
         Curve(name, [Point(times.median, found.angles[0], _spread(times))], joined=False)
         for name, times, found, _ in rows

@@ -14,11 +14,11 @@
 
 
 """
-The truth, proved: balls that hold a linkage's joints, rates and accelerations for certain.
+Verified reference: balls that are proved to contain a linkage's joints, rates and accelerations.
 
-A second reference, which shares nothing with the first but the linkage. Unknown are here the place
-p of each link's frame and its direction u as a vector, no angle and no slide; so that all
-constraints are of second degree at most::
+This second reference shares only the linkage with the first. The unknowns are the position p of
+each link's frame and its direction u as a vector, but no angles and no slides. So all constraints
+are of second degree at most::
 
     link       u·u = 1
     pin        p1 + u1 z1 = p2 + u2 z2                  (z times u as complex numbers)
@@ -26,9 +26,10 @@ constraints are of second degree at most::
     block      u1 e^{i·angle} × u2 = 0
     input      u1 e^{iφ} × u2 = 0, or (p2 + u2 z2 − p1 − u1 t) · u1 d = s
 
-A sum of c·x_i·x_j, with x_0 = 1, is derived by the product rule, and nothing by hand. That a
-ball X about m holds one solution and no other is shown by Krawczyk's operator: with Y near J(m)⁻¹
-it does where m − Y·F(m) + (1 − Y·J(X))·(X − m) lies inside X (R. Krawczyk, Computing 4, 1969).
+The derivatives of a sum of c·x_i·x_j, with x_0 = 1, come from the product rule; none is derived by
+hand. Krawczyk's operator shows that a ball X about m holds exactly one solution: with Y near
+J(m)⁻¹, this is so if m − Y·F(m) + (1 − Y·J(X))·(X − m) lies inside X (R. Krawczyk, Computing 4,
+1969).
 """
 
 from __future__ import annotations
@@ -44,16 +45,16 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
 
 _PRECISIONS = (512, 1024, 2048)
-"""In bits; the next is taken where one proves nothing."""
+"""Precisions in bits; the next is tried if one proves nothing."""
 
 _RADIUS = 150
-"""Of the ball that is proved to hold one solution: 2 to minus this, in the unit of length."""
+"""Radius of the ball to be verified: 2 to the power of minus this, in the unit of length."""
 
 Form = list[tuple[int, Any]]
-"""A place or a direction: complex factors by the number of their unknown."""
+"""A position or direction: complex factors by the number of their unknown."""
 
 Term = tuple[tuple[Any, Any, Any], int, int]
-"""A factor with its first and second derivative by time, and the numbers of two unknowns."""
+"""A factor with its first and second time derivative, and the numbers of two unknowns."""
 
 
 class Proof(NamedTuple):
@@ -71,21 +72,21 @@ def prove(
     accelerations: Sequence[float] | None = None,
 ) -> Proof:
     """
-    Return a proved state next to the closure's own.
+    Return a verified state near the closure's own.
 
     Parameters
     ----------
     linkage
         The linkage.
     inputs, rates, accelerations
-        Of the driven joints; as `Reference.solve` has them.
+        Of the driven joints; see `Reference.solve`.
 
     Raises
     ------
     SingularError
-        Where nothing can be proved: at a toggle or a change point.
+        If nothing can be proved: at a toggle or a change point.
     ValueError
-        Where the linkage does not close.
+        If the linkage does not close.
 
     """
     rates = [1.0] * len(inputs) if rates is None else rates
@@ -149,25 +150,25 @@ class _Equations:
             )
 
     def start(self, closure: Closure, inputs: Sequence[float]) -> list[Any]:
-        """Return the unknowns as the closure has them; that of number 0 is 1."""
+        """Return the unknowns from the closure's solution; unknown 0 is 1."""
         position = closure.position(*inputs)
         if not position.joints:
             raise ValueError(f'{inputs}: the linkage is {position.status.name.lower()}')
         angles, points = closure.link_angles(position), closure.points(position)
-        found = [arb(1)]
+        unknowns = [arb(1)]
         for link in self._links:
             name, arm = next(iter(self._linkage.links[link].items()))
             direction = rect(1.0, angles[link])
             place = (points[link, name] - complex(*arm) * direction) / self.scale
-            found += [arb(x) for x in (direction.real, direction.imag, place.real, place.imag)]
-        return found
+            unknowns += [arb(x) for x in (direction.real, direction.imag, place.real, place.imag)]
+        return unknowns
 
     def values(self, motion: Sequence[Sequence[Any]]) -> list[Any]:
-        """Return what the constraints come to, derived as often as the motion has derivatives."""
+        """Return the residuals, differentiated as often as the motion has derivatives."""
         return [_value(terms, motion) for terms in self.constraints]
 
     def slopes(self, x: Sequence[Any]) -> Any:
-        """Return the derivatives of the constraints by the unknowns."""
+        """Return the derivatives of the constraints with respect to the unknowns."""
         rows = [[arb(0)] * (self.count + 1) for _ in self.constraints]
         for row, terms in zip(rows, self.constraints, strict=True):
             for (factor, *_), i, j in terms:
@@ -237,7 +238,7 @@ class _Equations:
 
 
 def _proved(equations: _Equations, start: list[Any]) -> list[Any] | None:
-    """Return balls that hold one solution, or nothing."""
+    """Return balls that hold exactly one solution, or None."""
     x = start
     try:
         for _ in range(12):
@@ -267,7 +268,7 @@ def _proved(equations: _Equations, start: list[Any]) -> list[Any] | None:
 
 
 def _value(terms: Sequence[Term], motion: Sequence[Sequence[Any]]) -> Any:
-    """Return a sum of products; of a motion, its highest derivative, by the product rule."""
+    """Return a sum of products; for a motion its highest derivative, by the product rule."""
     x = motion[0]
     total = arb(0)
     for (c, c1, c2), i, j in terms:
@@ -290,7 +291,7 @@ def _dot(one: Form, other: Form) -> list[Term]:
 
 
 def _cross(one: Form, other: Form, turn: Sequence[Any] = ()) -> list[Term]:
-    """Return one × other; the first turned as the series of a unit vector says."""
+    """Return one × other, with the first rotated by the series of a unit vector."""
     if not turn:
         return [_still((_conjugate(c) * d).imag, i, j) for i, c in one for j, d in other]
     return [

@@ -14,18 +14,18 @@
 
 
 """
-Where a linkage of one freedom is after some time, by its energy and not by steps.
+State of a linkage with one degree of freedom after some time, from its energy, without steps.
 
-Without friction, damping and commands the energy E is constant, so that the rate follows from the
-place, and the time from the place by an integral::
+Without friction, damping and commands the energy E is constant. So the rate follows from the
+position, and the time from the position by an integral::
 
     ½·I(q)·q̇² + V(q) = E          t = ∫ dq/q̇ = ∫ √(I/(2·(E − V))) dq
 
-I and V are summed over the links in extended precision, from the reference's places and rates. A
-crank that turns round makes 1/q̇ periodic in q; one that swings between q₁ and q₂ makes dt/dφ so,
-with q = (q₁ + q₂)/2 − (q₂ − q₁)/2·cos φ, and takes the roots at both ends out of it. A Fourier
-series of as many terms as it takes, fitted to equidistant places, is integrated term by term: it
-converges geometrically, and counts any number of turns.
+I and V are summed over the links in extended precision, from the reference's positions and rates.
+If the crank turns fully, 1/q̇ is periodic in q. If it swings between q₁ and q₂, the substitution
+q = (q₁ + q₂)/2 − (q₂ − q₁)/2·cos φ makes dt/dφ periodic and removes the roots at both ends. A
+Fourier series, fitted to equidistant positions with as many terms as needed, is integrated term by
+term: it converges geometrically, for any number of turns.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ from mpmath import MPContext
 _DIGITS = 30
 _TERMS = (32, 64, 128, 256, 512, 1024)
 _ENOUGH = 1e-18
-"""Of the mean, how small the last terms of a series have to be."""
+"""Bound of the last terms of a series, relative to its mean."""
 
 
 class NoReferenceError(ArithmeticError):
-    """The series does not converge, or the motion is not one that it is made for."""
+    """The series does not converge, or does not apply to the motion."""
 
 
 class State(NamedTuple):
-    """Value and rate of the input, in [rad] or [m] and by the second."""
+    """Value and rate of the input, in [rad] or [m], and [rad/s] or [m/s]."""
 
     value: float
     rate: float
@@ -64,7 +64,7 @@ class ExactEnergy:
     linkage
         The linkage, with one input and with masses.
     loads
-        What acts on it; dampers do not count.
+        Its loads; dampers are ignored.
 
     """
 
@@ -83,7 +83,7 @@ class ExactEnergy:
             raise NoReferenceError(f'it passes a singular pose: {error}') from None
 
         def moved(link: str, point: tuple[float, float]) -> tuple[Any, Any]:
-            """Return where a point of a link is, and its derivative by the input."""
+            """Return the position of a point of a link, and its derivative by the input."""
             arm = mp.mpc(*point)
             if link == GROUND:
                 return arm, mp.mpc(0)
@@ -109,21 +109,21 @@ class ExactEnergy:
 
 def turned(energy: ExactEnergy, start: State, seconds: float) -> State:
     """
-    Return where a crank that turns round and round is after some time.
+    Return the state of a crank that keeps turning after some time.
 
     Parameters
     ----------
     energy
-        Of its linkage.
+        Energy of its linkage.
     start
-        Where it begins, and how fast; fast enough to pass every place.
+        State at the start, fast enough to pass every position.
     seconds
         The time, in [s].
 
     Raises
     ------
     NoReferenceError
-        Where it does not turn round, or the series does not converge.
+        If it does not turn fully, or the series does not converge.
 
     """
     mp = energy.mp
@@ -143,23 +143,23 @@ def turned(energy: ExactEnergy, start: State, seconds: float) -> State:
 
 def swung(energy: ExactEnergy, low: float, high: float, seconds: float) -> State:
     """
-    Return where an input is that is let go at one place, and turns back at another as high.
+    Return the state of an input that swings from rest at one position, after some time.
 
     Parameters
     ----------
     energy
-        Of its linkage.
+        Energy of its linkage.
     low
-        Where it is let go, in [rad] or [m].
+        Position at the start, at rest, in [rad] or [m].
     high
-        About where it turns back; the place itself is found.
+        Approximate position at which it turns back; the exact one is computed.
     seconds
         The time, in [s].
 
     Raises
     ------
     NoReferenceError
-        Where it does not turn back there, or the series does not converge.
+        If it does not turn back there, or the series does not converge.
 
     """
     mp = energy.mp
@@ -190,7 +190,7 @@ class _Series:
     """
     The Fourier series of a function with the period 2π.
 
-    It is sampled between the multiples of π/n, never on them.
+    Samples lie between the multiples of π/n, never on them.
     """
 
     def __init__(self, mp: MPContext, function: Callable[[Any], Any]) -> None:
@@ -213,14 +213,14 @@ class _Series:
         )
 
     def value(self, at: Any) -> Any:
-        """Return the function."""
+        """Return the value of the function."""
         mp = self.mp
         return self.mean + mp.fsum(
             a * mp.cos(k * at) + b * mp.sin(k * at) for k, (a, b) in enumerate(self.terms, 1)
         )
 
     def _term(self, values: list[Any], order: int) -> tuple[Any, Any]:
-        """Return the factors of cos and sin of an order."""
+        """Return the coefficients of cos and sin of an order."""
         mp, count = self.mp, len(values)
         step = mp.expj(2 * mp.pi * order / count)
         turn, total = mp.expj(mp.pi * order / count), mp.mpc(0)
@@ -231,7 +231,7 @@ class _Series:
 
 
 def _reached(mp: MPContext, series: _Series, seconds: float) -> Any:
-    """Return where the integral of a series is as long as some time."""
+    """Return the argument at which the integral of a series equals some time."""
     time = mp.mpf(seconds)
     at = time / series.mean
     for _ in range(100):

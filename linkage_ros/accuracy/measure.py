@@ -16,12 +16,12 @@
 """
 Measure a scene, part by part.
 
-Each part is a module, which is imported only if the part is asked for. It has a function
+Each part is a module, imported only if the part is requested. It has a function
 
 ``measure_PART(scene, quick, progress) -> Part | None``
     Measure; None if the scene has no such part. ``quick``: take a few seconds only. ``progress``
-    is called now and then with the share that is done, 0 to 1; an exception that it raises ends
-    the measurement, and no file is left behind. Recording also takes a folder, after the scene.
+    is called now and then with the fraction that is done, 0 to 1; an exception from it ends the
+    measurement, and no file is left behind. Recording also takes a folder, after the scene.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from linkage_ros.measuring import describe_machine
 from linkage_ros.scene.scene import Scene
 
 PARTS = ('solving', 'ticking', 'effects', 'dynamics', 'recording')
-"""In the order of the page."""
+"""The parts, in the order of the page."""
 
 ProgressCallback = Callable[[str, float], None]
-"""Takes the name of a part, and how much of it is done, 0 to 1."""
+"""Takes the name of a part, and the fraction of it that is done, 0 to 1."""
 
 
 def measure_accuracy(
@@ -52,21 +52,21 @@ def measure_accuracy(
     scene
         The scene.
     parts
-        Which of `PARTS`.
+        The parts to measure, of `PARTS`.
     quick
-        Whether a few seconds are to do for each.
+        Whether to take only a few seconds for each.
     folder
-        On the disk whose recording is measured.
+        Folder on the disk to be measured.
     progress
-        Called with how far each part is.
+        Called with the progress of each part.
 
     Raises
     ------
     LinkageError
-        Where something does not go together, or is not installed.
+        If parts of the scene cannot be combined, or a package is not installed.
 
     """
-    found: list[Part] = []
+    measured: list[Part] = []
     for name in PARTS:
         if name not in parts:
             continue
@@ -75,6 +75,6 @@ def measure_accuracy(
         where = (folder,) if name == 'recording' else ()
         part = measure(scene, *where, quick, lambda share, name=name: progress(name, share))
         if part is not None:
-            found.append(part)
+            measured.append(part)
         progress(name, 1.0)
-    return Results(scene.name, describe_machine(), found)
+    return Results(scene.name, describe_machine(), measured)

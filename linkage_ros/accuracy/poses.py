@@ -16,9 +16,9 @@
 """
 The poses at which methods are compared, and the errors of a method there.
 
-Poses are easy ones, poses next to a toggle or change point, and linkages added for comparison.
-Inputs are doubles and are taken as exact: the error of a method contains no rounding of its input.
-States follow each other as a path forward and back, so that a method which starts from its last
+The sets hold easy poses, poses next to a toggle or change point, and linkages added for
+comparison. Inputs are doubles and are taken as exact: the error of a method contains no rounding
+of its input. States follow a path forward and back, so that a method which starts from its last
 state has a neighbour to start from.
 """
 
@@ -44,23 +44,23 @@ from linkage_ros.resources import shipped
 import numpy as np
 
 DISTANCES = tuple(10.0 ** (-k / 3.0) for k in range(6, 28))
-"""From trouble, in [rad], or of the size of a linkage whose input slides: 1e-2 to 1e-9."""
+"""Distances from a singular pose, 1e-2 to 1e-9, in [rad], or for slides relative to the size."""
 
 WITH_TOGGLE, WITH_CHANGE_POINT, CLASS_3 = 'double_rocker', 'parallelogram', 'class_3'
-"""Shipped linkages that stand in where the scene's own has no such pose."""
+"""Shipped linkages used if the scene's own has no such pose."""
 
 FIVE_DYADS = 'chain of five four-bars'
 
 _CLEAR = 0.05
-"""How far an easy pose is from a toggle or change point, in [rad]; of a slide, of its range."""
+"""Minimum distance of an easy pose from a singular one, in [rad]; for slides, of the range."""
 
 _GOLDEN = 0.5 * (sqrt(5.0) - 1.0)
 
 _EASY = 0.2
-"""Conditioning of an easy pose, of the best pose's."""
+"""Minimum conditioning of an easy pose, as a fraction of the best pose's."""
 
 BATCH = 4096
-"""States of an array: the poses, over and over."""
+"""Number of states of an array: the poses, repeated."""
 
 
 class Poses(NamedTuple):
@@ -72,15 +72,15 @@ class Poses(NamedTuple):
     key
         'easy', 'toggle', 'change_point', 'five_dyads' or 'class_3'.
     title
-        In words.
+        Title of the set.
     name
-        Of the linkage.
+        Name of the linkage.
     linkage
         The linkage.
     inputs
-        Of each state.
+        Inputs of each state.
     distances
-        Of each state from the toggle or change point, in [rad] or [m]; none of easy poses.
+        Distance of each state from the toggle or change point, in [rad] or [m]; empty if easy.
     own
         Whether the linkage is the scene's.
 
@@ -97,14 +97,14 @@ class Poses(NamedTuple):
 
 def pose_sets(name: str, linkage: Linkage, count: int) -> list[Poses]:
     """
-    Return all sets for a linkage.
+    Return all sets of poses for a linkage.
 
     Parameters
     ----------
     name, linkage
         The scene's.
     count
-        Easy poses; of each guest half as many.
+        Number of easy poses; of each added linkage half as many.
 
     """
     sets = [Poses('easy', 'easy poses', name, linkage, easy(Closure(linkage), count))]
@@ -137,7 +137,7 @@ def easy(closure: Closure, count: int) -> tuple[tuple[float, ...], ...]:
         interval = InputSweep(closure).widest_range
         assert interval is not None, 'reading the file has proved that it closes somewhere'
         low, span = interval.lowest, interval.highest - interval.lowest
-        # Parts of the golden ratio: evenly spread, and on the knots of no table.
+        # Multiples of the golden ratio: evenly spread, and never on the knots of a table.
         parts = sorted(_GOLDEN * (i + 1) % 1.0 for i in range(8 * count))
         candidates = [(low + span * part,) for part in parts]
         apart = _CLEAR if interval.turning else _CLEAR * span
@@ -160,9 +160,9 @@ def path(poses: Poses, count: int) -> Poses | None:
     Parameters
     ----------
     poses
-        Easy ones of the linkage; a turn begins at the first.
+        Easy poses of the linkage; a turn begins at the first.
     count
-        States after the first.
+        Number of states after the first.
 
     """
     closure = Closure(poses.linkage)
@@ -180,12 +180,12 @@ def path(poses: Poses, count: int) -> Poses | None:
 
 
 def there_and_back(states: Sequence[tuple[float, ...]]) -> tuple[tuple[float, ...], ...]:
-    """Return states in an order that returns to the first without a jump."""
+    """Return states in an order that ends next to the first, without a jump."""
     return (*states[::2], *states[1::2][::-1])
 
 
 def near_toggle(closure: Closure) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
-    """Return inputs next to an end of the widest range, with their distances from it."""
+    """Return inputs next to an end of the widest range, and their distances from it."""
     interval = InputSweep(closure).widest_range if len(closure.linkage.inputs) == 1 else None
     if interval is None or interval.whole or not any(interval.limited):
         return (), ()
@@ -196,7 +196,7 @@ def near_toggle(closure: Closure) -> tuple[tuple[tuple[float, ...], ...], tuple[
 
 
 def near_change_point(closure: Closure) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
-    """Return inputs on both sides of a change point, with their distances from it."""
+    """Return inputs on both sides of a change point, and their distances from it."""
     if len(closure.linkage.inputs) > 1:
         return (), ()
     inner = [
@@ -211,7 +211,7 @@ def near_change_point(closure: Closure) -> tuple[tuple[tuple[float, ...], ...], 
 
 
 def unit_of(poses: Poses) -> str:
-    """Return the unit of the first input, and so of distances from trouble."""
+    """Return the unit of the first input, and so of distances from a singular pose."""
     return 'm' if poses.linkage.inputs[0].slider else 'rad'
 
 
@@ -219,8 +219,8 @@ def five_dyads() -> Linkage:
     """
     Return a chain of five four-bars, each rocker the crank of the next.
 
-    The lengths are those of config/linkages/four_bar.yaml: the crank and the longest link are
-    shorter than the other two, so that each closes wherever the one before it puts its crank.
+    The lengths are those of config/linkages/four_bar.yaml: the sum of the crank and the longest
+    link is less than that of the other two, so each four-bar closes at every angle of its crank.
     """
     links: dict[str, dict[str, tuple[float, float]]] = {GROUND: {'O0': (0.0, 0.0)}}
     links['crank'] = {'O0': (0.0, 0.0), 'A1': (0.04, 0.0)}
@@ -278,8 +278,8 @@ def _ease(closure: Closure, inputs: Sequence[float]) -> float:
 
 FAR = 0.1
 """
-In [rad], or of the size: an answer that is farther off counts as none, since it is another pose.
-Of the distance, where poses are next to a change point: there the other assembly is as near.
+Largest error of an answer, in [rad] or relative to the size; a larger one means another pose.
+Next to a change point it is a fraction of the distance: the other assembly is equally near.
 """
 
 
@@ -290,10 +290,10 @@ class Errors(NamedTuple):
     Attributes
     ----------
     each
-        At every state the worst of the joints, in [rad], of slides of the linkage's size; nothing
-        where it failed. Of rates and accelerations it is relative where they are above 1.
+        For each state the maximum over the joints, in [rad], for slides relative to the linkage's
+        size; None if it failed. Rates and accelerations above 1 have relative errors.
     failed
-        The part of the states at which it gave no answer, or another pose's.
+        Fraction of the states without an answer, or with that of another pose.
 
     """
 
@@ -302,7 +302,7 @@ class Errors(NamedTuple):
 
     @property
     def worst(self) -> float | None:
-        """Return the greatest error where it did not fail."""
+        """Return the maximum error where it did not fail."""
         return max(self._known, default=None)
 
     @property
@@ -322,12 +322,12 @@ class Measured(NamedTuple):
     Attributes
     ----------
     poses, method
-        Which.
+        The set and the method.
     position, motion, batch
-        The errors of positions; of all three with rates and accelerations, alone and in arrays.
+        Errors of positions; of positions, rates and accelerations; and of arrays.
     times
-        Of a state, in [s]: of its position, of its motion, of its position in an array, of its
-        motion in an array; by 'position', 'motion', 'batch', 'batch_motion'.
+        Time per state, in [s], by 'position', 'motion', 'batch' (positions in an array) and
+        'batch_motion' (motions in an array).
 
     """
 
@@ -395,11 +395,11 @@ def off(linkage: Linkage, found: Sequence[Any], truth: Truth, order: int = 0) ->
     linkage
         The linkage.
     found
-        Of the published joints.
+        Values of the published joints.
     truth
         The state.
     order
-        Which derivative.
+        Order of the derivative.
 
     """
     size, worst, greatest = size_of(linkage), 0.0, 1.0

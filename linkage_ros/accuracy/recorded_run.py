@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A run recorded in real time, and what it took: of the processor, of the disk, of the ticks."""
+"""A run recorded in real time, with its cost: processor time, disk writes, late ticks."""
 
 from __future__ import annotations
 
@@ -38,26 +38,26 @@ from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 
 FASTEST = 1000.0
-"""The greatest rate of ticks here, and that of a scene that ticks with its samples, in [Hz]."""
+"""Maximum tick rate here, and the rate of a scene that ticks with its samples, in [Hz]."""
 
-_SWITCH_INTERVAL = 1e-4  # as the node has it, in [s]
-_PATIENCE = 4.0  # by how many times a run may be longer than asked for, until it has flushed
+_SWITCH_INTERVAL = 1e-4  # as in the node, in [s]
+_PATIENCE = 4.0  # a run may be longer than requested by this factor, until it has flushed
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
 
 
 class Flush(NamedTuple):
     """
-    A time at which the disk was waited for, all in [ns].
+    A wait for the disk, all in [ns].
 
     Attributes
     ----------
     begin, end
-        By the steady clock.
+        On the monotonic clock.
     cpu
-        Processor time of the recorder thread in between.
+        Processor time of the recorder thread during the wait.
     stake
-        From the beginning of the flush before to the end of this one: what was recorded in that
-        time, a power cut just before the end would have taken.
+        From the begin of the previous flush to the end of this one: a power cut just before the
+        end would lose the messages recorded in this time.
 
     """
 
@@ -69,26 +69,26 @@ class Flush(NamedTuple):
 
 class Recorded(NamedTuple):
     """
-    What a run cost.
+    The cost of a run.
 
     Attributes
     ----------
     seconds
-        How long messages came, in [s].
+        Duration of the messages, in [s].
     ticks
-        How late each tick was, in [ns].
+        Lateness of each tick, in [ns].
     received, recorded, dropped
-        Messages on all topics; where there is no bag, received only.
+        Number of messages on all topics; without a bag, only ``received`` counts.
     cpu
-        What the recorder's thread worked, from its beginning until all was written and before the
-        bag was closed, in [ns].
+        Processor time of the recorder thread, from its start until all messages were written and
+        before the bag was closed, in [ns].
     flushes
-        The flushes until then.
+        The flushes in that time.
     written
-        What the system says that it was given for its disks in between, and in which time:
-        [bytes] and [s]; nothing where it does not say.
+        Bytes given to disks in that time, as the system counts them, and the time: [bytes] and
+        [s]; None if the system does not count them.
     size
-        What the bag grew by from its beginning to its end, in [bytes].
+        Growth of the bag in that time, in [bytes].
 
     """
 
@@ -118,18 +118,18 @@ def record_run(
     scene
         The scene.
     closures
-        Its linkages: they remember nothing, and serve every run.
+        Its linkages; they have no state and serve every run.
     folder
-        Where the bag is made; it stays. Without it nothing is recorded, for comparison.
+        Folder of the bag, which stays. None records nothing, for comparison.
     storage
-        How it is stored.
+        Settings of the recorder.
     seconds
-        How long, in [s]; longer where there was no flush by then.
+        Duration, in [s]; longer if there was no flush by then.
 
     Raises
     ------
     RecordingError
-        The bag cannot be made, or ended early.
+        If the bag cannot be created, or ended early.
 
     """
     period = 1e9 / min(scene.rate or FASTEST, FASTEST)
@@ -176,7 +176,7 @@ def _tick(
     period: float,
     going_on: Callable[[float], bool],
 ) -> tuple[tuple[int, ...], float]:
-    """Tick at a period, in [ns]; return how late each tick was, in [ns], and how long all took."""
+    """Tick at a period, in [ns]; return each tick's lateness and the total time, in [ns]."""
     crank = 1 if pipeline.topic else 0
     lateness = []
     begin = monotonic_ns()
@@ -203,7 +203,7 @@ def _tick(
 
 
 def _topics(pipeline: Pipeline) -> list[Topic]:
-    """Return what the node would record beside its diagnostics, without the types' texts."""
+    """Return the topics the node would record, without diagnostics and message definitions."""
     names = [(pipeline.topic, _JOINT_STATE)] if pipeline.topic else []
     names.append(('/joint_states', _JOINT_STATE))
     names += [(extra.topic.replace('~', '/node'), extra.message) for extra in pipeline.extras]
@@ -216,7 +216,7 @@ def _attachments(scene: Scene) -> Mapping[str, tuple[str, bytes]]:
 
 @contextmanager
 def _as_in_the_node() -> Iterator[None]:
-    """Switch threads as often as the node, and do not search for cycles of objects meanwhile."""
+    """Switch threads as often as the node does, with garbage collection off."""
     interval, collecting = sys.getswitchinterval(), gc.isenabled()
     gc.collect()
     gc.disable()
@@ -230,7 +230,7 @@ def _as_in_the_node() -> Iterator[None]:
 
 
 class _Watched(BagWriter):
-    """A writer that measures its cost; only its constructor runs outside the recorder thread."""
+    """A writer that measures its own cost; only its constructor runs outside its thread."""
 
     def __init__(
         self,
@@ -259,7 +259,7 @@ class _Watched(BagWriter):
         return super().close(custom)
 
     def written(self) -> tuple[int, float] | None:
-        """Return the bytes given to disks until the last flush, and the time that took, in [s]."""
+        """Return the bytes given to disks until the last flush, and the time in [s], or None."""
         if self._given is None or self._given_at_first is None:
             return None
         seconds = (self.flushes[-1].end - self._begun) * 1e-9
@@ -267,7 +267,7 @@ class _Watched(BagWriter):
 
 
 def _given_to_disks() -> int | None:
-    """Return how much this process has had written to disks, in [bytes], as Linux counts it."""
+    """Return the bytes this process has given to disks, as Linux counts them, or None."""
     try:
         lines = Path('/proc/self/io').read_text('ascii').splitlines()
     except OSError:

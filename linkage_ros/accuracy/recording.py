@@ -14,9 +14,9 @@
 
 
 """
-What recording costs: processor, disk, and the messages that a crash may lose.
+Cost of recording: processor time, disk writes, and the messages that a crash may lose.
 
-Every setting records the scene's own messages in real time. The settings take turns, forward and
+Every setting records the scene's own messages in real time. The settings alternate, forward and
 backward, so that other load on the machine disturbs them alike.
 """
 
@@ -38,7 +38,7 @@ from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.scene import Scene
 
 _LONGER = 1.1
-"""By which factor a run is longer than its flush period: there is at least one flush in it."""
+"""A run is longer than its flush period by this factor, so that it has at least one flush."""
 
 
 NO_BAG = 'no bag'
@@ -53,23 +53,23 @@ class Cost(NamedTuple):
     setting
         The setting; None for no bag.
     cpu
-        Processor time of the recorder thread for a message, in [µs].
+        Processor time of the recorder thread per message, in [µs].
     waited
-        How long it waits for the disk in a second, in [ms].
+        Time it waits for the disk, in [ms] per second.
     waits
-        How long it waits at a flush, of all flushes the median and the greatest, in [ms].
+        Time it waits per flush, median and maximum of all flushes, in [ms].
     stake
-        The most that a power cut can destroy, in [ms].
+        The longest time that a power cut can destroy, in [ms].
     stake_messages
-        The same in messages, at the rate at which they come.
+        The same as a number of messages, at their rate.
     written
-        Bytes given to the disks, in [kB] a second; None where the system does not count them.
+        Data given to the disks, in [kB/s]; None if the system does not count them.
     size
-        Size of a message in the bag with its share of the index, in [bytes].
+        Size of a message in the bag including its share of the index, in [bytes].
     late, late_p99
-        How late ticks are, the median and the 99th percentile, in [µs].
+        Lateness of ticks, median and 99th percentile, in [µs].
     dropped
-        Messages that the recorder had no room for, in all runs.
+        Messages dropped because the recorder's queue was full, in all runs.
 
     """
 
@@ -87,17 +87,17 @@ class Cost(NamedTuple):
 
     @property
     def flush_period(self) -> float:
-        """Return how often the disk is waited for, in [s]; 0 where there is no bag."""
+        """Return the flush period, in [s]; 0 without a bag."""
         return self.setting.flush_period if self.setting else 0.0
 
     @property
     def compression(self) -> str:
-        """Return how messages are packed."""
+        """Return the name of the compression."""
         return self.setting.compression if self.setting else NONE
 
     @property
     def name(self) -> str:
-        """Return what the setting is, as a scene says it."""
+        """Return the setting as a scene file writes it."""
         if self.setting is None:
             return NO_BAG
         text = f'flush_period: {self.flush_period:g}'
@@ -106,9 +106,9 @@ class Cost(NamedTuple):
 
 def settings(periods: Sequence[float], packed_at: float, folder: Path) -> list[Storage | None]:
     """Return the settings to compare: no bag, the flush periods, the installed compressions."""
-    found: list[Storage | None] = [None, *(Storage(flush_period=each) for each in periods)]
+    compared: list[Storage | None] = [None, *(Storage(flush_period=each) for each in periods)]
     here = [name for name in COMPRESSIONS if name != NONE and _is_here(name, folder)]
-    return found + [Storage(flush_period=packed_at, compression=name) for name in here]
+    return compared + [Storage(flush_period=packed_at, compression=name) for name in here]
 
 
 def measure_costs(
@@ -125,13 +125,13 @@ def measure_costs(
     Parameters
     ----------
     scene, folder, progress
-        As `measure_recording`.
+        See `measure_recording`.
     compared
         The settings; None for no bag.
     seconds
-        How long a run is at least, in [s].
+        Minimum duration of a run, in [s].
     rounds
-        How many runs there are of each setting.
+        Number of runs of each setting.
 
     """
     closures = Pipeline(scene).closures
@@ -150,7 +150,7 @@ def measure_costs(
 
 
 def cost_of(setting: Storage | None, runs: Sequence[Recorded]) -> Cost:
-    """Return what a setting costs by some runs of it."""
+    """Return the cost of a setting from its runs."""
     flushes = [flush for run in runs for flush in run.flushes]
     waits = [(flush.end - flush.begin - flush.cpu) * 1e-6 for flush in flushes]
     stakes = [max((flush.stake for flush in run.flushes), default=0) * 1e-6 for run in runs]
@@ -174,10 +174,10 @@ def cost_of(setting: Storage | None, runs: Sequence[Recorded]) -> Cost:
 
 def _cpu(run: Recorded, setting: Storage | None) -> float:
     """
-    Return what a message costs the recorder's thread, in [µs].
+    Return the recorder thread's processor time per message, in [µs].
 
-    A run has one flush or a few: how many fall into it would show. So the flushes count with
-    what one costs, as often as they come.
+    A run has only one flush or a few, so their number would show in the result. Flushes therefore
+    count with the cost of one, at the rate of the flush period.
     """
     if setting is None or not run.received:
         return 0.0
@@ -188,7 +188,7 @@ def _cpu(run: Recorded, setting: Storage | None) -> float:
 
 
 def _waited(run: Recorded, setting: Storage | None) -> float:
-    """Return how long the recorder's thread waits for the disk in a second, in [ms]."""
+    """Return how long the recorder thread waits for the disk, in [ms] per second."""
     if setting is None:
         return 0.0
     waits = sum(flush.end - flush.begin - flush.cpu for flush in run.flushes)
@@ -204,7 +204,7 @@ def _is_here(name: str, folder: Path) -> bool:
 
 
 FLUSH_PERIODS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-"""How often the disk is waited for, in [s]; from what a scene may ask for."""
+"""Flush periods, in [s], of those that a scene may set."""
 
 PACKED_AT = 1.0
 """The flush period at which the compressions are compared, in [s]."""
@@ -214,31 +214,30 @@ QUICK_PACKED_AT = 0.2
 
 _WANTED = (0.1, 1.0, 5.0)
 _NEAR = 0.9
-"""A flush period is near the cheapest if the least time is at least this part of its own."""
+"""A flush period is near the cheapest if the minimum time is at least this fraction of its own."""
 
 _NOT_PACKED = 'not packed'
 
 
 def measure_recording(scene: Scene, folder: Path, quick: bool, progress: Progress) -> Part:
     """
-    Measure what recording a scene costs.
+    Measure the cost of recording a scene.
 
     Parameters
     ----------
     scene
         The scene.
     folder
-        Where the bags of the measurement are made and removed again: on the disk that is asked
-        about.
+        Folder on the disk to be measured; the bags are created there and removed again.
     quick
-        Whether a few seconds are to do.
+        Whether to measure for a few seconds only.
     progress
-        Called now and then with the share that is done, 0 to 1.
+        Called now and then with the fraction that is done, 0 to 1.
 
     Raises
     ------
     RecordingError
-        A bag cannot be made there, or ended early.
+        If a bag cannot be created there, or ended early.
 
     """
     periods, packed_at = (QUICK_PERIODS, QUICK_PACKED_AT) if quick else (FLUSH_PERIODS, PACKED_AT)
@@ -303,7 +302,7 @@ def _table(costs: Sequence[Cost]) -> Table:
                 cost.stake,
                 cost.stake_messages,
                 cost.cpu,
-                # A message a microsecond would be a core.
+                # One message per microsecond would use a full core.
                 cost.cpu.middle * cost.stake_messages / cost.stake.high * 0.1,
                 cost.waited,
                 *cost.waits,

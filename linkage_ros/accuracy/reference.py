@@ -14,27 +14,27 @@
 
 
 """
-The truth: joints of any linkage to fifty digits, with their rates and accelerations.
+Reference to fifty digits: joints of any linkage, with their rates and accelerations.
 
-It is written from what the linkage's file says and from nothing that is measured. Unknown are, in
-extended precision, the angle θ and the place p of the frame of every link, and the slide s of
-every slider. With e = e^{iθ} and z a point in its link's frame::
+It follows from the linkage file alone, not from the code that is measured. The unknowns, in
+extended precision, are the angle θ and the position p of the frame of every link, and the slide s
+of every slider. With e = e^{iθ} and z a point in its link's frame::
 
     pin        p1 + e1·z1 = p2 + e2·z2
     slider     p1 + e1·(t + s·d) = p2 + e2·z2      t the line's point, d its unit direction
     block      θ2 = θ1 + angle
     input      θ2 − θ1, or s, is given
 
-Newton's method solves them. It starts from the closure's solution in doubles, for one reason: that
-says which assembly is meant. The k-th derivatives by time satisfy the same equations derived k
-times, in which they stand behind the same matrix::
+Newton's method solves them. It starts from the closure's solution in doubles, only because that
+selects the assembly. The k-th time derivatives satisfy the equations differentiated k times, which
+have the same matrix::
 
     d/dt   (p + e·z) = p' + iθ'·e·z
     d²/dt² (p + e·z) = p'' + (iθ'' − θ'²)·e·z
 
-At a toggle and at a change point that matrix is singular: there is no derivative at the one, there
-are several at the other, and neither has a reference here. Next to them it is only
-ill-conditioned, and the precision is raised until fifty digits are left over.
+At a toggle and at a change point that matrix is singular: at the first there is no derivative, at
+the second there are several, so neither has a reference here. Next to them it is only
+ill-conditioned, and the precision is raised until fifty digits remain.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ __all__ = ('DIGITS', 'Reference', 'SingularError', 'Truth')
 DIGITS = 50
 
 _GUARD = 50
-"""Digits that a neighbourhood of trouble may cost, to begin with."""
+"""Extra digits for poses near a singular one, to begin with."""
 
 _MOST = 800
-"""Digits beyond which a pose counts as singular."""
+"""Maximum number of digits; a pose that needs more counts as singular."""
 
 
 class Truth(NamedTuple):
@@ -66,12 +66,12 @@ class Truth(NamedTuple):
     Attributes
     ----------
     joints, rates, accelerations
-        Of the published joints, mpmath's numbers, in [rad] or [m] and by the second.
+        Of the published joints, as mpmath numbers, in [rad] or [m], per [s] and [s²].
     error
-        Bound of their relative error.
+        Bound of the relative error.
     links
-        For each link but the ground the angle and the place (x, y) of its frame, then the rates of
-        these, then their accelerations.
+        For each link but the ground the angle and the position (x, y) of its frame, then their
+        rates, then their accelerations.
 
     """
 
@@ -89,16 +89,16 @@ class Truth(NamedTuple):
 
 class Reference:
     """
-    A linkage, ready to be solved in extended precision.
+    A linkage to be solved in extended precision.
 
     Parameters
     ----------
     linkage
-        What to solve.
+        The linkage.
     digits
-        How many are wanted.
+        Number of digits of the result.
     guard
-        How many more are worked with, to begin with.
+        Number of extra digits to compute with, to begin with.
 
     """
 
@@ -125,16 +125,16 @@ class Reference:
         Parameters
         ----------
         inputs
-            Values of the driven joints, taken as the numbers that they are, in [rad] or [m].
+            Values of the driven joints, taken as exact, in [rad] or [m].
         rates, accelerations
-            Theirs; 1 and 0 if not given.
+            Of the driven joints; 1 and 0 if not given.
 
         Raises
         ------
         SingularError
             At a toggle and at a change point.
         ValueError
-            Where the linkage does not close.
+            If the linkage does not close.
 
         """
         position = self._closure.position(*map(float, inputs))
@@ -165,13 +165,13 @@ class Reference:
         """Return the unknowns as doubles."""
         angles, points = self._closure.link_angles(position), self._closure.points(position)
         slides = self._closure.slide_values(position)
-        found = []
+        unknowns = []
         for link in self._links:
             name, arm = next(iter(self._linkage.links[link].items()))
             turn = complex(*arm) * rect(1.0, angles[link])
             place = points[link, name] - turn
-            found += [angles[link], place.real, place.imag]
-        return [*found, *(slides[name] for name in self._sliders)]
+            unknowns += [angles[link], place.real, place.imag]
+        return [*unknowns, *(slides[name] for name in self._sliders)]
 
 
 def _near(
@@ -180,18 +180,18 @@ def _near(
     driven: Sequence[Sequence[float]],
     start: Sequence[float],
 ) -> Truth:
-    """Return the state near a start."""
+    """Return the state near a start value."""
     mp = equations.mp
     given = [[mp.mpf(value) for value in values] for values in driven]
     motion = [[mp.mpf(value) for value in start]]
     unit, goal = equations.unit, mp.mpf(10) ** (-0.55 * mp.dps)
     length = mp.inf
-    # A step of the goal leaves its square, which is less than rounding does.
+    # After a step as small as the goal, the error is its square, below the rounding error.
     while length > goal:
         last = length
         step, least = solved(equations.rows(motion[0]), equations.off(motion, given))
         length = max(abs(one) for one in step) / unit
-        # Where Newton's method does not contract, it may end in another assembly.
+        # If Newton's method does not contract, it may end in another assembly.
         if length > 0.25 * last:
             raise SingularError
         motion = [[x - s for x, s in zip(motion[0], step, strict=True)]]
@@ -200,7 +200,7 @@ def _near(
         motion.append([mp.mpf(0)] * len(start))
         change, least = solved(rows, equations.off(motion, given))
         motion[-1] = [-one for one in change]
-    # Each order inherits the error of the one before, once more by the inverse matrix.
+    # Each order inherits the error of the one before, multiplied by the inverse matrix.
     size = 1 + max(abs(one) for values in motion[1:] for one in values)
     condition = unit / min(least, unit)
     rounding = mp.mpf(10) ** (3 - mp.dps)
@@ -214,7 +214,7 @@ def _near(
 
 
 Row = dict[int, Any]
-"""A line of equations: factors by the number of their unknown."""
+"""A row of the system: factors by the number of their unknown."""
 
 
 class SingularError(ArithmeticError):
@@ -230,18 +230,18 @@ class ExactEquations:
     linkage
         The linkage.
     links
-        For each link that moves the number of its first unknown: its angle, then its place.
+        For each moving link the number of its first unknown: its angle; its position follows.
     sliders
-        For each slider that of its slide.
+        For each slider the number of its slide.
     digits
-        The precision.
+        The precision, in decimal digits.
 
     Attributes
     ----------
     mp
-        What the numbers are made with.
+        The context of the numbers.
     unit
-        The size of the linkage.
+        Size of the linkage, in [m].
 
     """
 
@@ -273,7 +273,7 @@ class ExactEquations:
             self._directions[name] = direction / abs(direction)
 
     def joints(self, values: Sequence[Any]) -> tuple[Any, ...]:
-        """Return the published joints of the unknowns; or their derivatives of theirs."""
+        """Return the published joints from the unknowns, or derivatives from derivatives."""
 
         def angle(link: str) -> Any:
             return values[self._links[link]] if link != GROUND else self.mp.mpf(0)
@@ -292,36 +292,36 @@ class ExactEquations:
         Parameters
         ----------
         motion
-            The unknowns, and their rates, and their accelerations.
+            The unknowns, then their rates, then their accelerations.
         given
-            Likewise of the inputs.
+            The same of the inputs.
 
         """
         order = len(motion) - 1
-        found: list[Any] = []
+        residuals: list[Any] = []
         for name, one, other in self._pins:
             between = self._place(motion, one, self._points[one, name])
             between -= self._place(motion, other, self._points[other, name])
-            found += [between.real, between.imag]
+            residuals += [between.real, between.imag]
         for name, slider in self._linkage.sliders.items():
             carrier = slider.block or self._carriers[slider.point]
             between = self._on_line(motion, name)
             between -= self._place(motion, carrier, self._points[carrier, slider.point])
-            found += [between.real, between.imag]
+            residuals += [between.real, between.imag]
             if slider.block:
                 apart = self._turn(motion, slider.block) - self._turn(motion, slider.along)
-                found.append(apart if order else self._wrapped(apart - slider.angle))
+                residuals.append(apart if order else self._wrapped(apart - slider.angle))
         for k, joint in enumerate(self._linkage.inputs):
             if joint.slider:
-                found.append(motion[-1][self._sliders[joint.slider]] - given[order][k])
+                residuals.append(motion[-1][self._sliders[joint.slider]] - given[order][k])
                 continue
             apart = self._turn(motion, joint.child) - self._turn(motion, joint.parent)
             apart -= given[order][k]
-            found.append(apart if order else self._wrapped(apart))
-        return found
+            residuals.append(apart if order else self._wrapped(apart))
+        return residuals
 
     def rows(self, values: list[Any]) -> list[Row]:
-        """Return the derivatives of the equations by the unknowns."""
+        """Return the derivatives of the equations with respect to the unknowns."""
         rows: list[Row] = []
 
         def add(slopes: Sequence[tuple[int, Any]]) -> None:
@@ -362,7 +362,7 @@ class ExactEquations:
         return rows
 
     def _slopes(self, values: list[Any], link: str, z: Any, sign: int) -> list[tuple[int, Any]]:
-        """Return the derivatives of a point's place by the unknowns of its link."""
+        """Return the derivatives of a point's position by the unknowns of its link."""
         if link == GROUND:
             return []
         k = self._links[link]
@@ -377,7 +377,7 @@ class ExactEquations:
         return motion[-1][self._links[link]] if link != GROUND else self.mp.mpf(0)
 
     def _place(self, motion: list[list[Any]], link: str, z: Any) -> Any:
-        """Return where a point of a link is; of a motion, the highest derivative of that."""
+        """Return the position of a point of a link; for a motion, its highest derivative."""
         if link == GROUND:
             return z if len(motion) == 1 else self.mp.mpc(0)
         k = self._links[link]
@@ -390,7 +390,7 @@ class ExactEquations:
         return place + (1j * motion[2][k] - motion[1][k] ** 2) * arm
 
     def _on_line(self, motion: list[list[Any]], name: str) -> Any:
-        """Return where a slider has its point, on its line; or the derivative of that."""
+        """Return the position of a slider's point on its line, or its derivative."""
         slider, column = self._linkage.sliders[name], self._sliders[name]
         along = self._directions[name]
         z = self._points[slider.along, slider.through] + motion[0][column] * along

@@ -16,7 +16,7 @@
 """
 The results of measurements as data: parts, diagrams and tables.
 
-Measuring and presenting know nothing of each other; both know these types.
+The modules that measure and those that present share only these types.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ class Axis(NamedTuple):
     Attributes
     ----------
     name
-        The quantity, in words: 'error'.
+        The quantity, for example 'error'.
     unit
-        In which unit: 'rad'; '' for a number.
+        Its unit, for example 'rad'; '' for a number.
     logarithmic
-        Whether equal steps are equal factors.
+        Whether the axis is logarithmic.
     least
-        Of a logarithmic axis, the smallest value worth a place of its own; 0 for any.
+        For a logarithmic axis, the smallest value drawn at its own position; 0 for any.
 
     """
 
@@ -51,7 +51,7 @@ class Axis(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Return its name with its unit."""
+        """Return the name with the unit."""
         return f'{self.name} [{self.unit}]' if self.unit else self.name
 
 
@@ -62,11 +62,11 @@ class Point(NamedTuple):
     Attributes
     ----------
     x, y
-        Where it lies: the median.
+        Coordinates: medians.
     x_spread, y_spread
-        The quartiles, where it was measured several times.
+        The quartiles, if it was measured several times.
     setting
-        The setting of the method, in words: 'tolerance 1e-6', '256 knots'.
+        The setting of the method: 'tolerance 1e-6', '256 knots'.
 
     """
 
@@ -84,7 +84,7 @@ class Curve(NamedTuple):
     Attributes
     ----------
     name
-        Of the method.
+        Name of the method.
     points
         In the order of the settings.
     joined
@@ -99,18 +99,18 @@ class Curve(NamedTuple):
 
 class Diagram(NamedTuple):
     """
-    A picture with one message.
+    A diagram with one message.
 
     Attributes
     ----------
     key
-        Its name as a file, without ending.
+        File name without suffix.
     title
         The message, in a sentence.
     x, y
         Its axes.
     curves
-        What is drawn; the same name has the same colour and mark in all diagrams.
+        The curves; the same name has the same colour and mark in all diagrams.
 
     """
 
@@ -128,13 +128,13 @@ class Table(NamedTuple):
     Attributes
     ----------
     key
-        Its name as a file, without ending.
+        File name without suffix.
     title
-        What it shows.
+        Its heading.
     columns
-        Names.
+        Headings.
     rows
-        Numbers as numbers and texts as texts; None for an empty cell.
+        Numbers or texts; None for an empty cell.
 
     """
 
@@ -155,7 +155,7 @@ class Part(NamedTuple):
     title
         The question that it answers.
     text
-        How it was measured, and what it says, in paragraphs without markup.
+        The method of measurement and the conclusions, in paragraphs without markup.
     diagrams, tables
         The results.
     advice
@@ -180,9 +180,9 @@ class Results(NamedTuple):
     scene
         Its name.
     machine
-        What it was measured on, and with which versions: names and values.
+        Machine and versions: names and values.
     parts
-        In their order; a scene without torque has no part on dynamics.
+        The parts in order; a scene without torque has no part on dynamics.
 
     """
 

@@ -14,10 +14,10 @@
 
 
 """
-What closing the loops costs: the error of a state against its time, for all methods.
+Cost of closing the loops: the error of a state against its time, for all methods.
 
-Errors are against fifty digits and computed once. Times are measured separately, of all methods on
-all poses in turn.
+Errors are relative to the reference with fifty digits and computed once. Times are measured
+separately, for all methods on all poses in turn.
 """
 
 from __future__ import annotations
@@ -66,13 +66,13 @@ from linkage_ros.solvers.table import ORDERS
 import numpy as np
 
 STATES = 64
-"""Of a turn, where rates are integrated."""
+"""Number of steps of a turn over which rates are integrated."""
 
 _ARRAY = 2e-2
-"""In [s]: where a full array takes longer, it is no longer than the poses."""
+"""If a full array takes longer than this, in [s], it is reduced to the poses."""
 
 _PASS = 5e-3
-"""A pass over states that takes longer than this is timed on the first of them only, in [s]."""
+"""If a pass over the states takes longer, only the first states are timed, in [s]."""
 
 
 def measure_solving(scene: Scene, quick: bool, progress: Progress) -> Part:
@@ -84,19 +84,19 @@ def measure_solving(scene: Scene, quick: bool, progress: Progress) -> Part:
     scene
         The scene.
     quick
-        Whether a few seconds are to do.
+        Whether to measure for a few seconds only.
     progress
-        Called now and then with the share that is done, 0 to 1.
+        Called now and then with the fraction that is done, 0 to 1.
 
     """
     member = scene.members[0]
     sets = pose_sets(member.name or scene.name, member.linkage, 24 if quick else 128)
-    found: list[Measured] = []
+    results: list[Measured] = []
     for number, poses in enumerate(sets):
         progress(0.3 * number / len(sets))
-        found += judge(poses, quick)
-    take_times(found, 1.0 if quick else 40.0, lambda share: progress(0.3 + 0.7 * share))
-    return part_of(found, quick)
+        results += judge(poses, quick)
+    take_times(results, 1.0 if quick else 40.0, lambda share: progress(0.3 + 0.7 * share))
+    return part_of(results, quick)
 
 
 def judge(poses: Poses, quick: bool) -> list[Measured]:
@@ -106,30 +106,30 @@ def judge(poses: Poses, quick: bool) -> list[Measured]:
     Raises
     ------
     ArithmeticError
-        Where two references differ.
+        If two references differ.
 
     """
     truths = true_states(poses)
     confirmed(poses, truths)
     methods = methods_for(poses.linkage, poses.key, quick)
-    found = [_judged(method, poses, truths) for method in methods]
+    results = [_judged(method, poses, truths) for method in methods]
     if poses.key == 'easy':
-        found += _integrated(poses, quick)
-    return found
+        results += _integrated(poses, quick)
+    return results
 
 
 def take_times(
-    found: Sequence[Measured], seconds: float, progress: Progress = lambda _: None
+    results: Sequence[Measured], seconds: float, progress: Progress = lambda _: None
 ) -> None:
     """Time all judged methods in turn, for about a number of seconds."""
-    jobs = [(one, what, job) for one in found for what, job in _contenders(one)]
+    jobs = [(one, what, job) for one in results for what, job in _contenders(one)]
     times = in_turn([job for _, _, job in jobs], seconds, progress)
     for (one, what, _), time in zip(jobs, times, strict=True):
         one.times[what] = time
 
 
 def true_states(poses: Poses) -> list[Truth]:
-    """Return the truth at every state of a set."""
+    """Return the reference state at every state of a set."""
     reference = Reference(poses.linkage)
     driven = len(poses.linkage.inputs)
     rates, accelerations = [RATE] * driven, [ACCELERATION] * driven
@@ -137,7 +137,7 @@ def true_states(poses: Poses) -> list[Truth]:
 
 
 def _integrated(poses: Poses, quick: bool) -> Iterator[Measured]:
-    """Yield the results of integration along a turn; its error is that at the end."""
+    """Yield the results of integration along a turn; the error is that at its end."""
     way = path(poses, STATES)
     if way is None:
         return
@@ -155,7 +155,7 @@ def _judged(method: Method, poses: Poses, truths: Sequence[Truth]) -> Measured:
     motion = motion_errors(method, poses, truths) if method.motion else None
     position = motion[0] if motion and method.together else position_errors(method, poses, truths)
     batch = None
-    # Iteration takes one state at a time; arrays make it no faster.
+    # Iteration solves one state at a time; arrays make it no faster.
     if method.batch is not None and poses.key in ('easy', 'five_dyads'):
         batch = batch_errors(method.batch, poses, truths)
     return Measured(poses, method, position, motion, batch, {})
@@ -180,7 +180,7 @@ def _contenders(one: Measured) -> Iterator[tuple[str, Contender]]:
 def _looped(solve: Callable[..., Any], poses: Poses) -> Contender:
     states = poses.inputs
     if poses.key == 'path':
-        # The first state is a new start and no step.
+        # The first state is a new start, not a step.
         solve(*states[0])
         states = states[1:]
     done, begun = 0, perf_counter()
@@ -208,30 +208,30 @@ TOLERANCES = tuple(10.0**-k for k in range(2, 16))
 KNOTS = tuple(2**k for k in range(4, 21))
 
 PEERS = (pylinkage, casadi, mujoco, pinocchio)
-"""Other packages, where they are installed; to import some of them takes a second."""
+"""Methods of other packages, if installed; importing some of them takes a second."""
 
 _FEW = {FROM_KNOTS: (1e-8,), WARM: (1e-2, 1e-8, 1e-14), COLD: (1e-8,)}
-"""Tolerances by where Newton's method starts."""
+"""Tolerances, by the start value of Newton's method."""
 
 _LARGEST = 2**22
-"""Knots times joints of a table: what memory bears beside all others."""
+"""Maximum size of a table, knots times joints, because of memory."""
 
 _LARGEST_ITERATED = 2**14
-"""Where each knot is iterated."""
+"""Maximum number of knots if each is iterated."""
 
 
 def methods_for(linkage: Linkage, key: str, quick: bool) -> Iterator[Method]:
     """
-    Yield the methods that a linkage has.
+    Yield the methods that apply to a linkage.
 
     Parameters
     ----------
     linkage
         The linkage.
     key
-        Of the poses: all settings for easy ones, a few for the others.
+        Key of the poses: all settings for easy ones, a few for the others.
     quick
-        Whether a few settings are to do everywhere, and no other packages.
+        Whether to use only a few settings everywhere, and no other packages.
 
     """
     closed = closed_form(linkage)
@@ -263,24 +263,24 @@ def _knots_of(linkage: Linkage, iterated: bool, key: str, quick: bool) -> Sequen
 
 
 PROVED = 1e-40
-"""Radius of a ball that proves a number, of 1 or of itself where that is more."""
+"""Maximum radius of a verifying ball, absolute below 1, else relative."""
 
 _SAMPLE = 3
 
 
 def confirmed(poses: Poses, truths: Sequence[Truth]) -> int:
     """
-    Return how many states balls have confirmed; 0 if python-flint is not installed.
+    Return the number of states that balls verify; 0 if python-flint is not installed.
 
     Raises
     ------
     ArithmeticError
-        Where the references differ.
+        If the references differ.
 
     """
     if find_spec('flint') is None:
         return 0
-    from linkage_ros.accuracy.enclosure import prove  # local import: an extra of its own
+    from linkage_ros.accuracy.enclosure import prove  # local import: an optional dependency
 
     driven = len(poses.linkage.inputs)
     rates, accelerations = [RATE] * driven, [ACCELERATION] * driven
@@ -293,8 +293,8 @@ def confirmed(poses: Poses, truths: Sequence[Truth]) -> int:
 
 
 def same(linkage: Linkage, proof: Any, truth: Truth) -> bool:
-    """Return whether small balls hold joints, rates and accelerations, angles modulo 2π."""
-    from flint import arb, ctx  # local import: an extra
+    """Return whether small balls hold the reference's joints and derivatives, angles mod 2π."""
+    from flint import arb, ctx  # local import: an optional dependency
 
     before, ctx.prec = ctx.prec, 512
     try:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The part of the page on closing the loops: its diagrams, its tables and their conclusions."""
+"""Results of closing the loops: diagrams, tables and conclusions."""
 
 from __future__ import annotations
 
@@ -29,34 +29,34 @@ from linkage_ros.accuracy.results import Axis, Curve, Diagram, Part, Point, Tabl
 from linkage_ros.measuring import Spread
 
 FLOOR = 1e-18
-"""Where an answer in doubles that is exactly right is drawn, in [rad]."""
+"""Position in the diagram of an error of 0, in [rad]."""
 
 _TIME = Axis('time of a state', 'µs')
 _ERROR = 'greatest error'
 _UNIT = 'rad, or of the size'
 _LEAST = 1e-19
-"""Less is drawn on the edge: what has more digits than a double has would flatten all else."""
+"""Smaller errors, beyond the digits of a double, are drawn on the edge to save the scale."""
 
 _ERRORS = Axis(_ERROR, _UNIT, least=_LEAST)
 
 _WITH_PATH = ('easy', 'path')
-"""Integration goes along a path; it is shown with the easy poses."""
+"""Integration follows a path; it is shown with the easy poses."""
 
 
-def part_of(found: Sequence[Measured], quick: bool) -> Part:
-    """Return the part."""
+def part_of(results: Sequence[Measured], quick: bool) -> Part:
+    """Return the results as a part of the page."""
     return Part(
         'solving',
         'Solving the loop',
-        text(found, quick),
-        list(_diagrams(found)),
-        list(_tables(found)),
-        advice(found),
+        text(results, quick),
+        list(_diagrams(results)),
+        list(_tables(results)),
+        advice(results),
     )
 
 
-def _diagrams(found: Sequence[Measured]) -> Iterator[Diagram]:
-    easy = _of(found, _WITH_PATH)
+def _diagrams(results: Sequence[Measured]) -> Iterator[Diagram]:
+    easy = _of(results, _WITH_PATH)
     where = f'of {easy[0].poses.name}'
     yield Diagram(
         'solving_easy',
@@ -80,7 +80,7 @@ def _diagrams(found: Sequence[Measured]) -> Iterator[Diagram]:
         _curves(easy, 'batch', lambda one: one.batch and one.batch[0]),
     )
     for key, words in (('toggle', 'next to a toggle'), ('change_point', 'at a change point')):
-        some = _of(found, (key,))
+        some = _of(results, (key,))
         yield Diagram(
             f'solving_{key}',
             f'Position of {some[0].poses.name} {words}: what accuracy costs',
@@ -91,11 +91,11 @@ def _diagrams(found: Sequence[Measured]) -> Iterator[Diagram]:
 
 
 def _curves(
-    found: Sequence[Measured], what: str, errors_of: Callable[[Measured], Errors | None]
+    results: Sequence[Measured], what: str, errors_of: Callable[[Measured], Errors | None]
 ) -> list[Curve]:
     """Return a curve for each method; a method that failed everywhere has no point."""
     points: dict[str, list[Point]] = {}
-    for one in found:
+    for one in results:
         errors, time = errors_of(one), one.times.get(what)
         if errors is None or errors.worst is None or time is None:
             continue
@@ -115,21 +115,21 @@ def _curves(
     return [Curve(name, some, joined=len(some) > 1) for name, some in points.items()]
 
 
-def _tables(found: Sequence[Measured]) -> Iterator[Table]:
-    for poses in _sets(found):
+def _tables(results: Sequence[Measured]) -> Iterator[Table]:
+    for poses in _sets(results):
         if poses.key != 'path':
-            yield _table(_of(found, _WITH_PATH if poses.key == 'easy' else (poses.key,)), poses)
-    batch = [one for one in found if one.batch is not None]
+            yield _table(_of(results, _WITH_PATH if poses.key == 'easy' else (poses.key,)), poses)
+    batch = [one for one in results if one.batch is not None]
     if batch:
         yield _batch_table(batch)
-    knots = [one for one in found if one.method.memory is not None and one.poses.key == 'easy']
+    knots = [one for one in results if one.method.memory is not None and one.poses.key == 'easy']
     if knots:
         yield _knot_table(knots)
     for key in ('toggle', 'change_point'):
-        yield _distance_table(_of(found, (key,)))
+        yield _distance_table(_of(results, (key,)))
 
 
-def _table(found: Sequence[Measured], poses: Poses) -> Table:
+def _table(results: Sequence[Measured], poses: Poses) -> Table:
     return Table(
         f'solving_{poses.key}',
         f'{poses.name}, {poses.title}: all methods',
@@ -158,12 +158,12 @@ def _table(found: Sequence[Measured], poses: Poses) -> Table:
                 one.motion[2].worst if one.motion else None,
                 100.0 * one.motion[2].failed if one.motion else None,
             )
-            for one in found
+            for one in results
         ],
     )
 
 
-def _batch_table(found: Sequence[Measured]) -> Table:
+def _batch_table(results: Sequence[Measured]) -> Table:
     return Table(
         'solving_batch',
         'Arrays of states',
@@ -188,16 +188,16 @@ def _batch_table(found: Sequence[Measured]) -> Table:
                 _time(one, 'batch_motion'),
                 one.batch[2].worst,
             )
-            for one in found
+            for one in results
             if one.batch is not None
         ],
     )
 
 
-def _knot_table(found: Sequence[Measured]) -> Table:
+def _knot_table(results: Sequence[Measured]) -> Table:
     return Table(
         'solving_knots',
-        f'Tables of {found[0].poses.name}: what they hold and take to build',
+        f'Tables of {results[0].poses.name}: what they hold and take to build',
         ('table', 'setting', 'memory [kB]', 'build [ms]', f'greatest error [{_UNIT}]'),
         [
             (
@@ -207,15 +207,15 @@ def _knot_table(found: Sequence[Measured]) -> Table:
                 1000.0 * (one.method.build or 0.0),
                 one.position.worst,
             )
-            for one in found
+            for one in results
         ],
     )
 
 
-def _distance_table(found: Sequence[Measured]) -> Table:
-    """Return the errors by the distance from trouble, a column for each method at its best."""
-    poses = found[0].poses
-    best = list(best_of_each(found))
+def _distance_table(results: Sequence[Measured]) -> Table:
+    """Return errors by distance from the singular pose, one column for each method's best."""
+    poses = results[0].poses
+    best = list(best_of_each(results))
     rows = []
     for distance in sorted(set(poses.distances), reverse=True):
         at = [k for k, apart in enumerate(poses.distances) if apart == distance]
@@ -235,11 +235,11 @@ def _distance_table(found: Sequence[Measured]) -> Table:
     )
 
 
-def best_of_each(found: Sequence[Measured]) -> Iterator[Measured]:
-    """Yield of each method the setting that fails least and is nearest to the truth."""
-    for name in dict.fromkeys(one.method.name for one in found):
+def best_of_each(results: Sequence[Measured]) -> Iterator[Measured]:
+    """Yield for each method the setting that fails least and has the smallest error."""
+    for name in dict.fromkeys(one.method.name for one in results):
         yield min(
-            (one for one in found if one.method.name == name),
+            (one for one in results if one.method.name == name),
             key=lambda one: (one.position.failed, one.position.worst or 0.0),
         )
 
@@ -249,12 +249,12 @@ def _worst_at(errors: Errors, states: Sequence[int]) -> float | None:
     return max((error for error in some if error is not None), default=None)
 
 
-def _of(found: Sequence[Measured], keys: Sequence[str]) -> list[Measured]:
-    return [one for one in found if one.poses.key in keys]
+def _of(results: Sequence[Measured], keys: Sequence[str]) -> list[Measured]:
+    return [one for one in results if one.poses.key in keys]
 
 
-def _sets(found: Sequence[Measured]) -> list[Poses]:
-    return list({one.poses.key: one.poses for one in found}.values())
+def _sets(results: Sequence[Measured]) -> list[Poses]:
+    return list({one.poses.key: one.poses for one in results}.values())
 
 
 def _time(one: Measured, what: str) -> Spread | None:
@@ -271,12 +271,12 @@ WANTED = (1e-3, 1e-6, 1e-9, 1e-12)
 _TROUBLE = ('toggle', 'change_point')
 
 _IN_A_SCENE = (*NODE_DEFAULTS, FROM_KNOTS, TABLES['hermite'])
-"""The methods that ``solver`` of a scene can choose."""
+"""Methods that ``solver`` of a scene can choose."""
 
 
-def text(found: Sequence[Measured], quick: bool) -> list[str]:
+def text(results: Sequence[Measured], quick: bool) -> list[str]:
     """Return paragraphs on the method of measurement and on the results."""
-    sets = {one.poses.key: one.poses for one in found}
+    sets = {one.poses.key: one.poses for one in results}
     easy = sets['easy']
     how = (
         f'{len(easy.inputs)} easy poses of {easy.name} were solved by each method, one call a '
@@ -297,19 +297,19 @@ def text(found: Sequence[Measured], quick: bool) -> list[str]:
     said = [how, errors]
     if quick:
         said.append('This is the quick run: fewer settings, poses and rounds.')
-    said.append(_outcome(found, easy))
-    said += [_near_trouble(found, sets[key]) for key in _TROUBLE]
+    said.append(_outcome(results, easy))
+    said += [_near_trouble(results, sets[key]) for key in _TROUBLE]
     said.append(
         "Where Newton's method does not converge, next to toggles and change points, it takes the "
         'state of the closed form.'
     )
-    said += filter(None, [_textbook(found), _iterated(found)])
+    said += filter(None, [_textbook(results), _iterated(results)])
     return said
 
 
-def advice(found: Sequence[Measured]) -> list[str]:
+def advice(results: Sequence[Measured]) -> list[str]:
     """Return a sentence for each accuracy: the cheapest method that a scene can choose."""
-    easy = [one for one in found if one.poses.key == 'easy' and one.times.get('position')]
+    easy = [one for one in results if one.poses.key == 'easy' and one.times.get('position')]
     offered = [one for one in easy if one.method.name in _IN_A_SCENE]
     winners = [_cheapest(offered, wanted) for wanted in WANTED]
     node = next(one for one in offered if one.method.name in NODE_DEFAULTS)
@@ -329,7 +329,7 @@ def advice(found: Sequence[Measured]) -> list[str]:
             f'For {wanted:g} rad at easy poses: {_named(one)}, {_median_us(one):.2g} µs a state, '
             f'{_compared(one, node)}'
         )
-        refuge = _fails_in(found, one, wanted)
+        refuge = _fails_in(results, one, wanted)
         if refuge:
             words += f'; but {refuge}'
         said.append(f'{words}.')
@@ -341,13 +341,14 @@ def advice(found: Sequence[Measured]) -> list[str]:
     return said
 
 
-def _cheapest(found: Sequence[Measured], wanted: float) -> Measured | None:
+def _cheapest(results: Sequence[Measured], wanted: float) -> Measured | None:
     """
     Return the fastest method of those that never fail and reach the accuracy.
 
-    Of those that are within each other's spreads what the node does wins, else what holds least.
+    If several are within each other's spread, the node's method wins, else the one with the
+    smallest memory.
     """
-    able = [one for one in found if _keeps(one, wanted)]
+    able = [one for one in results if _keeps(one, wanted)]
     if not able:
         return None
     best = min(able, key=lambda one: one.times['position'].middle)
@@ -369,11 +370,11 @@ def _compared(one: Measured, node: Measured) -> str:
     return f'{ratio:.3g} times as fast as the {node.method.name}'
 
 
-def _fails_in(found: Sequence[Measured], one: Measured, wanted: float) -> str:
-    """Return where a method does not keep the accuracy, with its setting if that was measured."""
+def _fails_in(results: Sequence[Measured], one: Measured, wanted: float) -> str:
+    """Return where a method misses the accuracy, with its setting if that was measured."""
     bad = []
     for key in _TROUBLE:
-        there = [other for other in found if other.poses.key == key]
+        there = [other for other in results if other.poses.key == key]
         same = [other for other in there if other.method.name == one.method.name]
         same = [o for o in same if o.method.setting == one.method.setting] or same
         if same and not any(_keeps(other, wanted) for other in same):
@@ -387,8 +388,8 @@ def _keeps(one: Measured, wanted: float) -> bool:
     return not one.position.failed and worst is not None and worst <= wanted
 
 
-def _outcome(found: Sequence[Measured], easy: Poses) -> str:
-    some = [one for one in found if one.poses.key == easy.key and one.times.get('position')]
+def _outcome(results: Sequence[Measured], easy: Poses) -> str:
+    some = [one for one in results if one.poses.key == easy.key and one.times.get('position')]
     node = next(one for one in some if one.method.name in NODE_DEFAULTS)
     base = node.times['position'].middle
     exact = [
@@ -418,8 +419,8 @@ def _outcome(found: Sequence[Measured], easy: Poses) -> str:
     return words
 
 
-def _near_trouble(found: Sequence[Measured], poses: Poses) -> str:
-    some = [one for one in found if one.poses.key == poses.key]
+def _near_trouble(results: Sequence[Measured], poses: Poses) -> str:
+    some = [one for one in results if one.poses.key == poses.key]
     node = next(one for one in some if one.method.name in NODE_DEFAULTS)
     failing = dict.fromkeys(one.method.name for one in some if one.position.failed)
     where = poses.title[0].upper() + poses.title[1:]
@@ -438,8 +439,8 @@ def _near_trouble(found: Sequence[Measured], poses: Poses) -> str:
     )
 
 
-def _textbook(found: Sequence[Measured]) -> str:
-    some = [one for one in found if one.method.name == TEXTBOOK]
+def _textbook(results: Sequence[Measured]) -> str:
+    some = [one for one in results if one.method.name == TEXTBOOK]
     if not some:
         return ''
     parts = ', '.join(f'{one.poses.title}: {one.position.failed:.0%}' for one in some)
@@ -449,8 +450,8 @@ def _textbook(found: Sequence[Measured]) -> str:
     )
 
 
-def _iterated(found: Sequence[Measured]) -> str:
-    some = [one for one in found if one.method.name == ITERATED]
+def _iterated(results: Sequence[Measured]) -> str:
+    some = [one for one in results if one.method.name == ITERATED]
     if not some:
         return ''
     return (

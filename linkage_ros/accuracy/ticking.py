@@ -14,11 +14,11 @@
 
 
 """
-What the rate of ticks buys: the error of the state that a subscriber has when it uses it.
+Effect of the tick rate: the error of the state that a subscriber has when it uses it.
 
-A node and a subscriber run in processes of their own and talk over DDS, in a domain of their own;
-no message leaves the machine. The crank moves so that a stale state shows: by a chirp, and by a
-constant acceleration.
+A node and a subscriber run in processes of their own and communicate over DDS, in a domain of
+their own; no message leaves the machine. The crank moves so that a stale state shows: by a chirp,
+and by a constant acceleration.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ _FREQUENCIES = (0.2, 5.0)  # [Hz]
 _SWING = 1.0  # [rad]
 _GROWTH = 10.0  # [rad/s²]
 _PART = 0.8
-"""Of its range that an input moves through where it cannot turn round."""
+"""Fraction of its range through which an input moves if it cannot turn fully."""
 
 CrankAt = Callable[[int], tuple[float, float]]
-"""Value and rate of the input, in [rad] or [m] and a second, at a time since the start in [ns]."""
+"""Value and rate of the input, in [rad] or [m], and per [s], at a time since the start in [ns]."""
 
 
 class Motions(NamedTuple):
@@ -68,7 +68,7 @@ class Motions(NamedTuple):
     by_name
         `CHIRP` and `ACCELERATION`.
     greatest
-        For each the greatest rate and acceleration of the input, in [rad/s] and [rad/s²], or of m.
+        For each the maximum rate and acceleration of the input, in [rad/s] and [rad/s²], or [m].
 
     """
 
@@ -85,7 +85,7 @@ def motions_of(closure: Closure, seconds: float) -> Motions:
     closure
         A linkage with one input.
     seconds
-        How long they take.
+        Duration of each.
 
     """
     (start,) = usual_inputs(closure)
@@ -118,36 +118,36 @@ def motions_of(closure: Closure, seconds: float) -> Motions:
 
 
 HELD, CARRIED = 'held', 'carried forward'
-"""How a state is used: as it is, or carried by its rates from its stamp to now."""
+"""How a state is used: unchanged, or extrapolated by its rates from its stamp to now."""
 
 CRANK_RATE = 1000.0
 USE_RATE = 500.0
-"""Samples of the crank and uses of a state, a second."""
+"""Samples of the crank, and uses of a state, per second."""
 
 _LINKAGE_FILE, _SCENE_FILE = 'linkage.yaml', 'ticking.yaml'
 _PATIENCE = 30.0  # [s]
 _DOMAINS = 101
-"""Domain ids up to this one are safe with the ports of every operating system."""
+"""Domain ids up to this one have ports that are safe on every operating system."""
 
 
 class Used(NamedTuple):
     """
-    The states that a subscriber used, at one rate of ticks and in one motion of the crank.
+    The states that a subscriber used, at one tick rate and in one motion of the crank.
 
     Attributes
     ----------
     rate
-        Ticks a second, in [Hz].
+        Tick rate, in [Hz].
     motion
-        Of the crank.
+        Motion of the crank.
     age
-        Of the states when used, in [s].
+        Age of the states when used, in [s].
     errors
-        By `HELD` and `CARRIED`: of each use the greatest error of a joint.
+        By `HELD` and `CARRIED`: for each use the maximum error of a joint.
     unused
-        Uses at which no state had come yet.
+        Number of uses before the first state arrived.
     cpu
-        Of the node, the share of a core.
+        Processor time of the node, as a fraction of a core.
 
     """
 
@@ -161,23 +161,23 @@ class Used(NamedTuple):
 
 def use_states(folder: Path, linkage: Linkage, rate: float, seconds: float) -> list[Used]:
     """
-    Run a node and let its states be used.
+    Run a node and a subscriber that uses its states.
 
     Parameters
     ----------
     folder
-        An empty one, for its files.
+        An empty folder for its files.
     linkage
-        What the node solves.
+        The linkage to solve.
     rate
-        Ticks a second, in [Hz].
+        Tick rate, in [Hz].
     seconds
-        How long each motion takes.
+        Duration of each motion.
 
     Raises
     ------
     LinkageError
-        Where node or user do not do their part.
+        If the node or the subscriber fails.
 
     """
     inputs = {given.joint for given in linkage.inputs}
@@ -227,7 +227,7 @@ def use_states(folder: Path, linkage: Linkage, rate: float, seconds: float) -> l
 
 @contextmanager
 def _in_one_line() -> Iterator[None]:
-    """Let a process that does not do its part be an error that a user can read."""
+    """Turn a failure of a process into an error of one line for the user."""
     try:
         yield
     except MeasurementError as error:
@@ -242,7 +242,7 @@ def _processor_time(pid: int) -> float:
 
 
 RATES = (20, 50, 100, 200, 500, 1000, 2000)
-"""Ticks a second, in [Hz]."""
+"""Tick rates, in [Hz]."""
 
 QUICK_RATES = (100, 1000)
 
@@ -259,14 +259,14 @@ def measure_ticking(scene: Scene, quick: bool, progress: Progress) -> Part | Non
     scene
         The scene.
     quick
-        Whether a few seconds are to do.
+        Whether to measure for a few seconds only.
     progress
-        Called now and then with the share that is done, 0 to 1.
+        Called now and then with the fraction that is done, 0 to 1.
 
     Raises
     ------
     LinkageError
-        Where the node or the subscriber does not do its part.
+        If the node or the subscriber fails.
 
     """
     linkage = scene.members[0].linkage
@@ -275,47 +275,47 @@ def measure_ticking(scene: Scene, quick: bool, progress: Progress) -> Part | Non
     rates = QUICK_RATES if quick else RATES
     seconds = 0.6 if quick else 2.0
     closure = Closure(linkage)
-    found: list[Used] = []
+    results: list[Used] = []
     with tempfile.TemporaryDirectory(prefix='linkage_ticking_') as folder:
         for number, rate in enumerate(rates):
             progress(number / len(rates))
-            found += use_states(Path(folder), linkage, rate, seconds)
+            results += use_states(Path(folder), linkage, rate, seconds)
     progress(1.0)
     unit = _UNIT[any(closure.turning)]
     return Part(
         'ticking',
         'What the rate of ticks buys',
-        _text(closure, seconds, found, unit),
+        _text(closure, seconds, results, unit),
         [
-            _diagram('ticking_rate', 'The faster the ticks, the nearer the state in use', found,
+            _diagram('ticking_rate', 'The faster the ticks, the nearer the state in use', results,
                      unit, Axis('ticks a second', 'Hz'), lambda used: used.rate),
-            _diagram('ticking_cpu', 'What that costs the processor', found, unit,
+            _diagram('ticking_cpu', 'What that costs the processor', results, unit,
                      Axis('processor time of the node', '% of a core'),
                      lambda used: 100.0 * used.cpu),
         ],
-        [_table(found, unit)],
-        list(_advice(found, unit)),
+        [_table(results, unit)],
+        list(_advice(results, unit)),
     )  # fmt: skip
 
 
 def rms(values: Sequence[float]) -> float:
-    """Return the root of the mean square."""
+    """Return the root mean square."""
     return sqrt(sum(value * value for value in values) / len(values))
 
 
 def _diagram(
     key: str,
     title: str,
-    found: Sequence[Used],
+    results: Sequence[Used],
     unit: str,
     axis: Axis,
     place: Callable[[Used], float],
 ) -> Diagram:
     curves = []
-    for motion in dict.fromkeys(used.motion for used in found):
+    for motion in dict.fromkeys(used.motion for used in results):
         for way in (HELD, CARRIED):
             chosen = [
-                (used, spread_of(used.errors[way])) for used in found if used.motion == motion
+                (used, spread_of(used.errors[way])) for used in results if used.motion == motion
             ]
             points = [
                 Point(place(used), spread.middle, y_spread=spread, setting=f'{used.rate:g} Hz')
@@ -325,7 +325,7 @@ def _diagram(
     return Diagram(key, title, axis, Axis('error of a joint when used', unit), curves)
 
 
-def _table(found: Sequence[Used], unit: str) -> Table:
+def _table(results: Sequence[Used], unit: str) -> Table:
     return Table(
         'ticking',
         'The state that a subscriber has, when it uses it',
@@ -354,12 +354,12 @@ def _table(found: Sequence[Used], unit: str) -> Table:
                 len(used.age),
                 used.unused,
             )
-            for used in found
+            for used in results
         ],
     )
 
 
-def _text(closure: Closure, seconds: float, found: Sequence[Used], unit: str) -> list[str]:
+def _text(closure: Closure, seconds: float, results: Sequence[Used], unit: str) -> list[str]:
     greatest = motions_of(closure, seconds).greatest
     of = {True: 'rad', False: 'm'}[not closure.linkage.inputs[0].slider]
     moves = '; '.join(
@@ -374,12 +374,12 @@ def _text(closure: Closure, seconds: float, found: Sequence[Used], unit: str) ->
         'the worst joint against the linkage solved at the exact crank of that instant. So it has '
         'all in it: the crank sample on its way, the wait for the tick, the tick, the way back.'
     )
-    slow, fast = found[0].rate, found[-1].rate
+    slow, fast = results[0].rate, results[-1].rate
     said = []
     for motion in greatest:
         ends = {
             used.rate: used
-            for used in found
+            for used in results
             if used.motion == motion and used.rate in (slow, fast)
         }
         if len(ends) == 2:
@@ -388,7 +388,7 @@ def _text(closure: Closure, seconds: float, found: Sequence[Used], unit: str) ->
 
 
 def _gain(motion: str, slow: Used, fast: Used, unit: str) -> str:
-    """Return the gain of the fastest ticks over the slowest."""
+    """Return the gain of the highest tick rate over the lowest."""
     parts = [
         f'{way} from {rms(slow.errors[way]):.2g} to {rms(fast.errors[way]):.2g} {unit}'
         for way in (HELD, CARRIED)
@@ -400,10 +400,10 @@ def _gain(motion: str, slow: Used, fast: Used, unit: str) -> str:
     )
 
 
-def _advice(found: Sequence[Used], unit: str) -> Iterator[str]:
-    """Yield the slowest ticks that reach each of some accuracies, in both motions."""
+def _advice(results: Sequence[Used], unit: str) -> Iterator[str]:
+    """Yield the lowest tick rate that reaches each of several accuracies, in both motions."""
     for wanted in _WANTED:
-        held, carried = (_slowest(found, way, wanted) for way in (HELD, CARRIED))
+        held, carried = (_slowest(results, way, wanted) for way in (HELD, CARRIED))
         words = f'For {wanted:g} {unit} (rms) when used: '
         if carried is None and held is None:
             yield f'{words}none of these rates will do.'
@@ -414,6 +414,6 @@ def _advice(found: Sequence[Used], unit: str) -> Iterator[str]:
             yield f'{words}{held:g} ticks a second.'
 
 
-def _slowest(found: Sequence[Used], way: str, wanted: float) -> float | None:
-    poor = {used.rate for used in found if rms(used.errors[way]) > wanted}
-    return min((used.rate for used in found if used.rate not in poor), default=None)
+def _slowest(results: Sequence[Used], way: str, wanted: float) -> float | None:
+    poor = {used.rate for used in results if rms(used.errors[way]) > wanted}
+    return min((used.rate for used in results if used.rate not in poor), default=None)

@@ -36,7 +36,7 @@ from linkage_ros.cli.terminal import progress, ProgressCallback, show, Table
 from linkage_ros.errors import did_you_mean, LinkageError, listed
 from linkage_ros.scene.load import load_scene
 
-# What accuracy costs, printed: the tables of its parts, and what to take.
+# The printed result: the tables of each part, and the advice.
 
 
 def print_results(results: Results) -> None:
@@ -54,7 +54,7 @@ def print_results(results: Results) -> None:
 
 
 def printed(table: Measured) -> Table:
-    """Return a table as texts; columns of numbers are set right."""
+    """Return a table as texts; columns of numbers are aligned to the right."""
     columns = zip(table.columns, numeric_columns(table), strict=True)
     return Table(
         table.title,
@@ -64,14 +64,14 @@ def printed(table: Measured) -> Table:
 
 
 _REFERENCE = 'mpmath'
-"""Of the extra `report`: what the reference is worked out with."""
+"""The package that computes the reference; it comes with the extra `report`."""
 
 _SHARES = {'solving': 60, 'ticking': 45, 'effects': 5, 'dynamics': 25, 'recording': 30}
-"""About how long the parts take, one beside another."""
+"""Approximate relative durations of the parts."""
 
 
 class _StoppedError(Exception):
-    """Somebody has asked to stop."""
+    """A stop was requested."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -98,7 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Measure, print and write; return 1 where it was stopped."""
+    """Measure, print and write; return 1 if stopped."""
     parts = _parts(arguments.only)
     if find_spec(_REFERENCE) is None:
         raise LinkageError(_REFERENCE, 'is not installed', 'pip install linkage_ros[report]')
@@ -123,7 +123,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 class _Overall:
-    """Makes of how much of a part is done how much of all is."""
+    """Converts the progress of a part to the progress of the whole."""
 
     def __init__(self, parts: list[str], told: ProgressCallback, stop: Event) -> None:
         self._told, self._stop = told, stop

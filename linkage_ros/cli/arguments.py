@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the commands that look at one linkage share: values of its inputs, typed and told."""
+"""Arguments that several commands share: values of the inputs of a linkage, files, output."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def add_at(parser: argparse.ArgumentParser, text: str) -> None:
 
 
 def values(text: str) -> tuple[float, ...]:
-    """Read numbers with commas between them."""
+    """Read numbers separated by commas."""
     try:
         numbers = tuple(float(part) for part in text.split(','))
     except ValueError:
@@ -60,12 +60,12 @@ def inputs(
     linkage: Linkage, typed: Sequence[float], option: str, *, in_degrees: bool = True
 ) -> tuple[float, ...]:
     """
-    Return what was typed for the inputs, in [rad] and [m].
+    Return the typed values of the inputs, in [rad] and [m].
 
     Raises
     ------
     LinkageError
-        Where there are more or fewer values than inputs.
+        If there are more or fewer values than inputs.
 
     """
     given = linkage.inputs
@@ -82,13 +82,13 @@ def inputs(
 
 
 def wrapped(angle: float) -> float:
-    """Return an angle less its whole turns, in (−π, π] rad."""
+    """Return an angle without its full turns, in (−π, π] rad."""
     rest = remainder(angle, tau)
     return pi if rest <= -pi else rest
 
 
 def fixed(value: float, digits: int) -> str:
-    """Return a number with decimals, and without a minus before a zero."""
+    """Return a number with fixed decimals; never a negative zero."""
     written = f'{value:.{digits}f}'
     return written.lstrip('-') if float(written) == 0.0 else written
 
@@ -99,17 +99,17 @@ def angle_text(angle: float, digits: int = 3) -> str:
 
 
 def value_text(value: float, turning: bool) -> str:
-    """Return the value of an input as it is read: degrees and radians, or metres."""
+    """Return the value of an input for a reader: degrees and radians, or metres."""
     if turning:
         return f'{angle_text(value)} ({value + 0.0:.6g} rad)'
     return f'{value + 0.0:.6g} m'
 
 
-# What the commands that write robot models share: a linkage or scene file, and where it goes.
+# Shared by the commands that write robot models: a linkage or scene file, and the output.
 
 
 def add_files(parser: argparse.ArgumentParser, kind: str) -> None:
-    """Declare the file that is read, and ``-o``."""
+    """Declare the input file, and ``-o``."""
     parser.add_argument('file', help='the linkage file or the scene file')
     add_output(parser, kind)
 
@@ -125,7 +125,7 @@ def model_of(file: str, write: Write) -> bytes:
     """
     Return the model of a linkage or scene file.
 
-    The linkages of a scene are as the node would solve them, deviations of their parts included.
+    Linkages of a scene are those that the node would solve, with the deviations of their parts.
     """
     content, _ = read_yaml(file)
     if kind_of(content) == 'scene':

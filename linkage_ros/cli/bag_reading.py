@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The messages of a bag for a command: with a word on how far it is, up to damage or Ctrl-C."""
+"""Read the messages of a bag for a command: with progress, up to damage or Ctrl-C."""
 
 from __future__ import annotations
 
@@ -48,19 +48,19 @@ from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heeded, StoppedError
 
 _MIB = 2**20
-_BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its own
+_BESIDE = 47  # bytes that a message takes in an MCAP file and its index beside its content
 
 
 def opened(path: Path, stop: Event) -> Bag:
     """
-    Open a bag for reading, as far as it goes; say what of its attachments is not read.
+    Open a bag for reading as far as it goes; report attachments that are not read.
 
     Raises
     ------
     BagError
-        As `read_bag`.
+        See `read_bag`.
     StoppedError
-        A signal has come while it was searched for what its missing index would tell.
+        If a signal came while the file was searched because its index is missing.
 
     """
 
@@ -79,7 +79,7 @@ def opened(path: Path, stop: Event) -> Bag:
 
 
 def add_trust(parser: argparse.ArgumentParser) -> None:
-    """Declare the option by which a user trusts a bag."""
+    """Declare the option to import the modules that a bag's scene names."""
     parser.add_argument(
         '--trust-effects',
         action='store_true',
@@ -90,12 +90,12 @@ def add_trust(parser: argparse.ArgumentParser) -> None:
 
 def scene_of(bag: Bag, *, trust_effects: bool) -> Scene:
     """
-    Return the scene that a bag carries; what it imports, if that is wished, is said before.
+    Return the scene that a bag carries; list the modules it imports first, if it may.
 
     Raises
     ------
     LinkageError
-        As `recorded_scene`.
+        See `recorded_scene`.
 
     """
     scene = recorded_scene(bag)
@@ -111,20 +111,20 @@ def scene_of(bag: Bag, *, trust_effects: bool) -> Scene:
 
 
 def beside(bag: Path, suffix: str) -> Path:
-    """Return the file beside a bag that is named as it, with a suffix behind its name."""
-    # The folder that one is in has no name.
+    """Return the path beside the bag that has its name and this suffix."""
+    # The current folder, '.', has no name.
     named = bag if bag.name not in ('', '..') else bag.resolve()
     return named.with_name(named.name + suffix) if named.name else named
 
 
 def unfinished_text(bag: Bag) -> str:
-    """Return why an end is missing, of a bag that is truncated."""
+    """Return why a truncated bag has no end."""
     text = 'its recording was killed, or still runs'
     return text if bag.path.is_dir() else f'{text}, or goes on in another file'
 
 
 def run_or_blank(bag: Bag) -> RunAccount:
-    """Return what a run says of itself in its bag; blank where it does not, or damaged."""
+    """Return the run account in a bag; a blank one if it is missing or damaged."""
     try:
         return run_account(bag)
     except BagError:
@@ -132,7 +132,7 @@ def run_or_blank(bag: Bag) -> RunAccount:
 
 
 def gaps(bag: Bag) -> Iterator[str]:
-    """Yield what is missing of a bag within it, so that what comes after may differ."""
+    """Yield the gaps within a bag; what follows a gap may differ in a replay."""
     diagnostics = run_said(bag).get('diagnostics_topic')
     dropped = sum(
         count for topic, count in counts_in(bag.custom, 'dropped').items() if topic != diagnostics
@@ -149,28 +149,28 @@ _GAP = 'what depends on one that is not there may differ'
 
 class BagReading:
     """
-    The messages of a bag, up to damage or a wish to stop, with a word on how far it is.
+    Read the messages of a bag up to damage or a stop request, with progress.
 
     Parameters
     ----------
     bag
         The bag.
     stop
-        The wish.
+        Set by a signal.
 
     """
 
     def __init__(self, bag: Bag, stop: Event) -> None:
         self.damage = ''
-        """What is damaged, on one line; '' where it was read to its end."""
+        """The damage, on one line; '' if the bag was read to its end."""
         self.stopped = False
-        """Whether it was stopped."""
+        """True if a signal stopped the reading."""
         self._bag, self._stop = bag, stop
         self._told: Callable[[int, int], None] = lambda _done, _of: None
         self._size = max(1, sum(layout_of(file).content for file in bag.files) // _MIB)
 
     def glance(self) -> Iterator[BagMessage]:
-        """Yield the messages to one who looks for something; raise StoppedError at the wish."""
+        """Yield the messages without progress; raise StoppedError if a signal came."""
         for number, message in enumerate(self._bag.messages(), 1):
             yield message
             if not number % TOLD_EVERY and self._stop.is_set():
@@ -178,7 +178,7 @@ class BagReading:
 
     @contextmanager
     def told(self) -> Iterator[Iterator[BagMessage]]:
-        """Give the messages, and tell on the terminal how far they are."""
+        """Give an iterator over the messages, and show the progress on the terminal."""
         with heeded(), progress('replayed [MiB]') as self._told:
             yield self._messages()
 
@@ -202,18 +202,18 @@ class BagReading:
                     return
 
 
-# What there is to say of a bag, as JSON has it: numbers in SI units or [ns], and named so.
+# A bag as JSON: numbers are in SI units or [ns], and their keys say so.
 
 
 def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str, Any]:
-    """Return what any bag says of itself, ours or not."""
+    """Return the description of any bag, recorded by this package or not."""
     begin, end = contents.begin, contents.end
-    said: Mapping[str, Any] = information_of(bag.path) if bag.path.is_dir() else {}
+    metadata: Mapping[str, Any] = information_of(bag.path) if bag.path.is_dir() else {}
     within = next((layout.rosbag2 for layout in layouts if layout.rosbag2), None)
-    if not said and within is not None:
-        said = serialized_metadata(within)
+    if not metadata and within is not None:
+        metadata = serialized_metadata(within)
     run = run_said(bag)
-    # What is let go of is only told where there is some.
+    # Only bags that have metadata left out say so.
     let_go = counts_in(bag.custom, 'let_go')
     counted = {word: counts_in(bag.custom, word) for word in ('received', 'dropped')}
     return {
@@ -254,15 +254,15 @@ def account_of(bag: Bag, layouts: list[Layout], contents: Contents) -> dict[str,
             'linkage_ros': _text(run.get('linkage_ros')),
             'python': _text(run.get('python')),
             'machine': _text(run.get('machine')),
-            'ros_distro': _text(said.get('ros_distro')),
-            'rosbag2_metadata': _whole(said.get('version')),
+            'ros_distro': _text(metadata.get('ros_distro')),
+            'rosbag2_metadata': _whole(metadata.get('version')),
             'written_by': ', '.join(dict.fromkeys(layout.library for layout in layouts)) or None,
         },
     }
 
 
 def scene_account(scene: Scene) -> dict[str, Any]:
-    """Return what there is to say of the scene that a bag carries."""
+    """Return the description of the scene that a bag carries."""
     return {
         'name': scene.name,
         'rate_hz': scene.rate,
@@ -273,7 +273,7 @@ def scene_account(scene: Scene) -> dict[str, Any]:
 
 
 def worst_account(worst: WorstResiduals) -> dict[str, Any]:
-    """Return what there is to say of a linkage's states, to stand beside what its scene says."""
+    """Return the worst residuals of a linkage, to be merged with its description."""
     account: dict[str, Any] = {
         'four_bars': [
             {'kind': bar.kind.name, 'lengths_m': list(bar.lengths)}
@@ -304,12 +304,12 @@ def worst_account(worst: WorstResiduals) -> dict[str, Any]:
 
 
 def replay_account(examined: Examined) -> dict[str, Any]:
-    """Return how the scene, run once more, agrees with the bag."""
+    """Return how well the replayed scene agrees with the bag."""
     return {'joint_states': examined.joint_states, 'same_bytes': examined.same}
 
 
 def local(time: int | None) -> str | None:
-    """Return a time in [ns] as date and time of this machine's zone, to the nanosecond."""
+    """Return a time in [ns] as local date and time, to the nanosecond."""
     if time is None:
         return None
     seconds, rest = divmod(time, 1_000_000_000)
@@ -346,7 +346,7 @@ def _compressions(layouts: list[Layout]) -> list[dict[str, Any]]:
 
 
 def _text(value: Any) -> str | None:
-    # Not of lists: in YAML, aliases make a small file's text as long as memory.
+    # Not for lists: with YAML aliases, a small file can make an enormous text.
     return str(value) if isinstance(value, str | int | float) else None
 
 

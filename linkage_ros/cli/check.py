@@ -45,10 +45,10 @@ _SINGULAR = (
     ('change points', Status.CHANGE_POINT),
     ('without a pose', Status.INDETERMINATE),
 )
-"""What singular inputs are called, by what is met there."""
+"""Names of singular inputs, by kind."""
 
 _PLACES = 4
-"""How many places of one extreme are named."""
+"""Maximum number of places shown for one extreme value."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
-    """Check the linkage; a file with an error in it has been refused when this returns."""
+    """Check the linkage; an invalid file raises before this returns."""
     closure = load(arguments.file)
     for number, table in enumerate(tables(closure, arguments.file)):
         if number:
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def tables(closure: Closure, title: str) -> Iterator[Table]:
-    """Yield what there is to say of a linkage."""
+    """Yield the tables that describe a linkage."""
     way = InputSweep(closure) if len(closure.linkage.inputs) == 1 else None
     yield Table(title, ('', ''), list(_facts(closure, way)))
     yield Table(
@@ -105,7 +105,7 @@ def tables(closure: Closure, title: str) -> Iterator[Table]:
 
 
 def describe_group(closure: Closure, number: int) -> tuple[str, str, str, str]:
-    """Return kind, links, way of solution and assembly of a group."""
+    """Return kind, links, solution method and assembly of a group."""
     group: Group = closure.structure.groups[number]
     if isinstance(group, Driven):
         given = closure.linkage.inputs[group.index]
@@ -189,27 +189,29 @@ def _reach(closure: Closure, way: InputSweep | None) -> Iterator[tuple[str, str]
 
 
 def _is_reached(way: InputSweep, value: float) -> bool:
-    """Return whether a value of the input, in one of its turns, is within the limits."""
+    """Return whether a value of the input, up to full turns, is within the limits."""
     turns = (0.0, -tau, tau) if way.turning else (0.0,)
     return not way.closure.bounds or any(way.range_about(value + turn) for turn in turns)
 
 
 def _limits_text(limits: Limits, turning: bool) -> str:
-    said = []
+    texts = []
     if limits.bounded:
         low, high = (
             value_text(end, turning) if isfinite(end) else '' for end in (limits.low, limits.high)
         )
-        said.append(f'{low} to {high}' if low and high else f'from {low}' if low else f'to {high}')
+        texts.append(
+            f'{low} to {high}' if low and high else f'from {low}' if low else f'to {high}'
+        )
     if isfinite(limits.velocity):
-        said.append(f'at most {limits.velocity:.6g} {"rad" if turning else "m"}/s')
+        texts.append(f'at most {limits.velocity:.6g} {"rad" if turning else "m"}/s')
     if isfinite(limits.effort):
-        said.append(f'at most {limits.effort:.6g} {"N·m" if turning else "N"}')
-    return ', '.join(said)
+        texts.append(f'at most {limits.effort:.6g} {"N·m" if turning else "N"}')
+    return ', '.join(texts)
 
 
 def _range_text(interval: InputRange) -> str:
-    """Return a range; where limits end it, with what ends it."""
+    """Return a range; if limits end it, with their names."""
     low, high = (value_text(value, interval.turning) for value in interval[:2])
     if interval.by == ('', ''):
         return f'{low} to {high}'
@@ -242,7 +244,7 @@ def _assembly(closure: Closure, dyad: Dyad) -> str:
 
 
 def _other_assemblies(closure: Closure) -> Iterator[Table]:
-    """Yield for each group that is iterated what else a pose could name at the same inputs."""
+    """Yield for each iterated group the other assemblies that a pose could name."""
     pose = closure.linkage.pose
     for number, group in enumerate(closure.structure.groups):
         if not isinstance(group, Iterated) or pose is None:
@@ -281,8 +283,8 @@ def _links(closure: Closure, number: int) -> str:
     return describe_group(closure, number)[1]
 
 
-def _extremes(closure: Closure, number: int, found: MinMaxCurve, turning: bool) -> tuple[str, ...]:
-    lowest, highest = found
+def _extremes(closure: Closure, number: int, curve: MinMaxCurve, turning: bool) -> tuple[str, ...]:
+    lowest, highest = curve
     return (
         str(number + 1),
         _links(closure, number),
@@ -304,6 +306,6 @@ def _conditioning(
 def _places(extreme: Extreme, turning: bool) -> str:
     if not extreme.at:
         return 'everywhere'
-    said = [angle_text(at, 2) if turning else f'{at + 0.0:.6g} m' for at in extreme.at[:_PLACES]]
+    places = [angle_text(at, 2) if turning else f'{at + 0.0:.6g} m' for at in extreme.at[:_PLACES]]
     more = len(extreme.at) - _PLACES
-    return ', '.join(said) + (f' and {more} more' if more > 0 else '')
+    return ', '.join(places) + (f' and {more} more' if more > 0 else '')

@@ -44,7 +44,7 @@ LANGUAGES: dict[str, Callable[[Subject], Language]] = {
     '.js': lambda _: JavaScript(),
     '.py': lambda subject: PythonModule(subject.derivatives),
 }
-"""The languages, by the ending of the file."""
+"""The languages, by file suffix."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -97,7 +97,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def _name(file: str, typed: str | None) -> str:
-    """Return an identifier: the one that was typed, or what is made of the file's name."""
+    """Return an identifier: the typed one, or one made from the file's name."""
     name = re.sub('[^0-9A-Za-z]+', '_', Path(file).stem).strip('_') if typed is None else typed
     if not re.fullmatch('[A-Za-z][0-9A-Za-z_]*', name):
         where, wrong = (file, Path(file).stem) if typed is None else ('--name', typed)
@@ -108,7 +108,7 @@ def _name(file: str, typed: str | None) -> str:
 
 
 def _joints(closure: Closure, typed: str | None) -> tuple[str, ...]:
-    """Return the joints that are asked for, each once."""
+    """Return the requested joints, each once."""
     published = closure.linkage.joints
     if typed is None:
         return tuple(published)

@@ -64,10 +64,10 @@ effects:
   delay: {seconds: 0.002}
   markers: {rate: 30}
 """
-"""A scene with every effect, each for one joint, pin or link, on the four-bar that is shipped."""
+"""A scene with every effect, each on one joint, pin or link of the shipped four-bar."""
 
 _BAG = 'samples'
-"""Name of the bag of the drive that takes its samples from one."""
+"""Name of the bag for the drive that plays samples from a bag."""
 
 EVERY_DRIVE = {
     'topic': '{}',
@@ -79,7 +79,7 @@ EVERY_DRIVE = {
     'bag': f'{{file: {_BAG}, repeat: true}}',
     'torque': '{start: 1.0, rate: 6.2832}',
 }
-"""Every drive with its parameters, moving the four-bar that is shipped."""
+"""Every drive with its parameters, moving the shipped four-bar."""
 
 EVERY_FAULT = {
     'time_jump': '{by: 1.0}',
@@ -89,7 +89,7 @@ EVERY_FAULT = {
     'freeze': '{}',
     'silence': '{}',
 }
-"""Every fault with its parameters, on the four-bar that is shipped."""
+"""Every fault with its parameters, on the shipped four-bar."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -110,7 +110,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Measure; return 1 where it was stopped."""
+    """Measure; return 1 if stopped."""
     if arguments.all:
         found = all_effects(arguments.ticks, stop.is_set)
     else:
@@ -130,7 +130,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 def all_effects(ticks: int, stopped: Callable[[], bool] = lambda: False) -> Table | None:
-    """Measure all there is, alone, on the four-bar; return nothing where it was stopped."""
+    """Measure every effect, drive and fault alone on the four-bar; return None if stopped."""
     cost = measure(every_effect(), ticks, leave_out=False, stopped=stopped)
     if cost is None:
         return None
@@ -159,17 +159,17 @@ def _of_four_bar(text: str, folder: str = '') -> Scene:
 
 
 def _with_drive(name: str) -> str:
-    """Return a scene of one drive; all publish the input, as those do that are no topic."""
+    """Return a scene of one drive; all publish the input, as every drive but a topic does."""
     return f'linkage: four_bar.yaml\npublish_input: true\ndrive: {{{name}: {EVERY_DRIVE[name]}}}\n'
 
 
 def _with_fault(name: str) -> str:
-    """Return the scene that others are compared with, and a fault that nobody injects."""
+    """Return the scene that others are compared with, and a fault that is never injected."""
     return f'{_with_drive("topic")}faults: {{one: {{{name}: {EVERY_FAULT[name]}}}}}\n'
 
 
 def _record_samples(folder: Path) -> None:
-    """Record a turn of the crank, a hundred samples a second, for the drive that plays a bag."""
+    """Record a turn of the crank at 100 samples a second, for the drive that plays a bag."""
     writer = BagWriter(folder, [Topic('/crank', 'sensor_msgs/msg/JointState', '', '')])
     write = JointStateWriter(['crank_joint']).write
     for number in range(100):
@@ -213,13 +213,13 @@ def table_of_all(
     Parameters
     ----------
     cost
-        Of the scene of all effects.
+        Cost of the scene of all effects.
     ticks
-        Of each variant.
+        Ticks of each variant.
     drives
-        What each takes beyond the topic drive.
+        What each drive takes beyond the topic drive.
     faults
-        What each takes while nobody injects it.
+        What each fault takes while it is not injected.
 
     """
     rows = [

@@ -42,13 +42,13 @@ from linkage_ros.scene.scene import Scene, SceneLinkage
 from linkage_ros.signals import heeded
 
 _DOMAINS = 101
-"""Domain ids up to this one are safe with the ports of every operating system."""
+"""Domain ids up to this one have ports that are safe on every operating system."""
 
 _BESIDE = {
     'topic': ('linkage_ros.node.crank_source',),
     'torque': ('linkage_ros.node.pd_controller', 'swing:=1.0'),
 }
-"""What drives that listen to a topic need beside them, with parameters; others need nothing."""
+"""Companion processes of the drives that listen to a topic, with parameters."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -71,16 +71,16 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     print(
         f'{scene.name}: {arguments.seconds:g} s; from a second terminal: '
         f'ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ROS_DOMAIN_ID={os.environ["ROS_DOMAIN_ID"]}',
-        flush=True,  # it is of use while the run goes on, and to a pipe too
+        flush=True,  # needed during the run, also by a pipe
     )
     with heeded(), _beside(scene, arguments.seconds):
         code, bag = run_scene(str(file), arguments, stop)
     if bag is not None:
         picture = Path(f'{bag}.png')
         try:
-            draw(bag, picture, Event())  # it is Ctrl-C that has ended the run
+            draw(bag, picture, Event())  # Ctrl-C ended the run; it must not stop the drawing
         except LinkageError as error:
-            # A run that was ended before it began, or no matplotlib: the run itself was good.
+            # The run ended before it began, or matplotlib is missing: the run itself succeeded.
             print(f'picture   none: {error}')
         else:
             print(f'picture   {picture}')
@@ -91,11 +91,11 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 @contextmanager
 def _beside(scene: Scene, seconds: float) -> Iterator[None]:
-    """Have what the scene's drives need in processes of their own."""
+    """Run the companions of the scene's drives in processes of their own."""
     processes = [
         subprocess.Popen(
             command,
-            start_new_session=True,  # Ctrl-C is for this process, which ends the others
+            start_new_session=True,  # Ctrl-C goes to this process only, which ends the others
         )
         for member in scene.members
         for command in _commands(member, seconds)
@@ -110,11 +110,11 @@ def _beside(scene: Scene, seconds: float) -> Iterator[None]:
 
 
 def _commands(member: SceneLinkage, seconds: float) -> Iterator[list[str]]:
-    """Yield the command of what a linkage needs beside it, if it does."""
+    """Yield the command of a linkage's companion, if it needs one."""
     drive, _ = member.drive
     if drive in _BESIDE:
         module, *parameters = _BESIDE[drive]
-        # Bounded, so that it ends by itself even where this process is killed.
+        # A time limit, so that it ends by itself even if this process is killed.
         parameters += [f'joint:={member.inputs[0]}', f'seconds:={seconds + 10.0:.1f}']
         yield [sys.executable, '-m', module, '--ros-args', *_each('-p', parameters)]
 
@@ -139,14 +139,14 @@ def _file(name: str) -> Path:
 
 
 def _row(file: Path) -> tuple[str, ...]:
-    """Return what the list says of a scene: its drives, and what it says of itself."""
+    """Return the list's text on a scene: its drives, and its own description."""
     scene = load_scene(file)
     drives = ' and '.join(dict.fromkeys(member.drive[0] for member in scene.members))
     return scene.name, drives, 'yes' if scene.record else 'no', _first_sentence(file)
 
 
 def _first_sentence(file: Path) -> str:
-    """Return that of the comment at the head of a file."""
+    """Return the description in the comment at the head of a file."""
     comment = []
     for line in file.read_text('utf-8').splitlines():
         if not line.startswith('#'):

@@ -54,16 +54,17 @@ from linkage_ros.replay.verify import turning_joints
 from linkage_ros.scene.scene import Scene
 from linkage_ros.signals import StoppedError
 
-# The messages of a bag as rows of a table: one for each tick, or for each message of a topic.
+# Each tick, or each message of one topic, becomes a row.
 #
-# A tick's joint states, motions and pin forces follow each other in the bag, with one publish
-# time; they make one row. Columns are found in a first reading, since a joint may turn up late;
-# the rows come in a second one, so that no more than a row is held.
+# The joint states, motions and pin forces of a tick follow each other in the bag and share one
+# publish time: together they make one row. A joint may appear late, so a first pass collects the
+# columns. A second pass writes the rows, so that only one row is in memory.
 
 TIME, STAMP, PUBLISHED, LOGGED = 'time [s]', 'stamp [ns]', 'publish time [ns]', 'log time [ns]'
 """
-The first columns: since the first row's stamp, the stamp of the message itself, the time that was
-solved for or at which the source sent it, and the time of the tick that took or published it.
+The first columns: time since the first row's stamp, the stamp of the message, the time that was
+solved for or at which the source sent the message, and the time of the tick that received or
+published it.
 """
 
 _MOST_COLUMNS = 10_000
@@ -75,7 +76,7 @@ ProgressCallback = Callable[[int], None]
 
 class Source(NamedTuple):
     """
-    What rows are made of.
+    The origin of the rows.
 
     Attributes
     ----------
@@ -84,11 +85,11 @@ class Source(NamedTuple):
     types
         The topics, each with its type.
     closing
-        Topics whose messages end a tick.
+        Topics whose messages end the row of a tick.
     wanted
-        Of a topic with messages of others, what tells which are of the rows.
+        For each topic that also carries other messages, the test that selects those of the rows.
     dependent
-        Names of joints that nobody can command, as for `MessageValues`.
+        Names of dependent joints, which nobody can command; see `MessageValues`.
 
     """
 
@@ -101,18 +102,18 @@ class Source(NamedTuple):
 
 class Found(NamedTuple):
     """
-    What the first reading finds.
+    Result of the first pass.
 
     Attributes
     ----------
     keys
         The columns beyond the first four.
     rows
-        How many rows there are.
+        Number of rows.
     counts
-        Messages of each topic that are in the rows.
+        Number of messages in the rows, by topic.
     left_out
-        How many messages are not, by topic and reason.
+        Number of messages that are left out, by topic and reason.
 
     """
 
@@ -123,55 +124,55 @@ class Found(NamedTuple):
 
 
 class _Tick(NamedTuple):
-    """The messages of a tick, by topic, and its publish and log time."""
+    """The messages of a tick, by topic, with its publish time and log time."""
 
     published: int
     logged: int
     messages: dict[str, Values]
 
 
-def survey(source: Source, order: Sequence[str], told: ProgressCallback) -> Found:
+def survey(source: Source, order: Sequence[str], report_progress: ProgressCallback) -> Found:
     """
-    Read a bag for the columns of its rows.
+    Collect the columns of the rows (first pass).
 
     Parameters
     ----------
     source
-        What rows are made of.
+        The origin of the rows.
     order
-        Joints that come first, in this order; others follow as they turn up.
-    told
-        Takes how many bytes have been read, now and then. What it raises ends the reading.
+        Joints that come first, in this order; others follow in the order of the bag.
+    report_progress
+        Called now and then with the number of bytes read; an exception from it ends the pass.
 
     Raises
     ------
     BagError
-        Where the bag is damaged, or names ever new joints.
+        If the bag is damaged, or new joint names keep coming.
 
     """
-    found: dict[Key, None] = {}
+    columns: dict[Key, None] = {}
     known: set[tuple[Key, ...]] = set()
     counts: Counter[str] = Counter()
     left_out: Counter[tuple[str, str]] = Counter()
     rows = 0
-    for tick in _ticks(source, left_out, told):
+    for tick in _ticks(source, left_out, report_progress):
         rows += 1
         for topic, values in tick.messages.items():
             counts[topic] += 1
             if values.keys not in known:
                 known.add(values.keys)
-                found |= dict.fromkeys(values.keys)
-                if max(len(found), len(known)) > _MOST_COLUMNS:
+                columns |= dict.fromkeys(values.keys)
+                if max(len(columns), len(known)) > _MOST_COLUMNS:
                     raise BagError(
                         source.bag.path,
                         f'its joints take more than {_MOST_COLUMNS} columns',
                         'name one topic with --topic',
                     )
-    return Found(_sorted(found, order), rows, counts, left_out)
+    return Found(_sorted(columns, order), rows, counts, left_out)
 
 
 def _sorted(keys: Iterable[Key], order: Sequence[str]) -> tuple[Key, ...]:
-    """Return columns in order: by quantity, then joint; of a pin, force and torque together."""
+    """Sort the columns by quantity, then joint; force and torque of a pin stay together."""
     keys = tuple(keys)
     names = dict.fromkeys([*order, *(name for name, _ in keys)])
     ranks = {name: rank for rank, name in enumerate(names)}
@@ -184,13 +185,15 @@ def _sorted(keys: Iterable[Key], order: Sequence[str]) -> tuple[Key, ...]:
     return tuple(sorted(keys, key=rank))
 
 
-def rows_of(source: Source, keys: Sequence[Key], told: ProgressCallback) -> Iterator[Row]:
+def rows_of(
+    source: Source, keys: Sequence[Key], report_progress: ProgressCallback
+) -> Iterator[Row]:
     """Yield the rows of a bag: the first four columns, and the numbers under these keys."""
     places = {key: 4 + number for number, key in enumerate(keys)}
     placed: dict[tuple[Key, ...], tuple[int, ...]] = {}
     blank: Row = [None] * len(keys)
     begin: int | None = None
-    for published, logged, messages in _ticks(source, Counter(), told):
+    for published, logged, messages in _ticks(source, Counter(), report_progress):
         stamp = next(iter(messages.values())).stamp
         if begin is None:
             begin = stamp
@@ -199,7 +202,7 @@ def rows_of(source: Source, keys: Sequence[Key], told: ProgressCallback) -> Iter
             columns = placed.get(values.keys)
             if columns is None:
                 columns = placed[values.keys] = tuple(places[key] for key in values.keys)
-            # A motion repeats what its joint state says; it counts where that was dropped.
+            # ~/motion repeats the joint state; it counts only where the joint state was dropped.
             for column, number in zip(columns, values.numbers, strict=True):
                 if row[column] is None:
                     row[column] = number
@@ -207,7 +210,7 @@ def rows_of(source: Source, keys: Sequence[Key], told: ProgressCallback) -> Iter
 
 
 def _ticks(
-    source: Source, left_out: Counter[tuple[str, str]], told: ProgressCallback
+    source: Source, left_out: Counter[tuple[str, str]], report_progress: ProgressCallback
 ) -> Iterator[_Tick]:
     """Yield the ticks of a bag; count the messages that are left out."""
     readers = {
@@ -219,7 +222,7 @@ def _ticks(
     for number, (topic, logged, published, data) in enumerate(source.bag.messages(), 1):
         read += len(data)
         if not number % TOLD_EVERY:
-            told(read)
+            report_progress(read)
         reader = readers.get(topic)
         values = reader.read(data) if reader is not None else None
         if isinstance(values, str):
@@ -252,17 +255,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Write the file; return 1 where it was stopped."""
+    """Write the file; return 1 if a signal stopped it."""
     try:
-        found = export(arguments.bag, arguments.output, arguments.topic, stop)
+        result = export(arguments.bag, arguments.output, arguments.topic, stop)
     except StoppedError:
         print('linkage export: stopped; nothing was written', file=sys.stderr)
         return 1
-    for (topic, reason), count in found.left_out.items():
+    for (topic, reason), count in result.left_out.items():
         line = f'linkage export: {topic}: {count} messages left out: {reason}'
         print(clean(line), file=sys.stderr)
-    of = ', '.join(f'{count} of {clean(topic)}' for topic, count in found.counts.items())
-    print(f'{arguments.output}: {found.rows} rows, {4 + len(found.keys)} columns ({of})')
+    of = ', '.join(f'{count} of {clean(topic)}' for topic, count in result.counts.items())
+    print(f'{arguments.output}: {result.rows} rows, {4 + len(result.keys)} columns ({of})')
     return 0
 
 
@@ -277,16 +280,16 @@ def export(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Found:
     file
         The file; one that exists is replaced.
     topic
-        What to write alone; nothing for the joint states and what was published with them.
+        The only topic to write; None for the joint states and what was published with them.
     stop
-        The wish to stop.
+        Set by a signal.
 
     Raises
     ------
     StoppedError
-        There was one.
+        If the event was set.
     LinkageError
-        Where the bag cannot be read or holds nothing to write, or the file cannot be written.
+        If the bag cannot be read or has nothing to write, or if the file cannot be written.
 
     """
     check_kind(file)
@@ -323,7 +326,7 @@ def export(bag_path: Path, file: Path, topic: str | None, stop: Event) -> Found:
 
 
 def _scene(bag: Bag) -> Scene | None:
-    """Return the scene that a bag carries, where it carries one that this version can read."""
+    """Return the scene in a bag; None if there is none that this version can read."""
     try:
         return recorded_scene(bag)
     except LinkageError:
@@ -331,7 +334,7 @@ def _scene(bag: Bag) -> Scene | None:
 
 
 def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
-    """Return what to write, as it was asked for or as the bag says."""
+    """Return the topics to write: those asked for, or those that the bag names."""
     types = {each.name: each.type for each in bag.topics}
     readable = {name: kind for name, kind in types.items() if kind in TYPES}
     run = run_or_blank(bag)
@@ -345,7 +348,7 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
             raise BagError(
                 bag.path, f'{topic} is of {types[topic]}, which is not about joints', others
             )
-        # Commands of a crank may name joints that follow from it, without a number for them.
+        # A crank command may name dependent joints without a value for them.
         dependent: frozenset[str] = frozenset()
         if scene is not None and topic == run.crank_topic:
             dependent = scene.dependent_joints
@@ -367,11 +370,13 @@ def _source(bag: Bag, scene: Scene | None, topic: str | None) -> Source:
 
 
 def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
-    found = [name for name, kind in readable.items() if kind == JOINT_STATE]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        raise BagError(bag.path, f'holds joint states on {listed(found)}', 'name one with --topic')
+    topics = [name for name, kind in readable.items() if kind == JOINT_STATE]
+    if len(topics) == 1:
+        return topics[0]
+    if topics:
+        raise BagError(
+            bag.path, f'holds joint states on {listed(topics)}', 'name one with --topic'
+        )
     raise BagError(
         bag.path,
         f'holds no topic of {JOINT_STATE}',
@@ -379,8 +384,8 @@ def _only_joint_states(bag: Bag, readable: Mapping[str, str]) -> str:
     )
 
 
-def _nothing(source: Source, found: Found) -> BagError:
-    reasons = Counter(dict(found.left_out)).most_common(1)
+def _nothing(source: Source, result: Found) -> BagError:
+    reasons = Counter(dict(result.left_out)).most_common(1)
     why = f' ({reasons[0][1]} left out: {reasons[0][0][1]})' if reasons else ''
     return BagError(
         source.bag.path,
@@ -390,10 +395,10 @@ def _nothing(source: Source, found: Found) -> BagError:
 
 
 def _head(key: Key, turning: Mapping[str, bool]) -> str:
-    """Return the heading of a column: the joint, what is told of it, and its unit."""
+    """Return the heading of a column: joint, quantity and unit."""
     name, quantity = key
     angular, linear = UNITS[quantity]
-    told = name if quantity == POSITION else f'{name} {quantity}'
+    heading = name if quantity == POSITION else f'{name} {quantity}'
     if name in turning:
-        return f'{told} [{angular if turning[name] else linear}]'
-    return f'{told} [{angular}]' if angular == linear else f'{told} [{angular} or {linear}]'
+        return f'{heading} [{angular if turning[name] else linear}]'
+    return f'{heading} [{angular}]' if angular == linear else f'{heading} [{angular} or {linear}]'

@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
-    """Write the linkage file; tell what is not in it."""
+    """Write the linkage file; say what it leaves out."""
     file = arguments.file
     try:
         data = read_regular(file, _LARGEST_FILE)

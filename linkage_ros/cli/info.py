@@ -61,9 +61,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Look at the bag; return 1 where it was stopped."""
+    """Describe the bag; return 1 if stopped."""
     bag = opened(arguments.bag, stop)
-    with heeded():  # it tells what it has seen
+    with heeded():  # a signal ends the reading; the part read so far is still shown
         account = info(bag, stop, trust_effects=arguments.trust_effects)
     if arguments.json:
         print(json.dumps(account, indent=1, allow_nan=False))
@@ -79,12 +79,12 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 def info(bag: Bag, stop: Event, *, trust_effects: bool = False) -> dict[str, Any]:
     """
-    Return what there is to say of a bag, as JSON has it.
+    Return the description of a bag, as JSON holds it.
 
     Raises
     ------
     BagError
-        Where a file of the bag cannot be read.
+        If a file of the bag cannot be read.
 
     """
     layouts = [layout_of(file) for file in bag.files]
@@ -114,7 +114,7 @@ def _told(told: Any, of: int, done: int) -> None:
 
 
 def tables(account: dict[str, Any]) -> Iterator[Table]:
-    """Yield the account of a bag as tables."""
+    """Yield the description of a bag as tables."""
     yield _table(account['bag'], _facts(account))
     told = [
         word
@@ -180,7 +180,7 @@ def _facts(account: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _sum(account: dict[str, Any], word: str) -> int | None:
-    """Return what the bag counts over all topics; nothing where it does not."""
+    """Return the bag's counters over all topics; None if it has none."""
     counts = [topic[word] for topic in account['topics']]
     return sum(counts) if counts and None not in counts else None
 
@@ -213,7 +213,7 @@ def _linkage(linkage: dict[str, Any], begin: int | None) -> Iterator[tuple[str, 
 
 
 def _place(found: dict[str, Any], inputs: list[dict[str, str]], begin: int | None) -> str:
-    """Return when and where something was."""
+    """Return the time and place of an event."""
     values = ', '.join(
         f'{given["joint"]} {_input(value, given)}'
         for given, value in zip(inputs, found['inputs'], strict=True)
@@ -246,7 +246,7 @@ def _versions(versions: dict[str, Any]) -> Iterator[str]:
 
 
 def _qos(topic: dict[str, Any]) -> str:
-    """Return a quality of service in a word, or in two where who comes late gets the last."""
+    """Return a quality of service in one word; two for transient local."""
     if not topic['qos_understood']:
         return 'not understood, taken as reliable'
     latched = ', transient local' if topic['durability'] == 'transient_local' else ''

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""``linkage``: one command; each subcommand is a module, loaded where it is named."""
+"""``linkage``: one command; each subcommand is a module that is loaded when it is named."""
 
 from __future__ import annotations
 
@@ -49,20 +49,20 @@ COMMANDS = {
     'import': 'make a linkage file of a URDF and the pins that close it',
     'synthesize': 'design a four-bar: from pairs of angles, a function, a curve or poses',
 }
-"""Name of each subcommand, also that of its module in this folder, and what it does."""
+"""Each subcommand, usually also the name of its module in this folder, and its description."""
 
 _MODULES = {'import': 'import_urdf'}
-"""Modules of another name: no module can be named as a word of Python's."""
+"""Modules that cannot have their command's name, since it is a keyword of Python."""
 
 
 def module_of(command: str) -> str:
-    """Return the name of the module of a subcommand."""
+    """Return the module name of a subcommand."""
     return f'linkage_ros.cli.{_MODULES.get(command, command)}'
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run ``linkage``; return 0, 1 for a run that went wrong, 2 for wrong input, 3 for a loss."""
-    # First of all: from here on a signal ends a command, and a run by closing its bag.
+    """Run ``linkage``; return 0, 1 for a failed run, 2 for wrong input, 3 for a loss."""
+    # First of all: from here on a signal ends a command in order, and a run closes its bag.
     stop = stop_on_signals()
     clean_output()
     arguments = sys.argv[1:] if arguments is None else arguments
@@ -74,10 +74,10 @@ def main(arguments: list[str] | None = None) -> int:
             end_soon(1)
             name = ' '.join(['linkage', *(name for name in arguments[:1] if name in COMMANDS)])
             print(f'{name}: stopped', file=sys.stderr)
-            sys.stdout.flush()  # where nobody reads, this takes until the end
+            sys.stdout.flush()  # if nobody reads the pipe, this blocks until the time limit
             return 1
     except BrokenPipeError:
-        # Who read our output has gone; there is nobody to tell.
+        # The reader of the output has gone: there is nobody to report to.
         sys.stderr.close()
         return 1
 

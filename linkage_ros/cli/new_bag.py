@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A bag of a run that never was: the samples of another bag, and what a scene makes of them."""
+"""A bag of a counterfactual run: the samples of another bag, and a scene's output on them."""
 
 from __future__ import annotations
 
@@ -51,18 +51,18 @@ _CHANGES_QOS = QosProfile(depth=100, durability='transient_local')
 
 class Source(NamedTuple):
     """
-    What a new bag is made of.
+    The origin of a new bag.
 
     Attributes
     ----------
     bag
         The bag.
     run
-        What it says of itself; blank where it says nothing.
+        The bag's run account; blank if it has none.
     recorded
-        The scene in it; nothing where it carries none, or none that can be read.
+        The scene in the bag; None if there is none that can be read.
     crank_topic
-        Where its samples are.
+        Topic of the crank samples.
 
     """
 
@@ -74,14 +74,14 @@ class Source(NamedTuple):
 
 class Names(NamedTuple):
     """
-    Names of the topics that are written beside the samples, as the bag's own run has named them.
+    Names of the topics written beside the samples, as the bag's run named them.
 
     Attributes
     ----------
     joint_states, faults, withheld, resets
-        Of the topics.
+        One topic each.
     extras
-        Of the scene's further topics, in their order.
+        The scene's further topics, in their order.
 
     """
 
@@ -93,7 +93,7 @@ class Names(NamedTuple):
 
 
 def names_for(source: Source, scene: Scene, what_if: Counterfactual) -> Names:
-    """Return the names of what a scene publishes."""
+    """Return the names of the topics that a scene publishes."""
     run = source.run
     known: dict[str, str] = {}
     if source.recorded is not None and not source.recorded.not_imported:
@@ -109,7 +109,7 @@ def names_for(source: Source, scene: Scene, what_if: Counterfactual) -> Names:
     nodes = [name.removesuffix(key[1:]) for key, name in pairs.items() if name.endswith(key[1:])]
     node = nodes[0] if nodes else f'{joint_states.rpartition("/")[0]}/linkage_node'
     if joint_states == source.crank_topic:
-        # Told apart by their joints, which takes those that the run had.
+        # On a shared topic, joints distinguish samples from states: they must be the run's joints.
         own = source.recorded.joints if source.recorded is not None else ()
         if run.crank_topic != joint_states or scene.joints != own:
             joint_states = f'{node}/joint_states'
@@ -128,19 +128,19 @@ def names_for(source: Source, scene: Scene, what_if: Counterfactual) -> Names:
 
 class NewBag:
     """
-    A bag that is written.
+    A bag that is being written.
 
     Parameters
     ----------
     folder
-        Where it goes; one that exists is never touched.
+        Folder of the new bag; an existing one is never overwritten.
     source, scene, what_if, names
-        What it is made of.
+        Its content.
 
     Raises
     ------
     LinkageError
-        Where it cannot be made, or the definition of a message is not installed.
+        If it cannot be created, or the definition of a message is not installed.
 
     """
 
@@ -188,11 +188,11 @@ class NewBag:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Return how many messages were written on each topic."""
+        """Return the number of messages written on each topic."""
         return dict(zip((topic.name for topic in self._topics), self._written, strict=True))
 
     def add(self, event: Done) -> None:
-        """Write what happened; raises RecordingError where it cannot be."""
+        """Write an event; raise RecordingError if it cannot be written."""
         if isinstance(event, SampleEvent):
             self._write(self._numbers['crank_topic'], *event)
         elif isinstance(event, FaultEvent):
@@ -226,7 +226,7 @@ class NewBag:
 
 
 def _described(bag: Bag, name: str, kind: str, qos: QosProfile) -> Topic:
-    """Describe a topic as the bag does one of its type, or as the installed packages do."""
+    """Describe a topic as the bag does for its type, or as the installed packages do."""
     for topic in bag.topics:
         if topic.type == kind and topic.definition:
             return replace(topic, name=name, qos=qos)

@@ -94,7 +94,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Play the bag; return 1 where it is damaged, and was played up to there."""
+    """Play the bag; return 1 if it is damaged and was played only up to the damage."""
     bag = opened(arguments.bag, stop)
     if bag.truncated:
         _say_truncated(bag)
@@ -133,7 +133,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 
 def _say_truncated(bag: Bag) -> None:
-    """Say that a bag has no end; raise where that is because it still grows."""
+    """Report that a bag has no end; raise if it is still being written."""
     for file in bag.files:
         if is_in_use(file):
             raise BagError(file, 'is being written', 'end its recording first')
@@ -144,7 +144,7 @@ def _say_truncated(bag: Bag) -> None:
 
 
 def _topics(bag: Bag, names: Sequence[str] | None) -> list[Topic]:
-    """Return the topics that shall be played."""
+    """Return the topics to play."""
     if not bag.topics:
         raise BagError(bag.path, 'has no topics', 'there is nothing to play')
     topics = {topic.name: topic for topic in bag.topics}
@@ -159,7 +159,7 @@ def _topics(bag: Bag, names: Sequence[str] | None) -> list[Topic]:
 
 
 def _without_clock(topics: Sequence[Topic]) -> list[Topic]:
-    """Return the topics but the clock's, which two would tell differently."""
+    """Return the topics without the clock's: two clocks would disagree."""
     if any(topic.name == CLOCK for topic in topics):
         _say(LinkageError(CLOCK, 'is left out', '--clock publishes its own'), '')
     return [topic for topic in topics if topic.name != CLOCK]
@@ -175,7 +175,7 @@ def _tell(told: ProgressCallback, first: int, last: float, now: int) -> None:
 
 
 def _summary(playback: Playback, rate: float) -> str:
-    """Return what was played, in a few lines."""
+    """Return a summary of what was played."""
     of, took = f'{playback.played / 1e9:.3f} s of the bag', f'{playback.took / 1e9:.3f} s'
     sent = sum(playback.counts.values())
     late = f'{playback.late} of {sent} messages by more than {LATE / 1e6:g} ms'
@@ -188,7 +188,7 @@ def _summary(playback: Playback, rate: float) -> str:
 
 
 def _number(least: float, most: float) -> Callable[[str], float]:
-    """Return what reads a number within bounds."""
+    """Return a reader of a number within bounds."""
 
     def read(text: str) -> float:
         value = float(text)
@@ -196,5 +196,5 @@ def _number(least: float, most: float) -> Callable[[str], float]:
             raise argparse.ArgumentTypeError(f'{text} is not between {least:g} and {most:g}')
         return value
 
-    read.__name__ = 'number'  # argparse calls it so: "invalid number value"
+    read.__name__ = 'number'  # argparse shows this name: "invalid number value"
     return read

@@ -34,7 +34,7 @@ from linkage_ros.replay.replay import replay
 from linkage_ros.signals import StoppedError
 
 _COLOURS = ('#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9')
-"""Okabe and Ito's, which colour-blind readers can tell."""
+"""Colours by Okabe and Ito, which colour-blind readers can distinguish."""
 
 Curves = dict[str, tuple[list[float], list[float]]]
 
@@ -56,14 +56,14 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = False) -> None:
     """
-    Draw a bag: each published joint, and its rate where there is one, over one turn of the crank.
+    Draw a bag: each published joint, and its rate if recorded, over one turn of the crank.
 
-    A crank that slides is drawn over as far as it went.
+    A sliding crank is drawn over the length of its motion.
 
     Raises
     ------
     LinkageError
-        Where matplotlib is not installed, or the bag holds nothing to draw.
+        If matplotlib is not installed, or the bag holds nothing to draw.
     StoppedError
         The event was set.
 
@@ -74,7 +74,7 @@ def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = Fa
         )
     bag = opened(bag_path, stop)
     scene = scene_of(bag, trust_effects=trust_effects)
-    # Over the crank of the first linkage, with its joints.
+    # The x axis is the crank of the first linkage; its joints are drawn.
     member = scene.members[0]
     linkage = member.linkage
     driven = linkage.inputs[0]
@@ -94,7 +94,7 @@ def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = Fa
         if crank_state is None or not recorded:
             continue
         sample = reader.read(recorded)
-        if sample is Rejection.MISSING:  # this linkage had no reading, others had
+        if sample is Rejection.MISSING:  # for this linkage only; others had a reading
             continue
         if isinstance(sample, Rejection):
             raise BagError(bag_path, f'a joint state: {sample.value}', 'name another bag')
@@ -118,7 +118,7 @@ def draw(bag_path: Path, picture: Path, stop: Event, *, trust_effects: bool = Fa
 
 
 def _add(curve: tuple[list[float], list[float]], x: float, y: float, turning: bool) -> None:
-    """Add a point; where crank or joint begins a new turn, lift the pen."""
+    """Add a point; break the curve where crank or joint begins a new turn."""
     xs, ys = curve
     if xs and (abs(x - xs[-1]) > pi or (turning and abs(y - ys[-1]) > pi)):
         xs.append(nan)
@@ -130,7 +130,7 @@ def _add(curve: tuple[list[float], list[float]], x: float, y: float, turning: bo
 def _figure(
     title: str, driven: Input, units: list[str], positions: Curves, rates: Curves, picture: Path
 ) -> None:
-    import matplotlib as mpl  # local import: an extra, and slow to load
+    import matplotlib as mpl  # local import: an optional dependency, and slow to load
 
     mpl.use('Agg')
     from matplotlib import pyplot as plt
@@ -160,7 +160,7 @@ def _figure(
 
 
 def _plain(text: str, most: int) -> str:
-    """Return a text that is drawn as it is: between two dollars matplotlib sees mathematics."""
+    """Escape dollar signs: matplotlib reads a text between two of them as mathematics."""
     return shortened(text, most).replace('$', r'\$')
 
 

@@ -29,7 +29,7 @@ from linkage_ros.errors import clean
 WHOLE, STOPPED, LOSS = 0, 1, 3
 
 _MOST_SHOWN = 20
-"""Lines of losses; of a disk that is worn out there may be thousands."""
+"""Maximum number of losses shown; a worn-out disk may cause thousands."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Recover the bag; return 0 where nothing is lost, 3 where something is, 1 if stopped."""
+    """Recover the bag; return 0 without loss, 3 with losses, 1 if stopped."""
     with progress('bytes') as told:
         recovery = recover(arguments.bag, arguments.output, told, stop.is_set)
     if recovery is None:
@@ -79,7 +79,7 @@ def _say(recovery: Recovery) -> None:
 
 def _lines(word: str, lines: list[str]) -> None:
     for line in lines[:_MOST_SHOWN]:
-        # What a damaged file says of itself may hold anything; a line stays a line.
+        # A name in a damaged file may contain line breaks; one loss stays one line.
         print(f'{word:<13}{clean(line)}')
     if len(lines) > _MOST_SHOWN:
         print(f'{word:<13}and {len(lines) - _MOST_SHOWN:,} more')

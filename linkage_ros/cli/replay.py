@@ -12,7 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How a replay is told: as JSON has it, and as text. Times are in [ns], and named so."""
+"""
+Run the scene of a bag once more over its samples, and compare.
+
+Every joint state, and what else was published, is made anew and held against the recorded bytes.
+Exit code 0: all are the same; 3: some differ; 1: it could not be told, was stopped, or the bag
+is damaged and what lies before the damage is the same.
+
+With --scene another scene is run, and its joints are compared with the recorded ones; -o writes
+it to a new bag, which replays by itself. Then a difference is no failure.
+"""
 
 from __future__ import annotations
 
@@ -67,12 +76,12 @@ from linkage_ros.scene.scene import Scene
 
 
 def unit_of(joint: str, quantity: str, turning: Mapping[str, bool]) -> str:
-    """Return the unit of a joint's number."""
+    """Return the unit of a quantity of a joint."""
     return UNITS[quantity][not turning.get(joint, True)]
 
 
 def bag_account(bag: Bag, scene: Scene, reading: BagReading, begin: list[int]) -> dict[str, Any]:
-    """Return which bag was replayed as which scene, how far, and when it began, in [ns]."""
+    """Return the bag, the scene, how far the bag was replayed, and when it begins, in [ns]."""
     return {
         'bag': str(bag.path),
         'scene': scene.name,
@@ -91,37 +100,37 @@ def proof_account(
     versions: Mapping[str, Mapping[str, str]],
 ) -> dict[str, Any]:
     """
-    Return what there is to say of a proof.
+    Return the result of a verified replay as JSON holds it.
 
     Parameters
     ----------
     proof
-        The proof.
+        The result.
     turning
-        Of each joint whether it turns, or slides.
+        For each joint True if it is revolute, False if it is prismatic.
     versions
-        Those of the ``bag``, and those ``here``.
+        Versions of the packages that wrote the ``bag``, and of those installed ``here``.
 
     """
-    found = proof.comparison
+    comparison = proof.comparison
     return {
         'verdict': proof.verdict,
         'ticks': proof.ticks,
-        'compared_ticks': found.ticks,
-        'different_ticks': found.differing,
-        'withheld_ticks': found.withheld,
+        'compared_ticks': comparison.ticks,
+        'different_ticks': comparison.differing,
+        'withheld_ticks': comparison.withheld,
         'untold_ticks': proof.untold,
         'beginning_missing': beginning_text(proof) if proof.beginning else None,
-        'topics': [topic_account(topic) for topic in found.topics],
-        'first_difference': first_account(found.first or proof.first_untold, turning),
-        'last_different_tick': at_account(found.last) if found.last else None,
-        'greatest': greatest(found, turning),
+        'topics': [topic_account(topic) for topic in comparison.topics],
+        'first_difference': first_account(comparison.first or proof.first_untold, turning),
+        'last_different_tick': at_account(comparison.last) if comparison.last else None,
+        'greatest': greatest(comparison, turning),
         'versions': {name: dict(of) for name, of in versions.items()},
     }
 
 
 def topic_account(topic: TopicComparison) -> dict[str, Any]:
-    """Return how the messages of a topic came out."""
+    """Return the comparison of one topic."""
     return {
         'name': topic.name,
         'recorded': topic.recorded,
@@ -134,7 +143,7 @@ def topic_account(topic: TopicComparison) -> dict[str, Any]:
 
 
 def first_account(first: First | None, turning: Mapping[str, bool]) -> dict[str, Any] | None:
-    """Return a difference, with how far the two are apart."""
+    """Return the first difference, and by how much the two values differ."""
     if first is None:
         return None
     account: dict[str, Any] = {**at_account(first.at), 'topic': first.topic, 'what': first.what}
@@ -151,14 +160,14 @@ def first_account(first: First | None, turning: Mapping[str, bool]) -> dict[str,
 
 
 def at_account(at: At) -> dict[str, Any]:
-    """Return where something was."""
+    """Return the place of a message: its topic, tick and time."""
     return {'tick': at.tick, 'time_ns': at.time}
 
 
-def greatest(found: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
-    """Return the greatest differences of each quantity and unit that differs at all."""
+def greatest(comparison: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
+    """Return the greatest difference of each quantity and unit that differs."""
     rows: dict[tuple[str, str], dict[str, Any]] = {}
-    for topic in found.topics:
+    for topic in comparison.topics:
         for (joint, quantity), deviation in topic.deviations.items():
             if not deviation.differing:
                 continue
@@ -176,13 +185,13 @@ def greatest(found: Comparison, turning: Mapping[str, bool]) -> list[dict[str, A
     ]
 
 
-def joints_account(found: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
-    """Return of every number that both have how far they are apart."""
+def joints_account(comparison: Comparison, turning: Mapping[str, bool]) -> list[dict[str, Any]]:
+    """Return the differences of each number that both runs have, joint by joint."""
     rows: dict[tuple[str, str], dict[str, Any]] = {}
-    for topic in found.topics:
+    for topic in comparison.topics:
         for key, deviation in topic.deviations.items():
             joint, quantity = key
-            # Motions repeat what the joint states say.
+            # ~/motion repeats the positions and velocities of the joint states.
             rows.setdefault(
                 key,
                 {
@@ -200,7 +209,7 @@ def joints_account(found: Comparison, turning: Mapping[str, bool]) -> list[dict[
 
 
 def first_text(first: Mapping[str, Any], begin: int) -> str:
-    """Return the first difference in words; times are told from a time in [ns]."""
+    """Return the first difference in words; times count from ``begin``, in [ns]."""
     text = f'tick {first["tick"]}, at {(first["time_ns"] - begin) / 1e9:+.6f} s '
     text += f'({first["time_ns"]} ns), {first["topic"]}: '
     if 'joint' not in first:
@@ -213,7 +222,7 @@ def first_text(first: Mapping[str, Any], begin: int) -> str:
 
 
 def topics_table(account: Mapping[str, Any]) -> Table:
-    """Return the topics as a table."""
+    """Return the table of topics."""
     heads = ['topic', '>recorded', '>same bytes', '>different', '>not made now', '>not recorded']
     keys = ['recorded', 'same', 'different', 'not_made_now', 'not_recorded']
     if any(topic['same_but_for_turns'] for topic in account['topics']):
@@ -226,7 +235,7 @@ def topics_table(account: Mapping[str, Any]) -> Table:
 
 
 def greatest_table(account: Mapping[str, Any], begin: int) -> Table:
-    """Return the greatest differences as a table."""
+    """Return the table of greatest differences."""
     rows = [
         (
             f'{row["quantity"]} [{row["unit"]}]',
@@ -241,7 +250,7 @@ def greatest_table(account: Mapping[str, Any], begin: int) -> Table:
 
 
 def joints_table(account: Mapping[str, Any], begin: int) -> Table:
-    """Return the differences joint by joint as a table."""
+    """Return the table of differences joint by joint."""
     rows = [
         (
             clean(row['joint']),
@@ -257,7 +266,7 @@ def joints_table(account: Mapping[str, Any], begin: int) -> Table:
 
 
 def versions_text(versions: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
-    """Yield the versions of what made the bag, and those of here where they are others."""
+    """Yield the versions that wrote the bag, and those installed here if they differ."""
     then, here = versions['bag'], versions['here']
     same = dict(then) == dict(here)
     yield f'made {"and replayed " if same else ""}by {_versions(then)}'
@@ -267,9 +276,9 @@ def versions_text(versions: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
 
 def _versions(said: Mapping[str, str]) -> str:
     words = {'linkage_ros': 'linkage_ros', 'python': 'Python', 'machine': 'on'}
-    told = [f'{word} {clean(said[key])}' for key, word in words.items() if key in said]
-    told += [f'{clean(key)} ({clean(said[key])})' for key in said if key not in words]
-    return ', '.join(told) or 'versions that it does not tell'
+    texts = [f'{word} {clean(said[key])}' for key, word in words.items() if key in said]
+    texts += [f'{clean(key)} ({clean(said[key])})' for key in said if key not in words]
+    return ', '.join(texts) or 'versions that it does not tell'
 
 
 def _place(where: Mapping[str, Any], begin: int) -> str:
@@ -288,14 +297,14 @@ def _finite(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-# Another scene over the samples of a bag: compared with the recorded run, written anew.
+# Counterfactual replay: another scene runs over the samples of a bag.
 
 
 def replayed_with(
     bag: Bag, reading: BagReading, scene: Scene, crank_topic: str | None, output: Path | None
 ) -> dict[str, Any]:
     """
-    Run another scene over a bag's samples; return what came of it.
+    Run another scene over a bag's samples; return the comparison with the recorded run.
 
     Parameters
     ----------
@@ -304,15 +313,15 @@ def replayed_with(
     scene
         The scene.
     crank_topic
-        As typed.
+        Topic of the crank samples, as the user typed it.
     output
-        Where a new bag goes; nothing for none.
+        Folder of the new bag; None to write none.
 
     Raises
     ------
     LinkageError
-        Where the scene cannot be run over the bag, there is nothing to compare and none to write,
-        or the new bag cannot be written.
+        If the scene cannot be run over the bag, if there is nothing to compare and no bag to
+        write, or if the new bag cannot be written.
 
     """
     check_drives(scene, scene.members[0].content.file)
@@ -361,7 +370,7 @@ def replayed_with(
 
 
 def _own_account(bag: Bag) -> tuple[RunAccount, Scene | None]:
-    """Return what a bag says of its run; blank and nothing where it does not."""
+    """Return the run account and the scene in a bag; a blank account and None if unreadable."""
     try:
         return run_account(bag), recorded_scene(bag)
     except LinkageError as error:
@@ -373,7 +382,7 @@ def _own_account(bag: Bag) -> tuple[RunAccount, Scene | None]:
 
 
 def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path | None) -> None:
-    """Refuse where nothing would come of it."""
+    """Raise if the replay could neither compare joints nor write a bag."""
     if output is not None or recorded is None or set(recorded.joints) & set(scene.joints):
         return
     raise LinkageError(
@@ -387,7 +396,7 @@ def _check_joints(bag: Bag, scene: Scene, recorded: Scene | None, output: Path |
 def _side_by_side(
     event: Remade, run: RunAccount, names: Names, shared: list[str]
 ) -> tuple[list[bytes], list[bytes]]:
-    """Return what a tick has made on each topic that both runs have, then and now."""
+    """Return the messages of a tick, recorded and new, on each topic that both runs have."""
     then = dict(zip((run.joint_states_topic, *run.extras), event.recorded, strict=False))
     now: dict[str, bytes] = {}
     if event.tick is not None:
@@ -395,15 +404,6 @@ def _side_by_side(
         now[run.joint_states_topic] = event.tick.message
     return [then.get(name, b'') for name in shared], [now.get(name, b'') for name in shared]
 
-
-# Run the scene of a bag once more over its samples, and compare.
-#
-# Every joint state, and what else was published, is made anew and held against the recorded bytes.
-# Exit code 0: all are the same; 3: some differ; 1: it could not be told, was stopped, or the bag
-# is damaged and what lies before the damage is the same.
-#
-# With --scene another scene is run, and its joints are compared with the recorded ones; -o writes
-# it to a new bag, which replays by itself. Then a difference is no failure.
 
 EXIT_INCOMPLETE, EXIT_DIFFERENT = 1, 3
 
@@ -425,7 +425,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, stop: Event) -> int:
-    """Replay the bag; the module says what is returned."""
+    """Replay the bag; return the exit code that the module docstring describes."""
     for option, value in (('-o', arguments.output), ('--crank-topic', arguments.crank_topic)):
         if value is not None and arguments.scene is None:
             raise LinkageError(option, 'is for another scene', 'name it with --scene')
@@ -437,7 +437,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     else:
         scene = load_scene(arguments.scene)
         if RUN_FILE in bag.attachments and 'seed' not in scene.members[0].content:
-            # What differs is the scene, and not the noise.
+            # The same seeds: the scene makes the difference, not the noise.
             scene = replace(scene, seed=run_account(bag).seed)
         account = replayed_with(bag, reading, scene, arguments.crank_topic, arguments.output)
         code = 0
@@ -454,12 +454,12 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
 
 def replayed(bag: Bag, reading: BagReading, *, trust_effects: bool = False) -> dict[str, Any]:
     """
-    Run a bag's own scene once more; return what came of it.
+    Run a bag's own scene once more; return the comparison with the recorded run.
 
     Raises
     ------
     LinkageError
-        Where the bag carries no scene that can be run, or nothing to compare.
+        If the bag carries no scene that can be run, or holds no joint states to compare.
 
     """
     try:
@@ -538,7 +538,7 @@ def _show_what_if(account: dict[str, Any]) -> None:
 
 
 def _shortcomings(account: dict[str, Any]) -> Iterator[str]:
-    """Yield why not all of the bag was replayed."""
+    """Yield the reasons why a part of the bag was not replayed."""
     if account['truncated']:
         yield f'{account["bag"]}: unfinished: {account["unfinished"]}; what it holds was replayed'
     if account['damage']:

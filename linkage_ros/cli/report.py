@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace, stop: Event) -> int:
     file = arguments.output or beside(arguments.bag, '.html')
     _check(file)
     window = _window(arguments.since, arguments.until)
-    # What is no text, of a name of a file, say, comes as its bytes' numbers.
+    # Undecodable bytes, of a file name for example, are written as escapes.
     page = report(arguments.bag, window, stop, trust_effects=arguments.trust_effects)
     data = page.encode('utf-8', 'backslashreplace')
     _write(file, data)
@@ -95,18 +95,18 @@ def report(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool =
     bag_path
         The bag.
     window
-        Which part of its run is told.
+        The part of the run to show.
     stop
-        The wish to stop.
+        Set by a signal.
     trust_effects
-        Whether the modules that its scene names as effects are imported.
+        Whether to import the modules that the scene names as effects.
 
     Raises
     ------
     LinkageError
-        Where the bag cannot be read, or plotly is not installed.
+        If the bag cannot be read, or plotly is not installed.
     StoppedError
-        There was the wish.
+        If the event was set.
 
     """
     bag = opened(bag_path, stop)
@@ -122,7 +122,7 @@ def report(bag_path: Path, window: Window, stop: Event, *, trust_effects: bool =
     _heed(stop)
     account = account_of(bag, layouts, found.contents)
     account |= {'scene': None, 'scene_missing': None, 'replay': None}
-    # A page is handed on, and does not say where its bag lay.
+    # A page is passed on to others: it shows the bag's name, not its path.
     if account['damage']:
         where, _, damage = account['damage'].partition(': ')
         account['damage'] = f'{Path(where).name}: {damage}'
@@ -172,7 +172,7 @@ def _facts(account: dict[str, Any], found: Run, scene: Scene | None) -> Iterator
 def _warnings(
     bag: Bag, account: dict[str, Any], found: Run, scene: Scene | None, missing: str
 ) -> Iterator[str]:
-    """Yield what is missing of a run, or damaged."""
+    """Yield the missing or damaged parts of a run."""
     if missing and scene is None:
         yield f'No scene of linkage_ros, so no linkage: {missing}.'
     elif missing:
@@ -205,12 +205,12 @@ def _window(since: float | None, until: float | None) -> Window:
 
 
 def _check(file: Path) -> None:
-    """Refuse what cannot be written, before anything is read."""
+    """Raise if the page could not be written, before the bag is read."""
     if find_spec('plotly') is None:
         raise LinkageError('plotly', 'is not installed', 'pip install linkage_ros[report]')
     if file.suffix.lower() not in ('.html', '.htm'):
         raise LinkageError(file, 'is no name of a page', 'name FILE.html with -o')
-    # Of a name that is too long `Path.is_dir` raises.
+    # `Path.is_dir` raises for a name that is too long.
     if os.path.isdir(file):  # noqa: PTH112
         raise LinkageError(file, 'is a folder', 'name another file with -o')
     if not os.path.isdir(file.absolute().parent):  # noqa: PTH112
@@ -218,9 +218,9 @@ def _check(file: Path) -> None:
 
 
 def _write(file: Path, page: bytes) -> None:
-    """Write a file as a whole, or not at all."""
+    """Write a file completely or not at all."""
     try:
-        # Where it leads elsewhere, it is that which is written.
+        # The target of a symbolic link is replaced, not the link.
         atomic_replace(Path(os.path.realpath(file)), page)
     except OSError as error:
         reason = f'cannot be written: {error.strerror or error}'

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A run as it goes: a table that renews itself with rich, a line a second without."""
+"""Run a scene as a ROS 2 node, with a live display and a summary at the end."""
 
 from __future__ import annotations
 
@@ -47,19 +47,19 @@ if _RICH:
 
 _LIVE_PERIOD, _PLAIN_PERIOD = 0.25, 1.0
 _MOST_SHOWN = 24
-"""Joints beyond this do not fit on a screen."""
+"""Maximum number of joints that fit on a screen."""
 
 _Shown = tuple[str, float, float | None]
 
 
 class Display:
     """
-    Shows a running node.
+    Live display of a running node: a table drawn by rich, or one line a second.
 
     Parameters
     ----------
     plain
-        Whether to print lines also where a live display is possible.
+        Whether to print lines even where a live display is possible.
 
     """
 
@@ -81,7 +81,7 @@ class Display:
             self._entered = False
 
     def show(self, node: LinkageNode) -> None:
-        """Show the node as it is now, if it is time."""
+        """Show the current state of the node, if an update is due."""
         now = monotonic()
         if node.loop is None or node.scene is None or now - self._shown < self._period:
             return
@@ -99,7 +99,7 @@ class Display:
 
 
 def _state(loop: TickLoop) -> tuple[str, list[_Shown]]:
-    """Return the input's age as text, and name, value and rate of inputs and joints."""
+    """Return the input's age as text; name, value and rate of inputs and joints."""
     tick = loop.counts.last
     age = 'no crank'
     values: list[_Shown] = []
@@ -148,7 +148,7 @@ def _table(loop: TickLoop, rate: float) -> Any:
     return Group(status, table)
 
 
-# What a run came to, in a few lines.
+# The summary at the end of a run.
 
 
 def summary(node: LinkageNode) -> str:
@@ -204,7 +204,7 @@ def summary(node: LinkageNode) -> str:
 
 
 def _proof(folder: Path) -> str:
-    """Replay a bag: whether it gives the same bytes, and how well its loop closed."""
+    """Replay a bag: check that it gives the same bytes, and how well its loop closed."""
     worst = 0.0
 
     def look(replayed: ReplayedTick) -> None:
@@ -215,7 +215,7 @@ def _proof(folder: Path) -> str:
 
     try:
         bag = read_bag(folder)
-        # The run was the user's own, and has imported them.
+        # The run was the user's, and has imported these modules already.
         scene = recorded_scene(bag, trust_effects=True)
         pipeline = Pipeline(scene)
         closures = pipeline.closures
@@ -236,9 +236,6 @@ def _proof(folder: Path) -> str:
     return f'{same} replay to the same bytes; {"; ".join(notes)}'
 
 
-# Run a scene as a ROS 2 node, with a live display and a summary at the end.
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('scene', help='the scene file; or a linkage file, which it moves')
@@ -249,7 +246,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_run_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments that every run has."""
+    """Declare the arguments that all commands with a run share."""
     parser.add_argument(
         '--seconds', type=_seconds, default=inf, help='how long; without it, until Ctrl-C'
     )

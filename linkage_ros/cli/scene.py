@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a scene consists of, as tables."""
+"""Say what a scene consists of, or all that is wrong with it; or what scenes can name."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _WHERE = {
     'sensor': 'between mechanism and message',
     'writer': 'beside the joint states',
 }
-"""Where in a tick an effect stands, by the function that builds it."""
+"""Place of an effect within a tick, by the function that builds it."""
 
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
 _MOST_NAMES = 4
@@ -57,7 +57,7 @@ _LONGEST = 60
 
 
 def tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
-    """Yield what there is to say of a scene that has been built."""
+    """Yield the tables of a scene that has been built."""
     yield Table(title, ('', ''), [*_facts(scene), *_solvers(pipeline.lines)])
     for lines in _alike(pipeline.lines):
         names = _some([line.member.name for line in lines if line.member.name])
@@ -69,7 +69,7 @@ def tables(scene: Scene, pipeline: Pipeline, title: str) -> Iterator[Table]:
 
 
 def brought_in_by(stage: str, named: Any) -> str:
-    """Return what of the effects that are named brings in one that is not, with commas."""
+    """Return the named effects that require an unnamed one, separated by commas."""
     return ', '.join(bringing(stage, named))
 
 
@@ -90,7 +90,7 @@ def _facts(scene: Scene) -> Iterator[tuple[str, str]]:
 
 
 def _solvers(lines: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
-    """Yield what closes the loops, where the scene says so."""
+    """Yield the solvers that close the loops, if the scene names any."""
     for line in lines:
         name = f'{line.member.name}: ' if line.member.name else ''
         if line.choice is not None:
@@ -102,7 +102,7 @@ def _solvers(lines: list[LinkagePipeline]) -> Iterator[tuple[str, str]]:
 
 
 def _alike(lines: list[LinkagePipeline]) -> list[list[LinkagePipeline]]:
-    """Return the linkages, those together that have the same drive and effects."""
+    """Return the linkages; those with the same drive and effects share a row."""
     groups: dict[str, list[LinkagePipeline]] = {}
     for line in lines:
         groups.setdefault(repr((line.member.drive, line.member.effects)), []).append(line)
@@ -148,7 +148,7 @@ def _topics(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[str, ...]]:
 
 
 def _said(parameters: Any) -> str:
-    """Return the parameters that are not as by default."""
+    """Return the parameters that differ from their defaults."""
     said = [
         f'{entry.name} {_shown(getattr(parameters, entry.name))}'
         for entry, _ in declared(type(parameters))
@@ -170,7 +170,7 @@ def _shown(value: Any) -> str:
 
 
 def _some(names: list[str]) -> str:
-    """Return names, the first ones where there are many, and how many."""
+    """Return names; of many names the first ones and the count."""
     if len(names) <= _MOST_NAMES + 1:
         return ', '.join(names)
     return f'{", ".join(names[:_MOST_NAMES])}, … ({len(names)})'
@@ -184,13 +184,13 @@ REGISTRIES: Mapping[str, Mapping[str, str]] = {
     'fault': FAULTS,
     'solver': SOLVERS,
 }
-"""All that a scene can name, by what it is."""
+"""Everything that a scene can name, by kind."""
 
 _HEADS = ('parameter', 'unit', 'default', 'values', 'meaning')
 
 
 def table_of(what: str, name: str) -> Table:
-    """Return the table of what a scene can name: ``what`` is a key of `REGISTRIES`."""
+    """Return the table of a drive, effect, fault or solver; ``what`` is a key of `REGISTRIES`."""
     module = module_of(name) if what == 'effect' else import_module(REGISTRIES[what][name])
     parameters = module.PARAMETERS
     title = f'{what} {name}: {summary(parameters)}'
@@ -198,10 +198,8 @@ def table_of(what: str, name: str) -> Table:
     return Table(title, _HEADS, rows) if rows else Table(title, ('',), [('no parameters',)])
 
 
-# Say what a scene consists of, or all that is wrong with it; or what scenes can name.
-
 SCHEMAS = {'scene': scene_schema, 'linkage': linkage_schema}
-"""What makes the JSON Schema of each kind of file."""
+"""Functions that make the JSON Schema of each kind of file."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -248,14 +246,14 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def _named(names: list[str]) -> Iterator[tuple[str, str]]:
-    """Yield what is to be listed, as arguments of `table_of`."""
+    """Yield the arguments of `table_of` for each item to list."""
     known = [(what, name) for what, registry in REGISTRIES.items() for name in registry]
     if not names:
         yield from known
     for name in names:
         found = [entry for entry in known if entry[1] == name]
         if '.' in name:
-            # One of one's own, which no list has.
+            # A user-defined effect, which no list has.
             found = [('effect', name)]
         if not found:
             words = [word for _, word in known]
@@ -268,7 +266,7 @@ def _named(names: list[str]) -> Iterator[tuple[str, str]]:
 
 
 def _violations(file: str) -> list[FileError]:
-    """Return all that is wrong by the schemas with a scene and the linkages that it names."""
+    """Return all violations of the schemas in a scene and the linkages that it names."""
     if find_spec('jsonschema') is None:
         return []
     from linkage_ros.scene.violations import violations
@@ -280,7 +278,7 @@ def _violations(file: str) -> list[FileError]:
     if wrong:
         return wrong
     for linkage in dict.fromkeys(_linkages(content)):
-        # One that is not there is for the reader to tell, with the line that names it.
+        # The reader reports a missing file, with the line that names it.
         path = Path(file).parent / linkage
         if isfile(path):  # noqa: PTH113 (Path's raises where a name is too long)
             wrong += violations(read_yaml(path)[0], linkage_schema())

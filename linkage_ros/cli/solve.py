@@ -48,14 +48,14 @@ _PER = ('', '/s', '/s²')
 
 class Column(NamedTuple):
     """
-    A column of the answer.
+    A column of the result.
 
     Attributes
     ----------
     name
-        Of a joint or a coordinate, with what is told of it.
+        Joint or coordinate, and its quantity.
     unit
-        '' where it is a text.
+        '' for a text.
 
     """
 
@@ -126,7 +126,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 class State(NamedTuple):
-    """Inputs as they are typed and told, and in [rad] and [m]."""
+    """Inputs as the user reads them, and in [rad] and [m]."""
 
     told: tuple[float, ...]
     inputs: tuple[float, ...]
@@ -134,18 +134,18 @@ class State(NamedTuple):
 
 class Question(NamedTuple):
     """
-    What is asked for.
+    The requested computation.
 
     Attributes
     ----------
     states
         The inputs to solve for.
     rates, accelerations
-        Of the inputs; none where they are not asked for.
+        Of the inputs; empty if not requested.
     degrees
-        Whether angles are told in degrees.
+        Whether angles are shown in degrees.
     points
-        For each traced point a link that carries it.
+        For each traced point, a link that carries it.
 
     """
 
@@ -199,10 +199,10 @@ def _sweep(
     way: InputSweep, first: float | None, last: float | None, steps: int, *, in_degrees: bool
 ) -> Iterator[State]:
     """
-    Yield inputs from end to end, at equal steps; without ends, all over every range.
+    Yield inputs from end to end at equal steps; without ends, over every range.
 
-    The ends of a range are solved for as they were found: an angle in degrees has not all their
-    digits, and a toggle would be missed by the last one.
+    The ends of a range are solved with all their digits: shown in degrees they are rounded, and
+    the rounded end may miss a toggle.
     """
     ranges = list(way.ranges)
     if first is not None or last is not None:
@@ -244,7 +244,7 @@ def _orders(question: Question) -> range:
 
 
 def _row(closure: Closure, question: Question, state: State) -> list[Any]:
-    """Return the cells of a state; none where there is no value."""
+    """Return the cells of a state; empty cells where there is no value."""
     unit = degrees if question.degrees else float
     given = state.inputs
     row: list[Any] = [*state.told]
@@ -265,7 +265,7 @@ def _row(closure: Closure, question: Question, state: State) -> list[Any]:
     if not position.status.has_rates:
         return row + [None] * (count * (len(_orders(question)) - 1))
     velocity = closure.velocity(position, *question.rates)
-    # Rates of points come with accelerations; unknown ones are taken for none.
+    # Rates of points come together with accelerations; unknown accelerations count as 0.
     changes = question.accelerations or (0.0,) * len(given)
     acceleration = closure.acceleration(position, velocity, *changes)
     motion = closure.point_motion(position, velocity, acceleration) if question.points else {}

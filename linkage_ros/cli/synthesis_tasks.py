@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What ``linkage synthesize`` was asked for, worked out: one kind of task after the other."""
+"""Solve the tasks of ``linkage synthesize``: angle pairs, function, path, motion."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from linkage_ros.synthesis.function.task import FunctionTask, StructuralError
 
 CANDIDATES = 200_000
-"""How many a search tries where nobody says."""
+"""Default number of candidates of a search."""
 
 _SHIFT = 0.01
-"""What the sensitivity is told for, in degrees: what a good protractor shows."""
+"""Error of an angle for which the sensitivity is shown, in degrees: that of a good protractor."""
 
 Angles = Sequence[float]
 
@@ -50,13 +50,13 @@ class Answer(NamedTuple):
     Attributes
     ----------
     title
-        How it came about.
+        How the design was made.
     design, assessment
-        What it is, and what it is worth.
+        The design, and its quality.
     facts
-        How it was solved: what, and how much.
+        Names and values that describe how it was solved.
     curve
-        Crank angles and the rocker's error there, in [rad]; None where there is no more than the
+        Crank angles and the rocker's error there, in [rad]; None if the task gives only
         positions.
 
     """
@@ -69,7 +69,7 @@ class Answer(NamedTuple):
 
 
 class Search(NamedTuple):
-    """How to search, and for what."""
+    """Requirements and effort of a search."""
 
     needs: Needs
     seed: int
@@ -79,7 +79,7 @@ class Search(NamedTuple):
     progress: ProgressCallback
 
     def accepts(self, design: Design) -> bool:
-        """Return whether a design has what is needed."""
+        """Return whether a design meets the requirements."""
         return not misses(assess(design), self.needs)
 
 
@@ -90,7 +90,7 @@ def answers(typed: argparse.Namespace, search: Search) -> list[Answer]:
     Raises
     ------
     LinkageError
-        Where there is none, or what was typed is no task.
+        If there is no solution, or the arguments are not a task.
 
     """
     tasks = {
@@ -135,14 +135,14 @@ def _of_pairs(
     return [_fitted(crank, rocker, ground, free)]
 
 
-def _worth(found: ThreePairs) -> list[tuple[str, str]]:
-    k1, k2, k3 = found.k
-    slopes = abs(found.gradient).max(-1) / abs(found.lengths) * radians(_SHIFT)
-    digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, found.digits, strict=True)]
+def _worth(pairs: ThreePairs) -> list[tuple[str, str]]:
+    k1, k2, k3 = pairs.k
+    slopes = abs(pairs.gradient).max(-1) / abs(pairs.lengths) * radians(_SHIFT)
+    digits = [f'{link} {value:.0f}' for link, value in zip(_LINKS, pairs.digits, strict=True)]
     moves = [f'{link} {value:.2g}' for link, value in zip(_LINKS, 100.0 * slopes, strict=True)]
     return [
         ('k1, k2, k3', f'{k1:.12g}, {k2:.12g}, {k3:.12g}'),
-        ('condition', f'{found.condition:.4g}'),
+        ('condition', f'{pairs.condition:.4g}'),
         ('digits to trust', f'{", ".join(digits)}, of lengths worked out from these angles'),
         (f'{_SHIFT}° on one angle', f'moves {" %, ".join(moves)} %, at most'),
     ]
@@ -169,7 +169,7 @@ def _searched(crank: Angles, rocker: Angles, ground: float, search: Search) -> l
 
 
 def _turned(what: str, design: Design) -> Answer:
-    """Return a solution whose zeros were free, which its title names."""
+    """Return a solution whose zero angles were free; its title names them."""
     four_bar = design.four_bar
     zeros = [
         f'{link} at {degrees(remainder(phase(pin), pi)):+.6g}°'

@@ -36,11 +36,11 @@ from linkage_ros.files.linkage_text import write_linkage
 from linkage_ros.synthesis.defects import Assessment, distance, misses, Needs
 from linkage_ros.synthesis.design import FourBar
 
-# A designed four-bar as tables: its links, the proof, what it is worth.
+# Tables of a designed four-bar: its links, its proof, its quality.
 
 
 def tables(answer: Answer, title: str, needs: Needs) -> Iterator[Table]:
-    """Yield what there is to say of a solution."""
+    """Yield the tables of a solution."""
     yield Table(title, ('link', '>length [m]', ''), list(_links(answer.design.four_bar)))
     if answer.facts:
         yield Table('', ('', ''), answer.facts)
@@ -59,7 +59,7 @@ def _links(four_bar: FourBar) -> Iterator[tuple[str, str, str]]:
 
 
 def _proof(answer: Answer) -> Table:
-    """Return how each position is met; a column is there where one asks for it."""
+    """Return how each position is met; optional columns appear only if they were asked for."""
     wanted = answer.design.wanted
     columns = ['>', '>crank']
     rocker, coupler, place = (
@@ -115,11 +115,11 @@ def _worth(assessment: Assessment, needs: Needs) -> Iterator[tuple[str, str]]:
 
 
 _NOT_MET = 1
-"""Exit code where there are solutions and none has what is needed."""
+"""Exit code if there are solutions, but none meets the requirements."""
 
 
 _LISTED = 3
-"""How many solutions of a search are listed where nobody says."""
+"""Default number of solutions that a search lists."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -260,7 +260,7 @@ def _add_freedoms(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, _stop: Event) -> int:
-    """Design; return 1 where no solution has what is needed."""
+    """Design; return 1 if no solution meets the requirements."""
     with progress('candidates') as told:
         found, meeting = solutions(arguments, told)
     if not meeting:
@@ -277,7 +277,7 @@ def run(arguments: argparse.Namespace, _stop: Event) -> int:
 
 
 def solutions(typed: argparse.Namespace, told: ProgressCallback) -> tuple[list[Answer], bool]:
-    """Return all solutions that have what is needed, or the nearest to it; and whether they do."""
+    """Return the solutions that meet the requirements and True; or the nearest ones and False."""
     needs = needs_of(typed)
     keep = typed.best or _LISTED
     found = answers(typed, Search(needs, typed.seed, typed.candidates, keep, typed.dask, told))
@@ -302,7 +302,7 @@ def _count(text: str) -> int:
 
 
 def needs_of(typed: argparse.Namespace) -> Needs:
-    """Return what a solution needs; whatever is needed, it must be free of defects then."""
+    """Return the requirements; if there are any, a solution must also be free of defects."""
     needs = Needs(typed.need, radians(typed.min_transmission), typed.max_link_ratio)
     needs.check()
     return needs._replace(usable=typed.usable or needs != Needs())

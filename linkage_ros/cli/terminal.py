@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Tables for a terminal: drawn by rich where it is there, aligned with spaces elsewhere."""
+"""Tables and progress on a terminal: drawn by rich if it is installed, else plain text."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class Table(NamedTuple):
     Attributes
     ----------
     title
-        '' for none.
+        '' for no title.
     columns
-        Headings; a leading ``>`` aligns to the right. All empty: none are written.
+        Headings; a leading ``>`` aligns to the right. If all are empty, none is written.
     rows
         The cells, as text.
 
@@ -52,8 +52,8 @@ def show(table: Table) -> None:
     """
     Print a table.
 
-    What goes into a file or through a pipe, or is wider than the terminal, comes without frames:
-    it can be searched, and no name is broken in two.
+    Output into a file or a pipe, or wider than the terminal, has no frames: it can be searched,
+    and no name is broken in two.
     """
     rows = [[shortened(clean(cell), _LONGEST_CELL) for cell in row] for row in table.rows]
     table = Table(clean(table.title), table.columns, rows)
@@ -68,7 +68,7 @@ def show(table: Table) -> None:
 
 
 def text(table: Table) -> str:
-    """Return a table as lines of text."""
+    """Return a table as plain text."""
     headed = any(column.lstrip('>') for column in table.columns)
     lines = [[column.lstrip('>') for column in table.columns]] if headed else []
     lines += [list(row) for row in table.rows]
@@ -97,7 +97,7 @@ def _drawn(table: Table) -> object:
     from rich.text import Text
 
     headed = any(column.lstrip('>') for column in table.columns)
-    # As texts: what stands in brackets, such as a unit, is no markup.
+    # As Text: rich would read brackets, such as those of a unit, as markup.
     drawn = Drawn(
         title=Text(table.title, style='bold') if table.title else None,
         title_justify='left',
@@ -114,10 +114,10 @@ def _drawn(table: Table) -> object:
     return drawn
 
 
-# How far something long has come: a bar by rich on a terminal, a line now and then elsewhere.
+# Progress of a long task: a bar drawn by rich on a terminal, else a line now and then.
 
 ProgressCallback = Callable[[int, int], None]
-"""Takes how much is done, and of how much."""
+"""Takes the amount done and the total."""
 
 _EVERY = 5.0
 """Seconds between two lines."""
@@ -125,7 +125,7 @@ _EVERY = 5.0
 
 @contextmanager
 def progress(what: str) -> Iterator[ProgressCallback]:
-    """Give a function to tell progress to; what is told goes to standard error."""
+    """Give a function that shows progress on standard error."""
     if sys.stderr.isatty() and find_spec('rich') is not None:
         from rich.console import Console
         from rich.progress import (
@@ -152,17 +152,17 @@ def progress(what: str) -> Iterator[ProgressCallback]:
     yield line
 
 
-# Where lines go out: what a terminal would obey does not, whatever a file calls its topics.
+# Output is escaped: a topic's name in a file may contain control characters of the terminal.
 
 
 class Outlet:
     """
-    A stream of text whose lines are printable; all else is that of the stream.
+    A text stream whose lines are made printable; everything else is passed to the stream.
 
     Parameters
     ----------
     stream
-        Standard output, say.
+        The stream, for example standard output.
 
     """
 
@@ -180,5 +180,5 @@ class Outlet:
 
 
 def clean_output() -> None:
-    """Let standard output and standard error be clean; rich draws on what was there before."""
+    """Replace standard output and standard error by escaped ones; rich keeps the originals."""
     sys.stdout, sys.stderr = Outlet(sys.stdout), Outlet(sys.stderr)

@@ -13,4 +13,4 @@
 # limitations under the License.
 
 
-"""What all pages share: one file that needs nothing else, its looks, tables and plots."""
+"""Shared by all HTML pages: one self-contained file with its styles, tables and plots."""

@@ -14,10 +14,9 @@
 
 
 """
-A page that needs no other file: style, script, data and plotting library within one file.
+A self-contained page: style, script, data and plotting library in one file.
 
-Its policy forbids the browser every request, whatever the page holds. Tables and facts are set
-here for all pages.
+Its content policy forbids the browser all requests, whatever the page holds.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ POLICY = (
 _HERE = 'linkage_ros.pages'
 
 Parts = Sequence[tuple[str, str]]
-"""Files of a page's own: each with its package and its name."""
+"""Files of one page: each with its package and its name."""
 
 
 def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts: Parts) -> str:
@@ -50,18 +49,18 @@ def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts:
     Parameters
     ----------
     title
-        Of the window.
+        Title of the window.
     body
         Lines of HTML.
     data
-        For the script, as JSON has it; numbers are finite.
+        Data of the script, as JSON holds them; numbers are finite.
     styles, scripts
-        Files that the page has beside those of all pages, in their order.
+        Files of this page beside those of all pages, in their order.
 
     Raises
     ------
     LinkageError
-        Where plotly is not installed.
+        If plotly is not installed.
 
     """
     return '\n'.join(
@@ -73,7 +72,7 @@ def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts:
             f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             '<meta name="color-scheme" content="light dark">',
-            # Without it a browser asks the server for one.
+            # Without an icon, a browser asks the server for one.
             '<link rel="icon" href="data:,">',
             f'<title>{escape(clean(title))}</title>',
             f'<style>\n{_joined("page.css", styles)}</style>',
@@ -91,7 +90,7 @@ def document(title: str, body: Iterable[str], data: Any, styles: Parts, scripts:
 
 
 def picture(svg: bytes) -> str:
-    """Return an SVG as the address of an image that holds it."""
+    """Return an SVG as a data URL."""
     return f'data:image/svg+xml;base64,{b64encode(svg).decode()}'
 
 
@@ -102,27 +101,27 @@ def plotting_library() -> str:
     Raises
     ------
     LinkageError
-        Where it is not installed.
+        If it is not installed.
 
     """
     if find_spec('plotly') is None:
         raise LinkageError('plotly', 'is not installed', 'pip install linkage_ros[report]')
-    from plotly.offline import get_plotlyjs  # local import: an extra, and slow to load
+    from plotly.offline import get_plotlyjs  # local import: an optional dependency, slow to load
 
     return str(get_plotlyjs())
 
 
 def _joined(name: str, parts: Parts) -> str:
-    """Return a file that all pages have, and those of a page's own behind it."""
-    found = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
-    return '\n'.join(file.read_text('utf-8') for file in found)
+    """Return the file that all pages share, followed by those of this page."""
+    texts = (files(package).joinpath(file) for package, file in ((_HERE, name), *parts))
+    return '\n'.join(file.read_text('utf-8') for file in texts)
 
 
 def _json(data: Any) -> str:
-    # No text within can end the element, or open a comment.
+    # No text may end the script element or open a comment.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(',', ':'))
     text = text.replace('<', r'\u003c')
-    # Text that the script shows is made readable here, too; json has escaped the rest.
+    # Names that the script shows are cleaned here, too; json has escaped the rest.
     return _without({letter for letter in set(text) if not letter.isprintable()}, text, '\\')
 
 
@@ -141,25 +140,25 @@ def _within_script(text: str) -> str:
 
 
 _LONG = 28
-"""Letters from which on a cell may be broken."""
+"""Length from which the text of a cell may be broken into lines."""
 
 
 def table_html(
     title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[bool]
 ) -> Iterator[str]:
     """
-    Yield a table, within a figure that is left open.
+    Yield a table within a figure, which the caller closes.
 
     Parameters
     ----------
     title
         Its caption.
     columns
-        Headings; all empty: none are written.
+        Headings; if all are empty, none is written.
     rows
         The cells.
     numbers
-        Which columns hold numbers, and are set right.
+        Which columns hold numbers and are aligned to the right.
 
     """
     yield f'<figure><figcaption>{escape(title)}</figcaption>'

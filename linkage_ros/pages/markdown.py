@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Markdown that programs write: tables, and the part of a page between two marks."""
+"""Generated Markdown: tables, and the part of a page between two marks."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ def table_lines(
 
 
 def marks(name: str) -> tuple[str, str]:
-    """Return the two comments between which a program writes."""
+    """Return the two comments that enclose a generated part."""
     return f'<!-- {name}: begin -->', f'<!-- {name}: end -->'
 
 
 def filled(page: str, name: str, text: str) -> str:
-    """Return a page with a text between two of its marks; the rest is written by hand."""
+    """Return a page with a text between two of its marks; the rest stays as it is."""
     begin, end = marks(name)
     head, _, rest = page.partition(begin)
     _, _, tail = rest.partition(end)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-A run as a page: what its bag holds, read once, thinned, and put where a browser shows it.
+A run as an HTML page: the bag is read once, its curves are decimated, and a browser shows them.
 
-Memory and page do not grow with the bag beyond a bound; minima and maxima are kept.
+Memory and page size are bounded, whatever the size of the bag; minima and maxima are kept.
 """

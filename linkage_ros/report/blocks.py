@@ -14,11 +14,11 @@
 
 
 """
-The messages of a bag, some thousands at a time, with the time of the run for each.
+The messages of a bag in blocks of some thousands, with the run time of each.
 
-The time of a run begins at 0 and never goes back. Where the clock of the recorder jumps back, no
-time passes, and the time of the run goes on from there. Messages on several topics may be a little
-out of order in a bag that other programs have written; that is no jump.
+Run time begins at 0 and never goes back. When the recorder's clock jumps back, run time stands
+still and then goes on from there. In a bag of another program, messages on several topics may be
+slightly out of order; that is no jump.
 """
 
 from __future__ import annotations
@@ -34,29 +34,29 @@ from linkage_ros.report.decimation import Times
 import numpy as np
 
 _LATEST = 2**62
-"""In [ns]: what is said to be later is so by damage."""
+"""Latest plausible log time, in [ns]; a later one is damage."""
 
 
 def times_of(logged: Sequence[int]) -> Times:
-    """Return log times as an array; they may be anything that fits into 64 bits."""
+    """Return log times as an array; they may be any 64-bit numbers."""
     return np.minimum(np.array(logged, np.uint64), np.uint64(_LATEST)).astype(np.int64)
 
 
 class RunClock:
     """
-    Makes of log times the time of a run.
+    Converts log times to run time.
 
     Parameters
     ----------
     disorder
-        By how much a message may stand too late, in [ns], and the clock not have jumped.
+        By how much a message may come too late without a jump of the clock, in [ns].
 
     Attributes
     ----------
     begin
-        The log time at which the run begins, in [ns]; nothing before there is a message.
+        Log time at which the run begins, in [ns]; None before the first message.
     end
-        The time of the run at the last message, by whatever hand, in [ns].
+        Run time of the last message, from either thread, in [ns].
 
     """
 
@@ -66,16 +66,16 @@ class RunClock:
         self._disorder = disorder
         self._last = self._added = self._now = 0
         self._jumps: list[tuple[int, int]] = []
-        # The log times that were looked at last and the times of the run, and what was before.
+        # Log times and run times of the last block, and the last of the block before it.
         self._logged = self._times = np.zeros(1, np.int64)
 
     def start(self, logged: int) -> None:
-        """Begin the run, unless it has begun, at a log time in [ns]."""
+        """Begin the run at a log time in [ns], unless it has begun."""
         if self.begin is None:
             self.begin = self._last = logged
 
     def passed(self, logged: Times) -> Times:
-        """Return the times of the run at messages in their order, by their log times, in [ns]."""
+        """Return the run times of consecutive messages from their log times, in [ns]."""
         before = self._last, self._now
         times = logged
         if len(logged):
@@ -95,14 +95,14 @@ class RunClock:
 
     def beside(self, logged: Times, behind: Times) -> Times:
         """
-        Return the times of the run at messages that another hand has recorded, in [ns].
+        Return the run times of messages that another thread has recorded, in [ns].
 
         Parameters
         ----------
         logged
-            Their log times, in [ns]; they may deviate a little from those of the others.
+            Their log times, in [ns]; they may deviate a little from those of the first thread.
         behind
-            How many of the messages that `passed` was given last stand before each.
+            How many messages of the last call of `passed` precede each.
 
         """
         since = np.maximum(logged - self._logged[behind], 0)
@@ -112,7 +112,7 @@ class RunClock:
         return times
 
     def jumps(self) -> Iterator[tuple[int, int]]:
-        """Yield when the clock has jumped since this was asked last, and by how much, in [ns]."""
+        """Yield time and size of the clock's jumps since the last call, in [ns]."""
         found, self._jumps = self._jumps, []
         yield from found
 
@@ -120,17 +120,17 @@ class RunClock:
 _MOST_MESSAGES = 8192
 _MOST_BYTES = 32 * 2**20
 _FARTHEST = 4
-"""By how many times a block may be larger, for the sake of one log time."""
+"""Factor by which a block may grow to keep messages of one log time together."""
 
 _RECORD_BYTES = 31
-"""Size of a record of a message in an MCAP file without the message itself, in [bytes]."""
+"""Bytes of a message record in an MCAP file without the message itself."""
 
 Entry = tuple[int, int, int, bytes]
-"""Number of the message, log time, publish time, bytes; none of a topic that is only counted."""
+"""Number of the message, log time, publish time, bytes; none for a topic that is only counted."""
 
 
 class Progress(NamedTuple):
-    """Called with the bytes read, now and then; and whether to stop."""
+    """Called now and then with the number of bytes read; returns whether to stop."""
 
     told: Callable[[int], None] = lambda _read: None
     stopped: Callable[[], bool] = lambda: False
@@ -140,15 +140,15 @@ class Blocks:
     """
     Reads a bag block by block, and counts.
 
-    A block ends between two ticks: messages of one log time are in one, unless they are more than
-    any tick has.
+    A block ends between two ticks: messages of one log time stay in one block, unless there are
+    more than any tick has.
 
     Parameters
     ----------
     bag
-        The bag. Where it is damaged, what lies before the damage is read.
+        The bag. If it is damaged, the part before the damage is read.
     wanted
-        Topics whose messages are wanted, not their counts alone.
+        Topics whose messages are needed; messages of others are only counted.
     progress
         Receives the progress, and says whether to stop.
 
@@ -161,7 +161,7 @@ class Blocks:
         self._read = 0
 
     def __iter__(self) -> Iterator[Mapping[str, list[Entry]]]:
-        """Yield block by block the messages of each wanted topic."""
+        """Yield the messages of each wanted topic, block by block."""
         wanted = self._wanted
         found: dict[str, list[Entry]] = {}
         others: dict[str, list[tuple[int, int]]] = {}
@@ -188,7 +188,7 @@ class Blocks:
             yield self._counted(found, others)
 
     def contents(self) -> Contents:
-        """Return what has been read."""
+        """Return the counts of what has been read."""
         topics = {topic.name: topic for topic in self._bag.topics}
         rows = tuple(
             TopicContents(
@@ -216,7 +216,7 @@ class Blocks:
         found: Mapping[str, list[Entry]],
         others: Mapping[str, list[tuple[int, int]]],
     ) -> Mapping[str, list[Entry]]:
-        """Count a block, tell of it, and return what is wanted of it."""
+        """Count a block, report progress, and return the entries of wanted topics."""
         for name, entries in found.items():
             self._count(name, [(logged, len(data)) for _, logged, _, data in entries])
         for name, sizes in others.items():
@@ -236,19 +236,19 @@ class Blocks:
 
 KINDS = ('samples', 'faults', 'withheld', 'resets', 'states', 'health')
 _OTHER_RECORDER = 'health'
-"""Topics that another thread records; the clock of the run does not follow them."""
+"""Topics recorded by another thread; run time does not follow them."""
 
 
 class Rows(NamedTuple):
     """
-    Messages of a kind in a block.
+    Messages of one kind in a block.
 
     Attributes
     ----------
     numbers
-        Theirs, in the block.
+        Their numbers in the block.
     logged, published, passed
-        Their times, in [ns], and that of the run.
+        Their log and publish times and their run time, in [ns].
     data
         Their bytes.
 
@@ -275,11 +275,11 @@ def rows_of(
     block
         The messages of each topic.
     topics
-        The kind of each; others are left out.
+        Kind of each topic; topics without one are left out.
     own
-        Tells the run's own joint states from the samples, where these share their topic.
+        Distinguishes the run's joint states from the samples if they share a topic.
     clock
-        The run's.
+        The clock of the run.
 
     """
     kinds: dict[str, list[Entry]] = {kind: [] for kind in KINDS}

@@ -14,20 +14,20 @@
 
 
 """
-The curves of a run: joint states, poses for the moving picture, input ages and tick lateness.
+The curves of a run: joint states, poses for the animation, input ages and tick lateness.
 
-Lateness is computed from the times of the ticks alone. With the period T, the tick with number i
-of those that follow each other, at the time tᵢ, is off an even row by eᵢ = tᵢ − i·T. A tick is due
-on the row of the most punctual ticks shortly before it and shortly after it, b and a; where these
-are rows apart, on the later one::
+Lateness follows from the tick times alone. With the period T, the i-th of consecutive ticks, at
+the time tᵢ, deviates from an even row by eᵢ = tᵢ − i·T. A tick is due on the row of the most
+punctual ticks within a window before it (b) and after it (a); where these differ by whole rows,
+on the later row::
 
     lateness = eᵢ − min(b, a)   where |a − b| < T/2, else eᵢ − max(b, a)
 
-So late ticks that run one after the other are late until they have caught up, and lost ticks
-shift the row: ticks before them keep the old row, ticks after them have the new one. At the
-beginning and the end of a run there is only one side. A delay that all ticks nearby have in common
-cannot be seen. The least within a window is found in two sweeps (M. van Herk, *A fast algorithm
-for local minimum and maximum filters*, 1992).
+So consecutive late ticks are late until they have caught up. Lost ticks shift the row: ticks
+before them keep the old row, ticks after them have the new one. At the beginning and the end of a
+run there is only one side. A delay that all ticks of the window share cannot be seen. The minimum
+within a window is found in two sweeps (M. van Herk, *A fast algorithm for local minimum and
+maximum filters*, 1992).
 """
 
 from __future__ import annotations
@@ -56,22 +56,22 @@ from linkage_ros.scene.scene import Scene
 import numpy as np
 
 _WINDOW = 0.25
-"""In [s]: farther away the clocks have drifted, and nearer ticks may still be catching up."""
+"""Window, in [s]: in a wider one the clocks drift, in a narrower one ticks still catch up."""
 
 _FEWEST, _MOST_TICKS = 32, 4096
 
 _NONE = 2**62
-"""In [ns]: where there is nothing to be the least."""
+"""In [ns]: stands for the minimum of no values."""
 
 
 class Lateness:
     """
-    The lateness of ticks, as they come.
+    Computes the lateness of ticks as they come.
 
     Parameters
     ----------
     rate
-        Ticks a second, in [Hz], more than 0.
+        Tick rate, in [Hz], more than 0.
 
     """
 
@@ -81,20 +81,20 @@ class Lateness:
         self._begin: int | None = None
         self._number = 0
         self._ended = False
-        # The last window of those that are done, and all that are not.
+        # The last window of the finished ticks, and all unfinished ones.
         self._times = np.empty(0, np.int64)
         self._off = np.empty(0, np.int64)
         self._done = 0
 
     def add(self, times: Times) -> tuple[Times, Times]:
-        """Take times of ticks, in [ns]; return those whose lateness is known by now, and it."""
+        """Add tick times, in [ns]; return the times with known lateness so far, and that."""
         if not len(times):
             return self._found(0)
         if self._begin is None:
             self._begin = int(times[0])
         numbers = np.arange(self._number, self._number + len(times))
         self._number += len(times)
-        # In whole numbers: of long runs, or behind a long pause, a double loses the nanoseconds.
+        # Integers: in long runs, or after a long pause, a double loses the nanoseconds.
         whole, part = divmod(self._period, 1.0)
         due = numbers * int(whole) + np.rint(numbers * part).astype(np.int64)
         self._times = np.concatenate([self._times, times])
@@ -102,7 +102,7 @@ class Lateness:
         return self._found(max(0, len(self._off) - self._window - self._done))
 
     def end(self) -> tuple[Times, Times]:
-        """Return what is left; nothing is to be added after it."""
+        """Return the rest; nothing may be added after it."""
         self._ended = True
         return self._found(len(self._off) - self._done)
 
@@ -118,7 +118,7 @@ class Lateness:
         return times, late
 
     def _due(self) -> Times:
-        """Return the even row that each tick belongs to."""
+        """Return the even row of each tick."""
         before, after = _least_around(self._off, self._window)
         few, n = self._window // 4, len(self._off)
         if self._number == n:
@@ -133,7 +133,7 @@ class Lateness:
 
 
 def _least_around(values: Times, window: int) -> tuple[Times, Times]:
-    """Return the least of each value and so many before it, and of it and so many after it."""
+    """Return the minimum of each value and so many before it, and of it and so many after it."""
     size = window + 1
     n = len(values)
     padded = np.full(-(-n // size) * size + size, _NONE)
@@ -149,10 +149,10 @@ def _least_around(values: Times, window: int) -> tuple[Times, Times]:
 
 
 MOST_LINKAGES = 16
-"""Those that move in a picture."""
+"""Kinds of bodies that move in the animation."""
 
 UNITS = {'position': ('rad', 'm'), 'rate': ('rad/s', 'm/s'), 'effort': ('N·m', 'N')}
-"""Of each quantity where the joint turns, and where it slides."""
+"""Unit of each quantity, for a revolute and for a prismatic joint."""
 
 NO_ROOM = 'curves for which there is no room'
 
@@ -161,23 +161,23 @@ LATENESS, AGE = Column('tick', 'lateness', 'ms'), Column('input', 'age', 'ms')
 
 class Kept:
     """
-    Curves that share their times, as far as they are within a window.
+    Curves with common times, within a window.
 
     Parameters
     ----------
     title
-        What they are of.
+        Title of the group.
     columns
-        What each tells.
+        The columns of a row.
     space
-        How much of them may come onto a page, in [bytes].
+        Size limit on the page, in [bytes].
     window
-        The part of the run that is shown.
+        The part of the run to show.
 
     Attributes
     ----------
     left_out
-        How many columns there is no room for, behind the others.
+        Number of columns beyond the size limit; they are the last ones.
 
     """
 
@@ -190,14 +190,14 @@ class Kept:
         self._rows = 0
 
     def add(self, times: Times, values: Numbers) -> None:
-        """Add rows, in the time of the run in [ns]."""
+        """Add rows at run times in [ns]."""
         since, until = self._window
         within = (times >= since) & (times <= until)
         self._rows += int(within.sum())
         self._kept.add(times[within], values[within, : len(self._columns)])
 
     def curves(self) -> Curves | None:
-        """Return the curves that there are; nothing without rows."""
+        """Return the curves; None without rows."""
         found = self._kept.intervals()
         told = [not np.isnan(column).all() for column in found.first.T]
         if not any(told):
@@ -208,7 +208,7 @@ class Kept:
 
 
 def joint_columns(names: Sequence[str], turning: Sequence[bool]) -> list[Column]:
-    """Return the columns of joints: positions, rates, and efforts, in the order of a message."""
+    """Return the columns of joints: positions, rates and efforts, in the order of a message."""
     return [
         Column(name, quantity, units[not turns])
         for quantity, units in UNITS.items()
@@ -218,18 +218,18 @@ def joint_columns(names: Sequence[str], turning: Sequence[bool]) -> list[Column]
 
 class SceneCurves:
     """
-    Collects what is drawn of a run.
+    Collects the curves of a run.
 
     Parameters
     ----------
     scene
         The scene.
     topics
-        Names of the topics of the joint states and of the crank.
+        Topics of the joint states and of the crank.
     bodies
-        How many links there are to be moved in the picture.
+        Number of links that move in the animation.
     window
-        The part of the run that is shown.
+        The part of the run to show.
 
     """
 
@@ -258,12 +258,12 @@ class SceneCurves:
         moving = scene.members[:MOST_LINKAGES]
         names = (name for each in moving for name in (*each.inputs, *each.joints))
         self._places = {name: place for place, name in enumerate(dict.fromkeys(names))}
-        # Beside the values the frames of the links come onto the page, three numbers each, and by
-        # how much they are apart.
+        # Beside the joint values, the page holds three numbers for the frame of each link, and the
+        # distance by which loops are open.
         size = 8 * (1 + len(self._places)) + 12 * bodies + 4 * len(moving)
         most = min(MOST_FRAMES, FRAME_BYTES // size)
         self._frames = Decimation(len(self._places), max(2, most - most % 2))
-        # The joints of a scene stand in the order of its linkages.
+        # The joints of a scene are in the order of its linkages.
         self._joints = [self._places[name] for each in moving for name in each.joints]
 
     def add_states(
@@ -275,11 +275,11 @@ class SceneCurves:
         Parameters
         ----------
         times
-            In the time of the run, in [ns].
+            Run times, in [ns].
         numbers
-            As `JointBlock.numbers` has them.
+            See `JointBlock.numbers`.
         inputs
-            Where driven joints were, by the samples, with their names.
+            Values of driven joints from the samples, by name.
 
         """
         self._states.add(times, numbers.reshape(len(times), numbers.shape[1] * numbers.shape[2]))
@@ -287,7 +287,7 @@ class SceneCurves:
         for names, angles in inputs:
             if names[0] in self._places:
                 values[:, [self._places[name] for name in names]] = angles
-        # What is published goes before what a sample said.
+        # Published values have priority over those of samples.
         positions = numbers[:, 0, : len(self._joints)]
         there = ~np.isnan(positions)
         under = values[:, self._joints]
@@ -300,17 +300,17 @@ class SceneCurves:
         self._samples.add(times, numbers.reshape(len(times), numbers.shape[1] * numbers.shape[2]))
 
     def add_ticks(self, times: Times) -> None:
-        """Add ticks, at which something was published or not, in the time of the run in [ns]."""
+        """Add the run times of ticks, in [ns], whether or not they published anything."""
         if self._lateness is not None:
             self._add_late(*self._lateness.add(times))
 
     def add_ages(self, times: Times, ages: Times) -> None:
-        """Add how old the input was at ticks, in [ns]."""
+        """Add the ages of the input at ticks, in [ns]."""
         self._ages.add(times, _milliseconds(ages))
         self.age.add(ages[self._within(times)])
 
     def end(self) -> tuple[list[Curves], Frames]:
-        """Return all that was collected; nothing is to be added after it."""
+        """Return the curves and frames; nothing may be added after it."""
         if self._lateness is not None:
             self._add_late(*self._lateness.end())
         kept = (self._states, self._samples, self._lates, self._ages)
@@ -320,7 +320,7 @@ class SceneCurves:
 
     @property
     def left_out(self) -> dict[tuple[str, str], int]:
-        """Return of how many curves there is no room for, by what they are of, and why."""
+        """Return the number of curves beyond the size limit, by title and reason."""
         return {
             (what, NO_ROOM): kept.left_out
             for what, kept in (('joint states', self._states), ('samples', self._samples))

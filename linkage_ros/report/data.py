@@ -14,16 +14,16 @@
 
 
 """
-A run as the data of its page: numbers as base64 of their bytes, least significant first.
+The data of a report page; arrays are base64 of their bytes, least significant byte first.
 
-All data are bounded, whatever the length of the run (see `linkage_ros.report.decimation`).
+The size is bounded, whatever the length of the run (see `linkage_ros.report.decimation`).
 
-Links are positioned by the recorded joints, for many instants at once. They hang on each other by
-the published joints, like those of a robot model (`linkage_ros.robot_models.tree`), and each is
-turned by its own recorded value. The loops are not solved: where a sensor is wrong, or late
-against another, links that share a pin come apart there, and the page shows by how much. Where the
-published joints do not determine the position of a link, the loops are closed at the recorded
-inputs instead.
+Links are positioned by the recorded joints, for many instants at once. They form a tree of the
+published joints, as in a robot model (`linkage_ros.robot_models.tree`), and each link is turned by
+its own recorded value. The loops are not solved: where a sensor is wrong or late relative to
+another, links that share a pin come apart there, and the page shows the distance. If the published
+joints do not determine the position of a link, the loops are closed at the recorded inputs
+instead.
 """
 
 from __future__ import annotations
@@ -48,27 +48,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 _FARTHEST = 1e30
-"""In [m] or [rad]: what is beyond it is none of a machine, and no number of the page's."""
+"""In [m] or [rad]: larger values are implausible, and not written to the page."""
 
 Places = Any
-"""Array of complex numbers: places in [m], or directions."""
+"""Array of complex numbers: positions in [m], or directions."""
 
 
 class Poses(NamedTuple):
     """
-    Where the links stand.
+    Poses of the links.
 
     Attributes
     ----------
     links
-        Those that move, and the blocks of sliders that are none.
+        The moving links, and the blocks of sliders, which are no links.
     frames
-        Of shape (instants, links, 3): where the frame of a link is, in [m], and its angle, in
-        [rad], in (−π, π]; NaN where it is unknown.
+        Position, in [m], and angle, in (−π, π] rad, of each link's frame, of shape
+        (instants, links, 3); NaN where it is unknown.
     apart
-        The farthest that two links miss a pin, or a point its line, in [m]; NaN likewise.
+        Largest distance between links at a pin, or of a point from its line, in [m]; or NaN.
     untold
-        Why the loops were closed instead; '' where every link stands by recorded joints.
+        Why the loops were closed instead; '' if recorded joints determine every link.
 
     """
 
@@ -79,24 +79,24 @@ class Poses(NamedTuple):
 
 
 _Found = dict[str, tuple[Places, Places]]
-"""Of each link the place of its frame, and its direction."""
+"""For each link the position of its frame, and its direction."""
 
 
 def poses(
     closure: Closure, prefix: str, values: Mapping[str, Numbers], inputs: Sequence[str]
 ) -> Poses:
     """
-    Return where the links stand.
+    Return the poses of the links.
 
     Parameters
     ----------
     closure
         The linkage.
     prefix
-        What its joints have before their own names in messages.
+        Prefix of its joints' names in messages.
     values
-        By the names in messages what the joints are at, in [rad] or [m]; NaN where unknown. All
-        of one length; the inputs are among them.
+        Joint values by name in messages, in [rad] or [m]; NaN where unknown. All have one length;
+        the inputs are among them.
     inputs
         Names of the driven joints in messages.
 
@@ -121,7 +121,7 @@ def poses(
         frames[:, number, 0] = place.real
         frames[:, number, 1] = place.imag
         frames[:, number, 2] = np.angle(way)
-    # A link is drawn with the others of its linkage, or not at all.
+    # If one link of a linkage is unknown, none is drawn.
     frames[np.isnan(frames).any(axis=(1, 2))] = np.nan
     apart = _apart(closure, found, count)
     apart[np.isnan(frames).any(axis=(1, 2))] = np.nan
@@ -199,12 +199,12 @@ Plot = dict[str, Any]
 
 def page_data(run: Run, wrapped: bool) -> dict[str, Any]:
     """
-    Return the data of a page, as JSON has it.
+    Return the data of a page, as JSON holds them.
 
     Parameters
     ----------
     run
-        What the bag holds.
+        The run.
     wrapped
         Whether published angles jump from π to −π.
 
@@ -235,11 +235,11 @@ def page_data(run: Run, wrapped: bool) -> dict[str, Any]:
 
 
 def lanes(run: Run) -> dict[str, Lane]:
-    """Return the lanes on which something is, in the order of the page."""
-    found = dict(run.lanes)
+    """Return the lanes that have events, in the order of the page."""
+    shown = dict(run.lanes)
     silent = [each.silent for each in run.linkages]
     if silent:
-        # Of several linkages each has its own; one of one name is told of all.
+        # Each linkage has its own silences; one lane shows those of all.
         merged = Lane(APART)
         spans = [
             (s.begin, s.end, each.name, s.count)
@@ -249,14 +249,14 @@ def lanes(run: Run) -> dict[str, Lane]:
         for span in sorted(spans):
             merged.add(*span)
         merged.count = sum(lane.count for lane in silent)
-        found['silent'] = merged
-    return {key: found[key] for key in LANES if key in found and found[key].count}
+        shown['silent'] = merged
+    return {key: shown[key] for key in LANES if key in shown and shown[key].count}
 
 
 def plots(run: Run) -> list[Plot]:
-    """Return the plots over time: of each the curves, by number and column, and the unit."""
+    """Return the plots over time: for each its curves, by number and column, and its unit."""
     found: dict[str, Plot] = {}
-    # The crank first: all else goes by it.
+    # The crank comes first: everything else depends on it.
     driven = {name for linkage in run.linkages for name in linkage.inputs}
     order = sorted(
         (
@@ -274,7 +274,7 @@ def plots(run: Run) -> list[Plot]:
         plot = found.setdefault(
             key, {'key': key, 'title': title, 'unit': column.unit, 'curves': []}
         )
-        # What is on two topics is told apart by the topic.
+        # If a joint is on two topics, the topic is shown as well.
         twice = number and (column.name, column.quantity) in published
         foreign = not run.linkages and len(run.curves) > 1
         topic = f' on {run.curves[number].title}' if twice or foreign else ''
@@ -283,16 +283,16 @@ def plots(run: Run) -> list[Plot]:
 
 
 def _curves(curves: Curves) -> dict[str, Any]:
-    found = curves.intervals
-    single = found.rows == 1
+    intervals = curves.intervals
+    single = intervals.rows == 1
     return {
         'title': curves.title,
-        'rows': found.rows,
+        'rows': intervals.rows,
         'of': curves.rows,
-        'begins': _seconds(found.begins),
-        'ends': None if single else _seconds(found.ends),
-        'first': [_packed(column, '<f8') for column in found.first.T],
-        'second': None if single else [_packed(column, '<f8') for column in found.second.T],
+        'begins': _seconds(intervals.begins),
+        'ends': None if single else _seconds(intervals.ends),
+        'first': [_packed(column, '<f8') for column in intervals.first.T],
+        'second': None if single else [_packed(column, '<f8') for column in intervals.second.T],
     }
 
 
@@ -314,7 +314,7 @@ def _linkages(linkages: Sequence[LinkageRun], frames: Frames) -> list[dict[str, 
 
 
 def _drawn(closure: Closure, space: int) -> tuple[dict[str, Any] | None, int, str]:
-    """Return how a linkage is drawn and what that takes, in [bytes], or why it is not."""
+    """Return the drawing of a linkage and its size in [bytes], or why there is none."""
     try:
         drawn = drawn_in_frames(view(closure, usual_inputs(closure)))
         size = size_in_json(drawn)
@@ -345,18 +345,18 @@ def _spans(lane: Lane) -> list[list[Any]]:
     return [[s.begin / 1e9, s.end / 1e9, s.count, s.text] for s in lane.in_order]
 
 
-def _histogram(found: Histogram) -> dict[str, Any]:
-    """Return the bins on which something is, and their edges in [s]."""
-    counts = found.counts
+def _histogram(histogram: Histogram) -> dict[str, Any]:
+    """Return the bins that are not empty, and their edges in [s]."""
+    counts = histogram.counts
     (places,) = np.nonzero(counts)
     first, end = int(places[0]), int(places[-1]) + 1
     last_edge = end + 1
-    edges = [0.0, *(edge / 1e9 for edge in EDGES), max(found.greatest, EDGES[-1]) / 1e9]
+    edges = [0.0, *(edge / 1e9 for edge in EDGES), max(histogram.greatest, EDGES[-1]) / 1e9]
     return {
         'counts': counts[first:end].tolist(),
         'edges': edges[first:last_edge],
-        'percentiles': {f'p{p}': found.percentile(p) / 1e9 for p in (50, 90, 99)},
-        'greatest': found.greatest / 1e9,
+        'percentiles': {f'p{p}': histogram.percentile(p) / 1e9 for p in (50, 90, 99)},
+        'greatest': histogram.greatest / 1e9,
     }
 
 
@@ -369,7 +369,7 @@ def _packed(values: ArrayLike, kind: str) -> str:
 
 
 def facts_of_thinning(run: Run) -> Iterator[str]:
-    """Yield in words how much of a run is on its page."""
+    """Yield the decimation of the curves, in words."""
     whole = [curves for curves in run.curves if curves.intervals.rows == 1]
     for curves in run.curves:
         what = {'lateness': 'the lateness of ', 'age': 'the age of the input at '}.get(

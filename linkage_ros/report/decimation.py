@@ -14,15 +14,15 @@
 
 
 """
-Runs of any length in bounded memory, and the size limits of a page.
+Bounded memory for runs of any length, and the size limits of a page.
 
-A curve becomes a bounded number of intervals that keep minima and maxima. While there is space,
-each interval is one row. When there is none, two neighbours become one, and from then on an
-interval takes twice as many rows: its least and its greatest value stay, in the order in which
-they came. So the length of a run need not be known beforehand. Rows at equal steps are decimated
-likewise, and durations are counted in bins.
+A curve becomes a bounded number of intervals that keep minima and maxima. At first each interval
+is one row. When the intervals are full, neighbours are merged in pairs, and from then on an
+interval takes twice as many rows; its minimum and maximum stay, in the order in which they came.
+So the length of a run need not be known in advance. Rows at equal steps are decimated in the same
+way, and durations are counted in bins.
 
-Numbers go onto a page as base64, which takes 4 bytes for 3.
+Numbers are written to a page as base64, which takes 4 bytes for 3.
 """
 
 from __future__ import annotations
@@ -40,27 +40,27 @@ Flags = NDArray[np.bool_]
 
 
 PAGE_BYTES = 20_000_000
-"""No page is larger, in [bytes], however long the run; a quarter of it is the plotting library."""
+"""Size limit of a page, in [bytes]; a quarter of it is the plotting library."""
 
 STATE_BYTES, SAMPLE_BYTES, DURATION_BYTES, FRAME_BYTES = 3_600_000, 1_500_000, 500_000, 2_500_000
 """
-The numbers, in [bytes], before they are text.
+Size limits of the numbers, in [bytes], before encoding.
 
-Of the curves of joints and of the crank, of lateness and of age (each), and of the instants of the
-moving picture with the places of the links.
+One each for the curves of joints and of the crank, of lateness and of age, and for the instants of
+the animation with the poses of the links.
 """
 
 MOST_FRAMES = 20_000
 
 SHAPE_BYTES = 500_000
-"""The shapes of the linkages, in [bytes]."""
+"""Size limit of the shapes of the linkages, in [bytes]."""
 
 TABLE_BYTES = 600_000
-"""The tables, in [bytes]."""
+"""Size limit of the tables, in [bytes]."""
 
 
 _FEWEST_INTERVALS = 256
-"""Intervals, below which a curve tells nothing."""
+"""Minimum number of intervals of a useful curve."""
 
 
 class Intervals(NamedTuple):
@@ -70,12 +70,12 @@ class Intervals(NamedTuple):
     Attributes
     ----------
     rows
-        How many rows an interval is made of; the last may have fewer. Of 1 all rows are there.
+        Rows of an interval; the last may have fewer. If it is 1, all rows are kept.
     begins, ends
         Time of the first and the last row of each, in [ns].
     first, second
-        Of each interval and column the least and the greatest value, that which came first first;
-        NaN where there is none. The same where an interval is one row.
+        Minimum and maximum of each interval and column, in the order in which they came; NaN if
+        there is none. Equal if an interval is one row.
 
     """
 
@@ -87,27 +87,27 @@ class Intervals(NamedTuple):
 
 
 def most_columns(space: int) -> int:
-    """Return how many curves may share so much space, in [bytes]."""
+    """Return the maximum number of curves for a size limit, in [bytes]."""
     return space // (16 * _FEWEST_INTERVALS) - 1
 
 
 def capacity(columns: int, space: int) -> int:
-    """Return into how many intervals so many curves go that share so much space, in [bytes]."""
-    # Of each interval two times, and two values of each curve, of 8 bytes each.
+    """Return the number of intervals of so many curves for a size limit, in [bytes]."""
+    # Per interval two times, and per curve two values, of 8 bytes each.
     most = space // (16 * columns + 16)
     return 1 << (most.bit_length() - 1)
 
 
 class MinMaxCurve:
     """
-    Curves that grow.
+    Curves that grow row by row.
 
     Parameters
     ----------
     columns
-        How many.
+        Number of curves.
     most
-        How many intervals there may be, a power of two; of single rows twice as many.
+        Maximum number of intervals, a power of two; twice as many for single rows.
 
     """
 
@@ -119,7 +119,7 @@ class MinMaxCurve:
         self._ends = np.empty(2 * most, np.int64)
         self._first = np.empty((2 * most, columns))
         self._second = np.empty((2 * most, columns))
-        # The interval that is not full: of how many rows, and their least and greatest so far.
+        # The open interval: its rows so far, and their minimum and maximum.
         self._open = 0
         self._ends_of_open = [0, 0]
         self._pair = np.empty((2, columns))
@@ -131,9 +131,9 @@ class MinMaxCurve:
         Parameters
         ----------
         times
-            In [ns], of shape (n,).
+            Times in [ns], of shape (n,).
         values
-            Of shape (n, columns); NaN where there is none.
+            Values, of shape (n, columns); NaN for a missing value.
 
         """
         at = 0
@@ -157,7 +157,7 @@ class MinMaxCurve:
             at = end
 
     def intervals(self) -> Intervals:
-        """Return the curves; nothing is to be added after it."""
+        """Return the curves; nothing may be added after it."""
         if self._open:
             self._close()
         n = self._count
@@ -166,7 +166,7 @@ class MinMaxCurve:
         )
 
     def _go_on(self, times: Times, values: Numbers) -> None:
-        """Add rows to the open interval, or begin one; it is closed where it is full."""
+        """Add rows to the open interval, or begin one; close it when it is full."""
         if self._open:
             values = np.concatenate([self._pair, values])
         else:
@@ -192,26 +192,26 @@ class MinMaxCurve:
         if times.shape[1] == 1:
             self._first[start:end] = self._second[start:end] = values
         else:
-            found = _least_and_greatest(values.reshape(count, -1, values.shape[1]))
-            self._first[start:end], self._second[start:end] = found
+            extremes = _least_and_greatest(values.reshape(count, -1, values.shape[1]))
+            self._first[start:end], self._second[start:end] = extremes
         self._count = end
 
     def _merge(self) -> None:
-        """Make one interval of every two."""
+        """Merge intervals in pairs."""
         n = self._count
         half = n // 2
         self._begins[:half] = self._begins[0:n:2]
         self._ends[:half] = self._ends[1:n:2]
         both = np.stack([self._first[:n], self._second[:n]], axis=1)
-        found = _least_and_greatest(both.reshape(half, 4, -1))
-        self._first[:half], self._second[:half] = found
+        extremes = _least_and_greatest(both.reshape(half, 4, -1))
+        self._first[:half], self._second[:half] = extremes
         self._count = half
         self._rows *= 2
 
 
 def _least_and_greatest(values: Numbers) -> tuple[Numbers, Numbers]:
     """
-    Return of groups of rows the least and the greatest value, that which came first first.
+    Return minimum and maximum of groups of rows, in the order in which they came.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def _least_and_greatest(values: Numbers) -> tuple[Numbers, Numbers]:
     none = np.isnan(values)
     low = np.where(none, np.inf, values).argmin(axis=1)[:, None]
     high = np.where(none, -np.inf, values).argmax(axis=1)[:, None]
-    # Among NaN and infinities alone the places found may hold a NaN beside a number.
+    # With only NaN and infinities, an index found may point at a NaN beside a number.
     least = np.fmin.reduce(values, axis=1)
     greatest = np.fmax.reduce(values, axis=1)
     rising = (low <= high)[:, 0]
@@ -233,19 +233,19 @@ def _least_and_greatest(values: Numbers) -> tuple[Numbers, Numbers]:
 
 class Decimation:
     """
-    Rows at equal steps.
+    Decimated rows at equal steps.
 
     Parameters
     ----------
     columns
-        How many.
+        Number of columns.
     most
-        How many rows there may be, an even number.
+        Maximum number of rows, an even number.
 
     Attributes
     ----------
     step
-        Of how many rows one is kept.
+        One row of so many is kept.
 
     """
 
@@ -276,12 +276,12 @@ class Decimation:
 
     @property
     def times(self) -> Times:
-        """Return the times of the rows that are kept, in [ns]."""
+        """Return the times of the kept rows, in [ns]."""
         return self._times[: self._count]
 
     @property
     def values(self) -> Numbers:
-        """Return the rows that are kept."""
+        """Return the kept rows."""
         return self._values[: self._count]
 
     def _halve(self) -> None:
@@ -295,14 +295,14 @@ class Decimation:
 
 _PER_DECADE = 10
 _FIRST, _LAST = 2, 12
-"""Powers of ten, in [ns], from which and up to which bins go."""
+"""Powers of ten, in [ns], of the first and last bin edge."""
 
 EDGES = [10 ** (_FIRST + i / _PER_DECADE) for i in range(_PER_DECADE * (_LAST - _FIRST) + 1)]
-"""Of the bins, in [ns]; below the first and above the last there is one more bin each."""
+"""Edges of the bins, in [ns]; one more bin lies below the first and one above the last."""
 
 
 class Histogram:
-    """Durations, counted."""
+    """Histogram of durations."""
 
     def __init__(self) -> None:
         self.counts = np.zeros(len(EDGES) + 1, np.int64)
@@ -310,11 +310,11 @@ class Histogram:
 
     @property
     def count(self) -> int:
-        """Return how many there are."""
+        """Return the number of durations."""
         return int(self.counts.sum())
 
     def add(self, durations: Times) -> None:
-        """Count durations, in [ns]."""
+        """Add durations, in [ns]."""
         if not len(durations):
             return
         least, greatest = int(durations.min()), int(durations.max())
@@ -325,7 +325,7 @@ class Histogram:
         self.counts += np.bincount(places, minlength=len(self.counts))
 
     def percentile(self, percent: float) -> float:
-        """Return what so many per cent do not exceed, to the upper edge of its bin, in [ns]."""
+        """Return a percentile, rounded up to the upper edge of its bin, in [ns]."""
         if not self.count:
             return 0.0
         place = int(np.searchsorted(np.cumsum(self.counts), self.count * percent / 100.0))

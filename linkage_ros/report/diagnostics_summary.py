@@ -14,10 +14,10 @@
 
 
 """
-What the diagnostics of a run add to its messages: lost ticks, drops and warnings.
+Lost ticks, drops and warnings from the diagnostics of a run.
 
-``diagnostic_msgs/msg/DiagnosticArray`` messages are read as bytes. The reader stands on its own:
-the messages of a bag may have been written by any program.
+``diagnostic_msgs/msg/DiagnosticArray`` messages are decoded here, with bounds: any program may
+have written the messages of a bag.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ DIAGNOSTIC_ARRAY = declared(
 )
 
 _MOST_ITEMS = 10_000
-"""Statuses of a message, and values of a status; what says to have more is damaged."""
+"""Maximum number of statuses of a message, and of values of a status; more means damage."""
 
 
 class Status(NamedTuple):
@@ -50,11 +50,11 @@ class Status(NamedTuple):
     level
         0 OK, 1 WARN, 2 ERROR, 3 STALE.
     name
-        Of the task.
+        Name of the task.
     message
-        In words.
+        Text of the status.
     values
-        By key, as text.
+        Texts by key.
 
     """
 
@@ -65,7 +65,7 @@ class Status(NamedTuple):
 
 
 def statuses(data: bytes) -> list[Status]:
-    """Return the statuses of a message; none of one that is damaged."""
+    """Return the statuses of a message; none if it is damaged."""
     try:
         found = parsed(data, DIAGNOSTIC_ARRAY, _MOST_ITEMS)['status']
     except MalformedError:
@@ -95,30 +95,30 @@ _COUNTED = {
     'Ticks at a toggle': ('told_toggle', ''),
     'Ticks beyond limits': ('told_limited', ''),
 }
-"""Counts that only grow, the lane that tells of it, and what it says."""
+"""Counters that only grow, with the lane and the text of their events."""
 
 _DROPPED = 'Dropped: '
 
 MOST_VALUES = 500
-"""Values that are remembered; our node says some sixty."""
+"""Maximum number of values kept; our node reports some sixty."""
 
 
 class DiagnosticsSummary:
     """
-    Follows the diagnostics.
+    Collects the diagnostics.
 
     Parameters
     ----------
     lanes
-        Where what happens is put, by kind: lost, told_open, told_toggle, told_limited, dropped
-        and health.
+        Lanes of the events, by kind: lost, told_open, told_toggle, told_limited, dropped and
+        health.
     from_beginning
-        Whether the bag holds the run from its beginning: where not, counts have begun before.
+        Whether the bag holds the beginning of the run; if not, counters do not start at 0.
 
     Attributes
     ----------
     said
-        The last values, by task and key; no more than `MOST_VALUES`.
+        The last values, by task and key; at most `MOST_VALUES`.
 
     """
 
@@ -129,7 +129,7 @@ class DiagnosticsSummary:
         self._counts: dict[tuple[str, str], int] = {}
 
     def take(self, message: bytes, time: int) -> None:
-        """Take a message, at a time of the run in [ns]."""
+        """Add a message at a run time in [ns]."""
         ours = [
             (task, status)
             for status in statuses(message)
@@ -163,7 +163,7 @@ class DiagnosticsSummary:
         count = int(value)
         known = self._counts.get(of, 0 if self._from_beginning else count)
         self._counts[of] = count
-        # Of a node that was started anew it begins at 0 again.
+        # A counter of a restarted node begins at 0 again.
         more = count - known if count >= known else count
         if more:
             self._lanes[lane].add(self._before, time, what, more)

@@ -14,9 +14,9 @@
 
 
 """
-The page of a run as HTML, with its tables; the scripts beside this file draw and move it.
+The report of a run as an HTML page with tables; the scripts beside this file draw its plots.
 
-Whatever the bag holds, the page has a size limit.
+The page has a size limit, whatever the bag holds.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ from linkage_ros.report.run import Curves, LinkageRun, Run
 import numpy as np
 
 _LONGEST = 200
-"""Letters of a cell."""
+"""Maximum number of characters of a cell."""
 
 _BESIDE_CELL, _BESIDE_ROW, _BESIDE_TABLE = 25, 10, 250
-"""What a page writes about each, or more, in [bytes]."""
+"""Upper bound of the HTML around each cell, in [bytes]."""
 
 
 class TableOf(NamedTuple):
@@ -56,13 +56,13 @@ class TableOf(NamedTuple):
     Attributes
     ----------
     title
-        What stands above it.
+        Its heading.
     columns
-        Headings; a leading ``>`` is for numbers.
+        Headings; a leading ``>`` marks a column of numbers.
     rows
         The cells.
     folded
-        Whether the reader has to open it.
+        Whether it is collapsed at first.
 
     """
 
@@ -73,7 +73,7 @@ class TableOf(NamedTuple):
 
 
 def tables_html(tables: Sequence[TableOf]) -> Iterator[str]:
-    """Yield tables as HTML, as far as there is room for them; and how much there is not."""
+    """Yield tables as HTML within the size limit; say how much is left out."""
     space = TABLE_BYTES
     for number, table in enumerate(tables):
         if not table.rows:
@@ -112,7 +112,7 @@ def _table(table: TableOf) -> Iterator[str]:
 
 
 def run_tables(run: Run) -> Iterator[TableOf]:
-    """Yield what there is to tell of a run in numbers."""
+    """Yield the tables of a run."""
     yield TableOf(
         'Curves',
         ('joint', 'quantity', '>least', '>greatest', 'unit', 'on'),
@@ -165,7 +165,7 @@ _SCRIPTS = [
 ]
 
 _LONGEST_FACT = 400
-"""Letters of a fact, or of a warning."""
+"""Maximum number of characters of a fact or a warning."""
 
 _SPEEDS = ('0.01', '0.1', '0.25', '0.5', '1', '2', '5', '10', '60')
 
@@ -177,7 +177,7 @@ class ReportHeader(NamedTuple):
     Attributes
     ----------
     title
-        Of the page.
+        Title of the page.
     facts
         The facts at its head.
     warnings
@@ -203,7 +203,7 @@ def run_html(run: Run, header: ReportHeader) -> str:
     Raises
     ------
     LinkageError
-        Where plotly is not installed, or the page would be larger than `PAGE_BYTES`.
+        If plotly is not installed, or the page would be larger than `PAGE_BYTES`.
 
     """
     data = page_data(run, header.wrapped)
@@ -277,7 +277,7 @@ def _events(run: Run) -> Iterator[str]:
     there = lanes(run)
     if there:
         yield _plot('events', 'Events')
-    # What is only told there may also be seen for itself.
+    # An event from the diagnostics alone may also be visible in the messages.
     missing = [
         title
         for key, (title, _) in LANES.items()

@@ -14,11 +14,11 @@
 
 
 """
-Many JointState messages at once, as arrays.
+Decode many JointState messages at once, as arrays.
 
-Messages of one publisher differ in their stamps and numbers alone. So they are laid below each
-other and taken column by column; where the layout changes, as at a toggle, whose rates are empty,
-those of one layout are taken together. What is no JointState is left out, and counted.
+Messages of one publisher differ only in stamps and numbers. They are stacked and decoded column by
+column. Where the layout changes, as at a toggle, whose rates are empty, messages of one layout are
+decoded together. Messages that are not a valid JointState are left out and counted.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ from numpy.typing import NDArray
 POSITION, RATE, EFFORT = range(3)
 
 _MOST_LAYOUTS = 64
-"""Of the messages of one length in a block; a publisher has a handful."""
+"""Maximum number of layouts per message length in a block; a publisher has a handful."""
 
 MOST_JOINTS = 64
-"""Of a topic; what has more is no machine whose joints one could look at."""
+"""Maximum number of joints of a topic; more is no machine that a page could show."""
 
 NOTHING = 'no joints or no numbers'
 TWICE = 'a joint named twice'
@@ -54,11 +54,11 @@ class JointBlock(NamedTuple):
     Attributes
     ----------
     good
-        Which of the messages were read, of shape (messages,); all else has a row for each.
+        Which messages were decoded, of shape (messages,); all other arrays have a row for each.
     stamps
-        In [ns]; 0 where it was not read.
+        In [ns]; 0 for a message that was not decoded.
     numbers
-        Of shape (messages, 3, joints): positions, rates and efforts; NaN where there is none.
+        Positions, rates and efforts, of shape (messages, 3, joints); NaN if missing.
 
     """
 
@@ -69,21 +69,21 @@ class JointBlock(NamedTuple):
 
 class JointStates:
     """
-    Reads the messages of a topic.
+    Decodes the messages of a topic.
 
     Parameters
     ----------
     joints
-        Those that come first; others follow as they turn up.
+        Joints that come first; others follow in the order of their appearance.
     others
-        Whether others may follow; where not, they are passed over.
+        Whether other joints may follow; if not, they are ignored.
 
     Attributes
     ----------
     joints
-        All that have turned up.
+        All joints so far.
     left_out
-        How many messages, or joints of messages, were left out, by reason.
+        Number of messages, or joints of messages, left out, by reason.
 
     """
 
@@ -130,7 +130,7 @@ class JointStates:
     def _alike(
         self, table: NDArray[np.uint8], first: bytes
     ) -> tuple[Flags, list[int], list[tuple[int, Numbers]], Times]:
-        """Return which rows are like the first, the columns of their joints, and their numbers."""
+        """Return the rows with the layout of the first, their joints' columns and numbers."""
         none = np.zeros(len(table), bool)
         none[0] = True
         found = arrays_of(first)
@@ -142,7 +142,7 @@ class JointStates:
         fixed = np.ones(table.shape[1], bool)
         fixed[4:12] = False
         for count_at, n, begin in arrays:
-            # Between a count and the first number there may be padding, with anything in it.
+            # Padding between a count and the first number may contain any bytes.
             after = count_at + 4
             end = begin + 8 * n
             fixed[after:end] = False
@@ -163,7 +163,7 @@ class JointStates:
         return alike, [self._column(name) for name in names], numbers, stamps
 
     def _column(self, encoded: bytes) -> int:
-        """Return the column of a joint; −1 where there is no room for it."""
+        """Return the column of a joint; −1 beyond the size limit."""
         name = encoded.decode('utf-8', 'backslashreplace')
         if name in self.joints:
             return self.joints.index(name)
@@ -174,10 +174,10 @@ class JointStates:
 
 
 def _unequal(found: tuple[str, list[bytes], Sequence[tuple[int, int, int]]]) -> str:
-    """Return why a message is left out whose arrays do not fit its names; '' where they do."""
+    """Return why a message whose arrays do not fit its names is left out; '' if they fit."""
     _, names, arrays = found
     counts = {n for _, n, _ in arrays} - {0}
-    # A command may have efforts alone.
+    # A command may have only efforts.
     if not names or not counts:
         return NOTHING
     if len(set(names)) < len(names):

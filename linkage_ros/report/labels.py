@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The words of a page: titles of lanes and plots, notes, durations."""
+"""Texts of a page: titles of lanes and plots, notes, durations."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ import json
 from typing import Any
 
 LONGEST_NAME = 80
-"""Letters of what others have named: topics and joints of bags, keys of diagnostics."""
+"""Maximum length of names from outside: topics and joints of bags, keys of diagnostics."""
 
 LANES = {
     'fault': ('fault injected', 'from its begin to its end, as its topic and the diagnostics say'),
@@ -40,7 +40,7 @@ LANES = {
     'jump': ('clock jumped back', 'the time of this page goes on from there'),
     'health': ('warnings, errors', 'of the diagnostics, by the period that they tell of'),
 }
-"""Of each lane its title, and what is on it; in the order of the page."""
+"""Title and description of each lane, in the order of the page."""
 
 QUANTITIES = {
     ('position', 'rad'): ('positions_rad', 'Angles'),
@@ -55,7 +55,7 @@ QUANTITIES = {
     ('lateness', 'ms'): ('lateness', 'How late ticks were'),
     ('age', 'ms'): ('age', 'How old the input was at a tick'),
 }
-"""Of each quantity, by its unit, the key and the title of its plot; in the order of the page."""
+"""Key and title of each quantity's plot, by unit, in the order of the page."""
 
 LATENESS_NOTE = (
     'Worked out from the times of the ticks: a tick is due a whole number of periods after the '
@@ -75,32 +75,32 @@ CLOSED_NOTE = (
 
 
 def short(text: str, most: int = LONGEST_NAME) -> str:
-    """Return a text of no more than so many letters."""
+    """Return a text of at most so many characters."""
     return text if len(text) <= most else f'{text[: most - 1]}…'
 
 
 def size_in_json(value: Any) -> int:
     """
-    Return what a value takes among a page's data, or more, in [bytes].
+    Return an upper bound of a value's size among a page's data, in [bytes].
 
     Raises
     ------
     ValueError
-        Where there is a number in it that is not finite.
+        If it contains a number that is not finite.
 
     """
-    # As here, each letter beyond ASCII by its number, it is longest; a page writes < so, too.
+    # Escaping all characters beyond ASCII gives the longest text; a page also escapes <.
     text = json.dumps(value, allow_nan=False)
     return len(text) + 5 * text.count('<')
 
 
 def seconds_text(time: int) -> str:
-    """Return a time of the run, in [ns], as seconds."""
+    """Return a run time, in [ns], as seconds."""
     return f'{time / 1e9:.6f}'.rstrip('0').rstrip('.')
 
 
 def duration_text(seconds: float) -> str:
-    """Return a duration with a unit that suits it."""
+    """Return a duration in a suitable unit."""
     for factor, unit in ((1.0, 's'), (1e3, 'ms'), (1e6, 'µs')):
         if abs(seconds) * factor >= 1.0:
             return f'{seconds * factor:.4g} {unit}'

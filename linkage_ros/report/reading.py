@@ -16,7 +16,7 @@
 """
 Read a bag once, from beginning to end, for its page; memory does not grow with the bag.
 
-A bag without a scene of ours is shown by all its topics of joint states, as they are.
+A bag without a scene of this package is shown by all its joint state topics, as they are.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ import numpy as np
 _TYPE = 'sensor_msgs/msg/JointState'
 _MOST_TOPICS = 6
 _DISORDER = 1_000_000_000
-"""How late a message may stand in a bag that others have written, in [ns]."""
+"""By how much a message may come late in a bag of another program, in [ns]."""
 
 _MORE_TOPICS = f'topics of joint states beyond the first {_MOST_TOPICS}'
 _LATER_JOINTS = 'messages with joints that turn up later'
@@ -50,14 +50,14 @@ _LATER_JOINTS = 'messages with joints that turn up later'
 
 class ForeignRun:
     """
-    Reads a bag block by block.
+    Reads a bag without a scene, block by block.
 
     Parameters
     ----------
     bag
         The bag.
     window
-        The part of the run that is shown.
+        The part of the run to show.
 
     """
 
@@ -70,14 +70,14 @@ class ForeignRun:
         self._kept: dict[str, Kept] = {}
         self._widths: dict[str, int] = {}
         self._lanes = {'jump': Lane(window=window)}
-        # Of several topics none is the one that must not be silent.
+        # Among several topics, none is known to publish all the time.
         if len(self._readers) == 1:
             self._lanes['silent'] = Lane(APART, window=window)
             self._silences = Silences(self._lanes['silent'], 0)
         self._later: dict[str, int] = {}
 
     def take(self, block: Mapping[str, list[Entry]]) -> None:
-        """Take the messages of a block."""
+        """Add the messages of a block."""
         entries = sorted(
             (*entry, topic) for topic in self.topics for entry in block.get(topic, ())
         )
@@ -93,7 +93,7 @@ class ForeignRun:
             if not len(times):
                 continue
             if topic not in self._kept:
-                # The unit is not said: it is that of what turns, or of what slides.
+                # The message has no unit; the joint may be revolute or prismatic.
                 columns = [
                     Column(short(name), quantity, ' or '.join(units))
                     for quantity, units in UNITS.items()
@@ -111,7 +111,7 @@ class ForeignRun:
                 self._silences.add(times)
 
     def end(self, contents: Contents) -> Run:
-        """Return what there is to tell; with the counts of all messages."""
+        """Return the run, with the counts of all messages."""
         if len(self._readers) == 1:
             self._silences.end(self._clock.end)
         found = [curves for kept in self._kept.values() if (curves := kept.curves()) is not None]
@@ -154,11 +154,11 @@ def read_run(
     bag
         The bag. If it is damaged, the part before the damage is shown.
     window
-        The part of the run that is shown.
+        The part of the run to show.
     progress
-        Receives the progress, and says whether to stop.
+        Called with the progress; returns whether to stop.
     scene_of
-        Gives the scene that a bag carries.
+        Returns the scene that a bag carries.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def read_run(
     scene
         Its scene, if it carries one.
     missing
-        Why there is none, or it cannot be built here; '' where all is there.
+        Why the scene is missing, or cannot be built here; '' if it is complete.
 
     """
     scene, missing = None, ''
@@ -176,7 +176,7 @@ def read_run(
         scene = scene_of(bag)
         reader = SceneRun(bag, run_account(bag), scene, window)
     except LinkageError as error:
-        # A page is handed on, and does not say where its bag lay.
+        # A page is passed on to others: it shows the bag's name, not its path.
         missing = f'{Path(error.where).name}: {error.reason}'
         reader = ForeignRun(bag, window)
     blocks = Blocks(bag, reader.topics, progress)

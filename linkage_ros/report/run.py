@@ -16,8 +16,8 @@
 """
 The contents of a report: the curves, the linkages, and events as spans on lanes.
 
-Events of one kind that follow each other closely are one span, with their number. Where there are
-more spans than a lane may have, the closest ones become one: none is lost from the count.
+Events of one kind that are close together form one span, with their number. If a lane would have
+too many spans, the closest ones are merged: the count stays complete.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ import numpy as np
 
 MOST_SPANS = 1000
 MOST_TEXT = 60_000
-"""How much the texts of a lane may take on a page, in [bytes]."""
+"""Size limit of the texts of a lane on a page, in [bytes]."""
 
 APART = -1
-"""How near are those that stay apart even where one begins as the other ends, in [ns]."""
+"""Value of ``near`` for events that never join, even if one begins when the other ends."""
 
 _LONGEST_TEXT = 120
 _MORE = ', and others'
@@ -48,16 +48,16 @@ _MORE = ', and others'
 @dataclass(slots=True)
 class Span:
     """
-    Things that happened one after the other.
+    Consecutive events.
 
     Attributes
     ----------
     begin, end
-        In [ns]; the same for an instant.
+        Run times in [ns]; equal for an instant.
     count
-        How many.
+        Number of events.
     text
-        Description of the first of them.
+        Description of the first event.
 
     """
 
@@ -69,29 +69,29 @@ class Span:
 
 class Lane:
     """
-    A kind of things that happen.
+    Events of one kind.
 
     Parameters
     ----------
     near
-        How far apart two may be, in [ns], and be one span.
+        Events closer than this form one span, in [ns].
     alike
-        Whether events with different texts join, too; the first text stays.
+        Whether events with different texts join, too; the first text is kept.
     longest
-        Whether, where there is no room for all, the longest spans stay, not all of them as one.
+        Whether the longest spans are kept if there are too many; if not, spans are merged.
     most
-        How many spans there may be.
+        Maximum number of spans.
     window
-        Begin and end, in [ns]; events outside are left out.
+        Begin and end, in [ns]; events outside are ignored.
 
     Attributes
     ----------
     count
-        How many there were.
+        Number of events.
     spans
         The spans, in the order in which they were added.
     near
-        As it has become.
+        The current value; it grows as spans are merged.
 
     """
 
@@ -113,11 +113,11 @@ class Lane:
 
     @property
     def in_order(self) -> list[Span]:
-        """Return the spans in the order of their begins; a span is added at its end."""
+        """Return the spans in the order of their begins; a span is added when it ends."""
         return sorted(self.spans, key=attrgetter('begin'))
 
     def add(self, begin: int, end: int, text: str = '', count: int = 1) -> None:
-        """Add what happened from then to then, in [ns]."""
+        """Add an event with begin and end, in [ns]."""
         if end < self._since or begin > self._until:
             return
         begin, end = max(begin, self._since), min(end, self._until)
@@ -133,12 +133,12 @@ class Lane:
             self._text = sum(size_in_json(span.text) for span in self.spans)
 
     def _joins(self, last: Span, begin: int, text: str) -> bool:
-        # What says something else is something else, unless there is no room for it.
+        # Events with different texts stay apart, unless there are too many spans.
         same = self._alike or text == last.text or last.text.endswith(_MORE)
         return same and last.begin <= begin and begin - last.end <= self.near
 
     def _half(self) -> list[Span]:
-        """Return half of the spans, or fewer."""
+        """Return at most half of the spans."""
         spans = self.in_order
         half = len(spans) // 2
         if self._longest:
@@ -164,26 +164,26 @@ def _join(last: Span, end: int, count: int) -> None:
 
 
 _SILENCE_FACTOR = 5
-"""How many times as far apart as is usual is silence."""
+"""A gap of so many usual periods is a silence."""
 
 _SHORTEST_SILENCE = 2_000_000
-"""In [ns]: no eye sees less."""
+"""Shortest silence that is shown, in [ns]: the eye sees no shorter one."""
 
 _MESSAGES_FOR_A_USUAL = 8
 
 
 class Silences:
     """
-    Looks for silences, block by block.
+    Finds silences, block by block.
 
     Parameters
     ----------
     lane
-        Where they are put.
+        The lane that receives them.
     period
-        In which messages are due, in [ns]; 0 where none is known.
+        Period of the messages, in [ns]; 0 if unknown.
     limit
-        From which on there is silence, in [ns]; 0 for what is longer than usual.
+        Shortest silence, in [ns]; 0 for a multiple of the usual period.
 
     """
 
@@ -193,12 +193,12 @@ class Silences:
         self._last: int | None = None
 
     def add(self, times: Times) -> None:
-        """Take messages, in the time of the run in [ns]."""
+        """Add messages at run times in [ns]."""
         if not len(times):
             return
-        # The time of a run begins at 0, whether or not something is published then.
+        # A run begins at 0, whether or not a message is published then.
         apart = np.diff(times, prepend=self._last or 0)
-        # What goes before the first message says nothing of how far they are apart.
+        # The gap before the first message does not count for the usual period.
         between = apart if self._last is not None else apart[1:]
         least = 1 if not (self._usual or self._period) else _MESSAGES_FOR_A_USUAL
         if len(between) >= least:
@@ -208,7 +208,7 @@ class Silences:
         self._last = int(times[-1])
 
     def end(self, time: int) -> None:
-        """Take the end of the run."""
+        """Add the end of the run."""
         last = 0 if self._last is None else self._last
         if self._last is None or time - last > self._longest:
             self._lane.add(last, time)
@@ -221,7 +221,7 @@ class Silences:
 
 
 class Window(NamedTuple):
-    """The part of a run that is shown, in the time of the run, in [ns]."""
+    """The part of a run to show, in run time, in [ns]."""
 
     since: int = 0
     until: int = 2**63 - 1
@@ -229,16 +229,16 @@ class Window(NamedTuple):
 
 class Column(NamedTuple):
     """
-    What a curve tells.
+    A column of a group of curves.
 
     Attributes
     ----------
     name
-        Of the joint, as messages have it.
+        Name of the joint in messages.
     quantity
         position, rate, effort, lateness or age.
     unit
-        Of its values.
+        Unit of its values.
 
     """
 
@@ -249,16 +249,16 @@ class Column(NamedTuple):
 
 class Curves(NamedTuple):
     """
-    Curves that share their times.
+    Curves with common times.
 
     Attributes
     ----------
     title
-        What they are of: a topic.
+        Their topic.
     columns
-        What each tells.
+        The columns of a row.
     rows
-        How many rows there were.
+        Number of rows.
     intervals
         The curves.
 
@@ -272,22 +272,22 @@ class Curves(NamedTuple):
 
 class LinkageRun(NamedTuple):
     """
-    A linkage of a scene, and what was recorded of it.
+    A linkage of a scene, as recorded.
 
     Attributes
     ----------
     name
-        Its name; '' where it is the only one.
+        Its name; '' if it is the only one.
     prefix
-        What its joints have before their own names.
+        Prefix of its joints' names.
     closure
-        As it is solved.
+        Its closure.
     inputs, joints
-        Names of the driven joints, and of the published ones, in messages.
+        Names of the driven and of the published joints in messages.
     input_units
-        Of the driven joints.
+        Units of the driven joints.
     silent
-        When nothing was published of it.
+        Spans in which none of it was published.
 
     """
 
@@ -302,16 +302,16 @@ class LinkageRun(NamedTuple):
 
 class Frames(NamedTuple):
     """
-    Instants of a run at which all joints are told, for the moving picture.
+    Instants of a run at which all joints are known, for the animation.
 
     Attributes
     ----------
     step
-        Of how many joint states there is one.
+        One joint state of so many is kept.
     times
-        In the time of the run, in [ns].
+        Run times, in [ns].
     values
-        By the names in messages the values of joints, in [rad] or [m]; NaN where there is none.
+        Joint values by name in messages, in [rad] or [m]; NaN if missing.
 
     """
 
@@ -328,27 +328,27 @@ class Run:
     Attributes
     ----------
     begin
-        The log time at which its time begins, in [ns]; None without messages.
+        Log time at run time 0, in [ns]; None without messages.
     end
-        The time of the run at its end, in [ns].
+        Run time at the end, in [ns].
     window
-        The part of it that is shown.
+        The part of the run to show.
     contents
-        Counts of all messages, and what is damaged.
+        Counts of all messages, and the damage.
     curves
         Joints, cranks, lateness and age over time.
     frames
-        For the moving picture; None without a scene.
+        Frames of the animation; None without a scene.
     linkages
-        Of the scene; none where there is none.
+        Linkages of the scene; empty without a scene.
     lanes
         The events, by kind.
     lateness, age
-        Their histogram; None where they are unknown.
+        Histograms; None if unknown.
     rejected
-        How many samples were rejected, by reason.
+        Number of rejected samples, by reason.
     left_out
-        How many messages, or joints of messages, could not be read, by topic and reason.
+        Number of messages, or joints of messages, that were not decoded, by topic and reason.
     said
         The values of the last diagnostics, by task and key.
 

@@ -14,10 +14,10 @@
 
 
 """
-The crank samples of a run: which were good, which were refused and why, and the crank angle.
+Crank samples of a run: the accepted ones, the rejected ones with reasons, and the crank angle.
 
-Each sample is offered to the scene's own pipeline, as in the run, so that it is refused for the
-same reason. The crank angle is that of the newest good sample, carried forward by its rate.
+Each sample is offered to the scene's own pipeline, as in the run, so that it is rejected for the
+same reason. The crank angle is that of the last accepted sample, extrapolated by its rate.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ import numpy as np
 
 class Crank:
     """
-    The driven joints of a linkage, by the newest good sample.
+    Driven joints of a linkage, by the last accepted sample.
 
     Parameters
     ----------
     member
         The linkage in its scene, driven from a topic.
     columns
-        Of its inputs among those of the samples.
+        Columns of its inputs among those of the samples.
 
     """
 
@@ -61,23 +61,23 @@ class Crank:
 
     def take(self, numbers: Times, stamps: Times, good: Flags, values: Numbers) -> Flags:
         """
-        Take samples; return which were for this linkage.
+        Add samples; return which were for this linkage.
 
         Parameters
         ----------
         numbers
-            Of the messages in their block, rising.
+            Message numbers in the block, increasing.
         stamps
-            Theirs, in [ns].
+            Their stamps, in [ns].
         good
-            Which were not refused.
+            Which samples were accepted.
         values
-            As `JointBlock.numbers` has them.
+            See `JointBlock.numbers`.
 
         """
         angles, rates = values[:, 0, self._columns], values[:, 1, self._columns]
         own: Flags = good & ~np.isnan(angles).any(axis=1)
-        # The last one of before stands before the first message of this block.
+        # The last sample of the block before precedes the first message of this one.
         self._number = np.concatenate([[-1], numbers[own]])
         self._stamp = np.concatenate([self._stamp[-1:], stamps[own]])
         self._angles = np.concatenate([self._angles[-1:], angles[own]])
@@ -86,14 +86,14 @@ class Crank:
 
     def at(self, numbers: Times, times: Times) -> tuple[Numbers, Times]:
         """
-        Return where the crank was at messages of the block, in [rad] or [m], and its stamp.
+        Return the crank's position at messages of the block, in [rad] or [m], and its stamp.
 
         Parameters
         ----------
         numbers
-            Of the messages in their block.
+            Message numbers in the block.
         times
-            That were solved for, in [ns].
+            Times that were solved for, in [ns].
 
         """
         places = np.searchsorted(self._number, numbers) - 1
@@ -106,7 +106,7 @@ class Crank:
 
 class SampleJudge:
     """
-    Separates good samples from refused ones.
+    Separates accepted samples from rejected ones.
 
     Parameters
     ----------
@@ -115,20 +115,20 @@ class SampleJudge:
     scene
         Its scene.
     from_beginning
-        Whether the bag holds the run from its beginning: where not, faults may be on already.
+        Whether the bag holds the beginning of the run; if not, faults may be on already.
 
     Attributes
     ----------
     listens
-        Whether the scene takes samples at all.
+        Whether the scene takes samples.
     rejected
-        How many were refused, by reason.
+        Number of rejected samples, by reason.
 
     """
 
     def __init__(self, bag: Bag, scene: Scene, from_beginning: bool) -> None:
         self._bag, self._scene = bag, scene
-        # Of the others it is not known yet whether they were on as the bag began.
+        # For other faults it is not yet known whether they were on at the beginning.
         self._known = {*(scene.faults if from_beginning else ())}
         self._pipeline = Pipeline(scene)
         self._last = 0
@@ -138,19 +138,19 @@ class SampleJudge:
 
     @property
     def pipeline(self) -> Pipeline:
-        """Return the scene at work, as it was built last."""
+        """Return the pipeline of the scene, as it was built last."""
         return self._pipeline
 
     def take(self, rows: Mapping[str, Rows], lanes: Mapping[str, Lane]) -> Flags:
         """
-        Return which samples of a block were good; in between, faults turn and all is forgotten.
+        Return which samples of a block were accepted; apply faults and resets between them.
 
         Parameters
         ----------
         rows
             The messages of the block, by kind.
         lanes
-            Where what happens is put: fault, reset and rejected.
+            Lanes of the events: fault, reset and rejected.
 
         """
         samples = rows['samples']
@@ -176,7 +176,7 @@ class SampleJudge:
         return good
 
     def hear(self, said: Mapping[tuple[str, str], str]) -> None:
-        """Take from what the diagnostics say, by task and key, which faults were on before."""
+        """Learn from the diagnostics, by task and key, which faults were on before."""
         for name in [name for name in self._scene.faults if name not in self._known]:
             state = said.get(('faults', short(self._fault(name))))
             if state:
@@ -185,12 +185,12 @@ class SampleJudge:
                 self._faults[name] = 0
 
     def end(self, time: int, lane: Lane) -> None:
-        """Put the faults that are still on onto their lane, to the end of the run."""
+        """Add the faults that are still on to their lane, to the end of the run."""
         for name, begun in self._faults.items():
             lane.add(begun, time, self._fault(name))
 
     def _offer(self, message: bytes, logged: int) -> Rejection | None:
-        """Offer a sample; return why it is refused."""
+        """Offer a sample to the pipeline; return why it is rejected, or None."""
         if logged < self._last:
             self._reset()
         self._last = logged
@@ -200,11 +200,11 @@ class SampleJudge:
         return rejection
 
     def _reset(self) -> None:
-        """Forget all, as the run has."""
+        """Reset all state, as the run did."""
         self._pipeline = Pipeline(self._scene, self._pipeline.closures, self._pipeline.injection)
 
     def _turn(self, message: bytes, time: int, lane: Lane) -> None:
-        """Turn a fault on or off, at a time of the run in [ns]; one that ends goes on its lane."""
+        """Switch a fault at a run time in [ns]; a fault that ends is added to its lane."""
         injection = self._pipeline.injection
         try:
             if injection is None:

@@ -38,16 +38,16 @@ import numpy as np
 
 def find_open_loop_spans(linkage: LinkageRun, times: Times, angles: Numbers, lane: Lane) -> None:
     """
-    Put samples at which a linkage does not close onto a lane.
+    Add samples at which a linkage does not close to a lane.
 
     Parameters
     ----------
     linkage
         The linkage.
     times
-        Of the samples, in the time of the run in [ns].
+        Run times of the samples, in [ns].
     angles
-        Where they have its driven joints, of shape (samples, inputs), in [rad] or [m].
+        Values of its driven joints, of shape (samples, inputs), in [rad] or [m].
     lane
         The lane.
 
@@ -55,10 +55,10 @@ def find_open_loop_spans(linkage: LinkageRun, times: Times, angles: Numbers, lan
     if not len(times):
         return
     status = linkage.closure.solve(*angles.T, derivatives=0).status
-    found = status >= CODES[Status.OPEN]
-    for time, given in zip(times[found].tolist(), angles[found].tolist(), strict=True):
+    is_open = status >= CODES[Status.OPEN]
+    for time, given in zip(times[is_open].tolist(), angles[is_open].tolist(), strict=True):
         text = ''
-        # The text is that of the first of those that are one span.
+        # The first of the joined events gives the text.
         if not lane.spans or time - lane.spans[-1].end > lane.near:
             position = linkage.closure.position(*given)
             text = f'{position.status.value}, the links miss by {position.gap:.3g} m'
@@ -71,7 +71,7 @@ LANES = (
 )  # fmt: skip
 
 _TOGETHER = 20_000_000
-"""How near to each other things of a kind are one, in [ns]."""
+"""Events of a kind that are closer than this form one span, in [ns]."""
 
 _ALIKE = ('open', 'toggle')
 _MOST_SILENCES = 400
@@ -80,19 +80,19 @@ _NOT_MOVING = f'linkages beyond the first {MOST_LINKAGES}, which have no moving 
 
 class SceneRun:
     """
-    Reads a run of a scene block by block.
+    Reads a run of a scene, block by block.
 
     Parameters
     ----------
     bag, run, scene
-        The bag, what its run says of itself, and its scene.
+        The bag, its run account and its scene.
     window
-        The part of the run that is shown.
+        The part of the run to show.
 
     Raises
     ------
     LinkageError
-        Where the scene cannot be built here.
+        If the scene cannot be built here.
 
     """
 
@@ -149,11 +149,11 @@ class SceneRun:
 
     @property
     def topics(self) -> set[str]:
-        """Return the topics whose messages are wanted."""
+        """Return the topics whose messages are needed."""
         return {*self._topics}
 
     def take(self, block: Mapping[str, list[Entry]]) -> None:
-        """Take the messages of a block."""
+        """Add the messages of a block."""
         rows = rows_of(block, self._topics, self._own, self._clock)
         for time, by in self._clock.jumps():
             self._lanes['jump'].add(time, time, f'by {by / 1e9:.6g} s')
@@ -171,7 +171,7 @@ class SceneRun:
             self._judge.hear(self._health.said)
 
     def end(self, contents: Contents) -> Run:
-        """Return what there is to tell; with the counts of all messages."""
+        """Return the run, with the counts of all messages."""
         end = self._clock.end
         self._judge.end(end, self._lanes['fault'])
         for silences in self._silences:
@@ -202,7 +202,7 @@ class SceneRun:
         )
 
     def _told(self) -> Iterator[str]:
-        """Yield the kinds of what happens of which it would be known."""
+        """Yield the kinds of events that the bag would show."""
         yield from ('silent', 'jump')
         kinds = self._topics.values()
         for kind, lane in (('faults', 'fault'), ('withheld', 'withheld'), ('resets', 'reset')):
@@ -222,16 +222,16 @@ class SceneRun:
                 yield 'told_limited'
 
     def _look_at_samples(self, samples: Rows, good: Flags, states: Rows, read: JointBlock) -> None:
-        """Draw the crank, and look for samples at which a loop does not close."""
-        told = self._samples.read(samples.data)
-        self._curves.add_samples(samples.passed[told.good], told.numbers[told.good])
+        """Add the crank's curve, and find samples at which a loop does not close."""
+        decoded = self._samples.read(samples.data)
+        self._curves.add_samples(samples.passed[decoded.good], decoded.numbers[decoded.good])
         if self._stale.limit:
             self._stale.add(samples.passed[good])
         for number, crank in self._cranks.items():
-            own = crank.take(samples.numbers, told.stamps, good, told.numbers)
+            own = crank.take(samples.numbers, decoded.stamps, good, decoded.numbers)
             there = read.good & self._is_there(read.numbers, number)
             alone = own & ~np.isin(samples.logged, states.logged[there])
-            at = samples.logged if self._rate else told.stamps
+            at = samples.logged if self._rate else decoded.stamps
             angles, _ = crank.at(samples.numbers[alone] + 1, at[alone])
             find_open_loop_spans(
                 self._linkages[number], samples.passed[alone], angles, self._lanes['open']
@@ -251,7 +251,7 @@ class SceneRun:
             stamps.append(newest)
         self._curves.add_states(passed, numbers, inputs)
         if stamps:
-            # Of several linkages that counts whose input is oldest; 0 is none.
+            # The oldest input of several linkages counts; 0 stands for none.
             found = np.array(stamps)
             oldest = np.where(found > 0, found, _NEVER).min(axis=0)
             known = oldest < _NEVER
@@ -260,9 +260,9 @@ class SceneRun:
             silences.add(passed[self._is_there(numbers, number)])
 
     def _is_there(self, numbers: Numbers, linkage: int) -> Flags:
-        """Return of which joint states a linkage is a part."""
-        found: Flags = ~np.isnan(numbers[:, 0, self._first_joints[linkage]])
-        return found
+        """Return which joint states contain a linkage."""
+        present: Flags = ~np.isnan(numbers[:, 0, self._first_joints[linkage]])
+        return present
 
 
 _NEVER = 2**62

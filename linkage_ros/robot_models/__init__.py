@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A linkage as the robot models of others, and from them: URDF and MJCF."""
+"""Export and import of robot models: URDF and MJCF."""

@@ -14,11 +14,11 @@
 
 
 """
-What links look like in a robot model: bars along their points, discs at them, rails for sliders.
+Shapes of links in a robot model: bars between their points, discs at them, rails for sliders.
 
-Robot models know boxes and cylinders only. All stand in the frame of their link; each link has a
-layer of its own, so that links pass each other as they do in a machine. Frames stay in the plane
-z = 0: where links are drawn does not move their pins.
+Robot models have only boxes and cylinders. All shapes are given in the frame of their link. Each
+link has a layer of its own, so that links pass each other as in a machine. Frames stay in the
+plane z = 0: the layer in which a link is drawn does not move its pins.
 """
 
 from __future__ import annotations
@@ -56,15 +56,15 @@ class Solid(NamedTuple):
     kind
         ``bar``, ``disc``, ``block`` or ``rail``.
     name
-        Of the point of a disc or block, of the slider of a rail; else ''.
+        Name of the point of a disc or block, or of the slider of a rail; else ''.
     centre, z
         In the frame of the link, in [m].
     angle
-        Of the box about z, in [rad].
+        Angle of a box about z, in [rad].
     length, width
-        Of the box; of a cylinder the diameter, twice. In [m].
+        Of a box; both are the diameter of a cylinder. In [m].
     height
-        Along z, in [m].
+        Size along z, in [m].
 
     """
 
@@ -79,24 +79,24 @@ class Solid(NamedTuple):
 
 
 class Body(NamedTuple):
-    """A link as it is seen."""
+    """The shapes of a link."""
 
     colour: tuple[float, float, float, float]
     solids: tuple[Solid, ...]
 
 
-def bodies(closure: Closure, found: Mapping[str, Span], first_layer: int = 0) -> dict[str, Body]:
+def bodies(closure: Closure, ranges: Mapping[str, Span], first_layer: int = 0) -> dict[str, Body]:
     """
-    Return what each link looks like.
+    Return the shapes of each link.
 
     Parameters
     ----------
     closure
         The linkage.
-    found
-        How far its joints go.
+    ranges
+        Range of motion of its joints.
     first_layer
-        Layers that other linkages have below.
+        Number of layers that other linkages occupy below.
 
     """
     linkage = closure.linkage
@@ -108,13 +108,13 @@ def bodies(closure: Closure, found: Mapping[str, Span], first_layer: int = 0) ->
         layer = moving.index(link) + 1 if link != GROUND else 0
         z = 1.2 * height * (first_layer + layer)
         colour = _COLOURS[(layer - 1) % len(_COLOURS)] if layer else _GREY
-        solids = [*_bars(closure, link, z, width), *_rails(closure, link, found, z, width)]
+        solids = [*_bars(closure, link, z, width), *_rails(closure, link, ranges, z, width)]
         drawn[link] = Body(colour, tuple(solids))
     return drawn
 
 
 def bar_width(closure: Closure) -> float:
-    """Return the width of bars, in [m]: a part of the length that links commonly have."""
+    """Return the width of bars, in [m]: a fraction of the typical length of links."""
     lengths = [
         max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
         for points in closure.linkage.links.values()
@@ -151,7 +151,7 @@ def _bars(closure: Closure, link: str, z: float, width: float) -> list[Solid]:
 
 
 def _turned(closure: Closure, link: str) -> float:
-    """Return the angle at which a block lies along its slider, in its own frame."""
+    """Return the angle of a block along its slider, in the block's own frame."""
     for slider in closure.linkage.sliders.values():
         if slider.block == link:
             return phase(complex(*slider.direction)) - slider.angle
@@ -166,15 +166,15 @@ def _turned(closure: Closure, link: str) -> float:
 
 
 def _rails(
-    closure: Closure, link: str, found: Mapping[str, Span], z: float, width: float
+    closure: Closure, link: str, ranges: Mapping[str, Span], z: float, width: float
 ) -> list[Solid]:
     rails = []
     for name, slider in closure.linkage.sliders.items():
         if slider.along != link:
             continue
-        low, high = travel(closure, name, found)
+        low, high = travel(closure, name, ranges)
         if link != GROUND:
-            low, high = min(low, 0.0), max(high, 0.0)  # it hangs together with the link's bars
+            low, high = min(low, 0.0), max(high, 0.0)  # the rail must reach the link's bars
         unit = complex(*slider.direction) / abs(complex(*slider.direction))
         start = complex(*closure.linkage.links[link][slider.through])
         centre = start + 0.5 * (low + high) * unit
@@ -185,10 +185,10 @@ def _rails(
     return rails
 
 
-def travel(closure: Closure, slider: str, found: Mapping[str, Span]) -> tuple[float, float]:
-    """Return how far a slider's point goes along its line, in [m], as far as that is told."""
+def travel(closure: Closure, slider: str, ranges: Mapping[str, Span]) -> tuple[float, float]:
+    """Return the range of a slider's point along its line, in [m], as far as it is known."""
     for name, joint in named_joints(closure.linkage).items():
         if isinstance(joint, SlideJoint) and joint.slider == slider:
-            return found[name].lowest, found[name].highest
+            return ranges[name].lowest, ranges[name].highest
     far = 0.5 * reach(closure)
     return -far, far

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A linkage out of a URDF and the pins that close it."""
+"""Make a linkage of a URDF and the pins that close its loops."""
 
 from __future__ import annotations
 
@@ -42,48 +42,49 @@ from linkage_ros.robot_models.planar import find_closings, find_loops, lay_flat,
 from linkage_ros.robot_models.urdf_file import MOVING, UrdfFile
 from linkage_ros.robot_models.urdf_topology import urdf_topology, UrdfTopology
 
-# On which sides the dyads of a linkage close, from a pose of its links.
+# The assembly of each dyad, from a pose of its links.
 #
-# A URDF does not say it. Each combination of sides is closed at the pose's inputs, and the one
-# that leads to the pose is taken: so no convention of the dyads stands here a second time.
+# A URDF does not contain it. The linkage is closed at the pose's inputs with each combination of
+# sides, and the one that gives the pose is chosen. So no sign convention of the dyads is repeated
+# here.
 
 Poses = Mapping[str, tuple[complex, float]]
-"""Of each link the origin of its frame, in [m], and its angle, in [rad]."""
+"""For each link the origin of its frame, in [m], and its angle, in [rad]."""
 
 _SIDED = ('RRR', 'RRP', 'RPR')
-"""Dyads that close in two ways."""
+"""Dyads with two assemblies."""
 
 _MANY = 10
-"""Dyads whose sides are tried all together; each more doubles the time."""
+"""Maximum number of dyads whose sides are tried together; each further one doubles the time."""
 
 _FOUND = 0.05
-"""What the links of a pose may be turned by from where the linkage closes, in [rad]."""
+"""Maximum angle between the links of a pose and those of the closed linkage, in [rad]."""
 
 _SAME = 1e-6
-"""What the poses of two assemblies may differ by and be one, in [rad]; inputs likewise."""
+"""Two assemblies are the same if poses and inputs differ by less than this, in [rad]."""
 
 _REMEDY = 'give a pose in which it is closed, off its toggles: --at JOINT=VALUE, for each joint'
 
 
 def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: str) -> Linkage:
     """
-    Return a linkage with the sides that lead to a pose.
+    Return a linkage with the sides that give a pose.
 
     Parameters
     ----------
     linkage
         The linkage, without sides.
     inputs
-        Of the pose, in [rad] or [m].
+        Inputs of the pose, in [rad] or [m].
     poses
-        Where its links are then.
+        Poses of its links there.
     where
         The pose in words, for messages.
 
     Raises
     ------
     DefinitionError
-        Where it is no linkage; where no sides lead to the pose, or several do.
+        If it is no valid linkage, or if no sides or several combinations give the pose.
 
     """
     groups = assur_groups(linkage).groups
@@ -93,19 +94,19 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
     if len(keys) > _MANY:
         reason = f'{len(keys)} dyads are too many to try all their sides'
         raise DefinitionError('assembly', reason, 'import it in parts')
-    found = []
+    candidates = []
     choices = [
         ('ahead', 'behind') if key in linkage.sliders else ('left', 'right') for key in keys
     ]
     for sides in product(*choices):
         assembly: dict[str, Side] = dict(zip(keys, sides, strict=True))  # type: ignore[arg-type]
         closure = Closure(replace(linkage, assembly=assembly))
-        found.append((_off(closure, inputs, poses), closure))
-    found.sort(key=lambda each: each[0])
-    least, closure = found[0]
+        candidates.append((_off(closure, inputs, poses), closure))
+    candidates.sort(key=lambda each: each[0])
+    least, closure = candidates[0]
     if least > _FOUND:
         raise DefinitionError('assembly', f'no way to close it leads to the pose {where}', _REMEDY)
-    if len(found) > 1 and found[1][0] < least + _SAME:
+    if len(candidates) > 1 and candidates[1][0] < least + _SAME:
         raise DefinitionError('assembly', f'two ways to close it meet {where}', _REMEDY)
     if closure.linkage.pose is None and not _near(usual_inputs(closure), inputs):
         return replace(closure.linkage, pose=Pose(inputs, {}))
@@ -113,13 +114,13 @@ def assembled(linkage: Linkage, inputs: tuple[float, ...], poses: Poses, where: 
 
 
 def _key(dyad: Dyad) -> str:
-    """Return what names the side of a dyad: its slider, or the pin between its links."""
+    """Return the key of a dyad's side: its slider, or the pin between its links."""
     joints = (dyad.inner, *dyad.outer)
     return next((joint.name for joint in joints if joint.kind == 'P'), dyad.inner.name)
 
 
 def _points(linkage: Linkage, poses: Poses) -> dict[str, Point]:
-    """Return where all points are in the pose, in the frame of the ground."""
+    """Return the positions of all points in the pose, in the frame of the ground."""
     found: dict[str, Point] = {}
     for link, points in linkage.links.items():
         place, angle = poses[link]
@@ -130,7 +131,7 @@ def _points(linkage: Linkage, poses: Poses) -> dict[str, Point]:
 
 
 def _off(closure: Closure, inputs: tuple[float, ...], poses: Poses) -> float:
-    """Return how far links are turned from the pose, at most, in [rad]."""
+    """Return the largest angle between a link and its pose, in [rad]."""
     position = closure.position(*inputs)
     if not position.joints:
         return pi
@@ -143,14 +144,14 @@ def _near(one: Sequence[float], other: Sequence[float]) -> bool:
 
 
 _MET = 1e-3
-"""How far pins may be apart in a pose and meet in it, of the size."""
+"""Maximum distance between pins that meet in a pose, as a fraction of the linkage's size."""
 
 
 class ImportedLinkage(NamedTuple):
     """
-    A linkage, and what of the URDF is not in it, in words.
+    A linkage, and the parts of the URDF that it leaves out, in words.
 
-    Its start is that of the URDF where the linkage itself would start elsewhere.
+    It starts at the URDF's start if its own would differ.
     """
 
     linkage: Linkage
@@ -173,19 +174,19 @@ def from_urdf(
     urdf
         The robot.
     close
-        Pairs of its links whose origins are to meet, beside those that are named for it.
+        Pairs of links whose origins coincide, beside those that frame names define.
     inputs
-        Names of joints that are driven; without them those that the file names.
+        Names of driven joints; by default those that the file names.
     at
-        Values of joints in a pose in which the loops close, in [rad] or [m]; those that are not
-        named are as the file has them, or 0.
+        Values of joints in a pose in which the loops close, in [rad] or [m]; by default those of
+        the file, or 0.
     limits
-        Whether the limits of its joints are kept.
+        Whether to keep the limits of the joints.
 
     Raises
     ------
     FileError
-        Where it does not make a linkage, with what would help.
+        If it does not give a linkage; the message has a remedy.
 
     """
     made = _Import(urdf, close, inputs, at or {}).made()
@@ -282,7 +283,7 @@ class _Import:
         return f'name one of {listed(each for each in self._skeleton.joints if each != but)}'
 
     def _frames(self) -> dict[str, tuple[complex, float]]:
-        """Return place and angle of every body in the pose, in the frame of the root."""
+        """Return position and angle of every body in the pose, in the frame of the root."""
         frames = {self._planar.root: (0j, 0.0)}
         for joint in self._planar.joints:
             value = self._pose[joint.name]
@@ -327,12 +328,12 @@ class _Import:
 
 
 def _limited(linkage: Linkage, urdf: UrdfFile) -> Linkage:
-    """Return a linkage whose joints have the limits of the robot's."""
+    """Return a linkage with the joint limits of the robot."""
 
     def of(name: str, turns: bool) -> Limits:
         limits = urdf.joints[name].limits if name in urdf.joints else NO_LIMITS
         if turns and limits.high - limits.low >= tau:
-            # Angles come round: these are no limits of one that is published.
+            # A range of a full turn or more does not limit an angle.
             return replace(limits, low=-inf, high=inf)
         return limits
 

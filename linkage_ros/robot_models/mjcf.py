@@ -13,10 +13,11 @@
 # limitations under the License.
 
 """
-The bodies of a linkage in MJCF: nested as the linkage hangs together, with joints, masses, shapes.
+Export of a linkage as MJCF, the format of MuJoCo.
 
-The axes of a body are parallel to its link's own; its origin lies at the pin or slider that it
-hangs by.
+Bodies are nested, and equality constraints hold the pins that are cut. The axes of a body are
+parallel to its link's own; its origin lies at the pin or slider that connects it to its parent.
+Springs are spatial tendons, which pull as those of `linkage_ros.dynamics` do.
 """
 
 from __future__ import annotations
@@ -43,11 +44,10 @@ from linkage_ros.robot_models.orientation import named_joints, spans
 from linkage_ros.robot_models.part import Part, PartError, prefixed, PrefixedNames
 from linkage_ros.robot_models.xml import comment, document, number, numbers, rough
 
-# A linkage as a tree of its pins and sliders themselves, whatever is published, and the pins cut.
+# The linkage as a tree of its physical pins and sliders, published or not, and the pins cut.
 #
-# Inputs and sliders stay in the tree, since a pin alone is easily closed again by an engine; of
-# the pins those that are published joints come first. A pin in a slot has a block of its own,
-# which slides.
+# Inputs and sliders stay in the tree, since an engine closes a pin most easily. Of the other
+# pins, published joints have priority. A pin in a slot gets a block of its own, which slides.
 
 
 class Branch(NamedTuple):
@@ -59,13 +59,13 @@ class Branch(NamedTuple):
     kind
         ``R`` for a pin, ``P`` for a slider.
     name
-        Of the pin or slider.
+        Name of the pin or slider.
     parent, child
-        The links; a block is named as in the closure's structure.
+        The links; a block has its name in the closure's structure.
     joint
-        As messages name it; '' where none does.
+        Name of the joint in messages; '' if it has none.
     sign
-        −1 where the joint counts the other way round.
+        −1 if the joint counts in the opposite direction.
 
     """
 
@@ -84,7 +84,7 @@ class PhysicalTree(NamedTuple):
     Attributes
     ----------
     branches
-        Each after the one that its parent hangs by.
+        The joints of the tree, each after the one that moves its parent.
     cuts
         Pins that are cut: the point, and the two links that it joins.
 
@@ -105,8 +105,8 @@ def physical_tree(closure: Closure) -> PhysicalTree:
     """
     Return a linkage as a tree of pins and sliders.
 
-    Every loop has a pin that is no input, and is cut there: a loop of sliders holds an angle twice
-    over, one whose pins are all driven cannot move, and neither is a linkage.
+    Every loop has a pin that is no input, and is cut there. A loop of sliders alone would fix an
+    angle twice, and one whose pins are all driven could not move: neither is a valid linkage.
     """
     links = closure.structure.links
     part_of = {link: link for link in links}
@@ -130,7 +130,7 @@ def physical_tree(closure: Closure) -> PhysicalTree:
 
 
 def _edges(closure: Closure) -> Iterator[_Edge]:
-    """Yield pins between any two links, and sliders; what is to stay in the tree ranks first."""
+    """Yield pins between any two links, and sliders; those to keep in the tree rank first."""
     linkage, links = closure.linkage, closure.structure.links
     driven = {frozenset((given.parent, given.child)) for given in linkage.inputs}
     for name, slider in linkage.sliders.items():
@@ -166,7 +166,7 @@ def _cuts(closure: Closure, kept: list[_Edge]) -> Iterator[tuple[str, str, str]]
 
 
 def _named(closure: Closure, edge: _Edge, parent: str, child: str) -> tuple[str, int]:
-    """Return the name under which messages have a joint, and with which sign."""
+    """Return the name of a joint in messages, and its sign."""
     for name, joint in named_joints(closure.linkage).items():
         if isinstance(joint, SlideJoint):
             if edge.kind == 'P' and joint.slider == edge.name:
@@ -177,19 +177,19 @@ def _named(closure: Closure, edge: _Edge, parent: str, child: str) -> tuple[str,
 
 
 DENSITY = 7850.0
-"""Of links whose mass nobody gives: steel, in [kg/m³]."""
+"""Density of links without a given mass: steel, in [kg/m³]."""
 
 LIGHT = 10.0
-"""Of the blocks that pins in slots stand for, in [kg/m³]: next to nothing."""
+"""Density of the blocks of pins in slots, in [kg/m³]: negligible."""
 
 _DIFFERENCE = 1e-4
-"""In [rad], or of a length."""
+"""Step of the finite differences, in [rad] or as a fraction of a length."""
 
 _FARTHEST = 1e9
-"""In [rad] or [m]: where a joint is limited that has a limit on the other side only."""
+"""Stands for the missing limit of a joint that has one limit only, in [rad] or [m]."""
 
 _LEAST_INERTIA = 1e-12
-"""An engine has no points with a mass; what has no extent gets this, in [kg·m²]."""
+"""The engine needs an inertia; a body without extent gets this, in [kg·m²]."""
 
 
 class Bodies:
@@ -199,22 +199,22 @@ class Bodies:
     Parameters
     ----------
     world
-        Element of the model that they go into.
+        Element of the model that receives them.
     part, names
-        The linkage, and what its parts are called.
+        The linkage, and the names of its parts.
     first_layer
-        Layers that other linkages have below.
+        Number of layers that other linkages occupy below.
 
     Attributes
     ----------
     cuts
         Pins that are cut: the point, and the two links that it joins.
     inputs
-        Where the linkage starts, in [rad] or [m].
+        Inputs at the start, in [rad] or [m].
     start
-        Likewise the value of every joint, in the order of the model.
+        Value of every joint at the start, in [rad] or [m], in the order of the model.
     joints
-        Elements of the joints that messages name, by their names there.
+        Elements of the joints that have a name in messages, by that name.
 
     """
 
@@ -244,7 +244,7 @@ class Bodies:
         self._hang_on(GROUND)
 
     def site(self, link: str, point: str) -> str:
-        """Return the name of a site at a point of a link; it is made where there is none."""
+        """Return the name of a site at a point of a link; make the site if it is missing."""
         if (link, point) not in self._sites:
             name = self._sites[link, point] = self._names.on(point, link)
             place = complex(*self._closure.structure.links[link][point]) - self._origins[link]
@@ -254,10 +254,10 @@ class Bodies:
 
     def inertia(self, index: int) -> float:
         """
-        Return about what an input has to move where the linkage starts, in [kg·m²] or [kg].
+        Return the approximate inertia that an input moves at the start, in [kg·m²] or [kg].
 
-        Half of it is the kinetic energy at a rate of 1, by differences, each link's mass spread
-        over its points.
+        The kinetic energy at a rate of 1 is half of it. Rates come from finite differences, and
+        each link's mass is spread over its points.
         """
         closure = self._closure
         step = _DIFFERENCE * (closure.scale if closure.linkage.inputs[index].slider else 1.0)
@@ -268,19 +268,19 @@ class Bodies:
             if there.joints:
                 break
         else:
-            return 0.0  # its range is narrower than that: it hardly moves at all
+            return 0.0  # the input's range is narrower than the step: it hardly moves
         before, after = closure.points(self._position), closure.points(there)
-        found = 0.0
+        inertia_sum = 0.0
         for link, mass in self._masses.items():
             squares = [
                 abs((after[link, point] - before[link, point]) / step) ** 2
                 for point in closure.structure.links[link]
             ]
-            found += mass * sum(squares) / len(squares)
-        return found
+            inertia_sum += mass * sum(squares) / len(squares)
+        return inertia_sum
 
     def _hang_on(self, parent: str) -> None:
-        """Write what hangs on a link, depth first, as the engine counts its joints."""
+        """Write the children of a link, depth first, in the order of the engine's joints."""
         for branch in self._hung.get(parent, ()):
             self._hang(branch)
             self._hang_on(branch.child)
@@ -311,7 +311,7 @@ class Bodies:
             joint.set('name', self._names.joint(f'{child}_at_{branch.name}'))
         flat = numbers(axis.real, axis.imag, 0.0)
         joint.set('axis', numbers(0.0, 0.0, branch.sign) if branch.kind == 'R' else flat)
-        # What the engine resets to is the pose that is written, with this as the joint's value.
+        # The engine resets to the pose as written; this is the joint's value in that pose.
         joint.set('ref', number(value))
         self.start.append(value)
         mass = closure.linkage.masses.get(child)
@@ -322,7 +322,7 @@ class Bodies:
         _geoms(body, solids, origin)
 
     def _value(self, branch: Branch) -> float:
-        """Return the value of a joint where the linkage starts."""
+        """Return the value of a joint at the start."""
         if branch.joint in self._driven:
             return self._driven[branch.joint]
         if branch.kind == 'P':
@@ -337,10 +337,10 @@ class Bodies:
 
 def _held(closure: Closure, branch: Branch) -> tuple[complex, float, complex, complex]:
     """
-    Return how a body hangs on its parent where its joint is at 0.
+    Return the pose of a body on its parent with its joint at 0.
 
-    Where it does, in the frame of the parent's link; its angle; of one that slides the axis, in
-    its own frame; and its origin, in the frame of its own link.
+    Returns the position, in the frame of the parent's link; the angle; for a slider the axis, in
+    the body's own frame; and the body's origin, in the frame of its own link.
     """
     links = closure.structure.links
     if branch.kind == 'R':
@@ -358,7 +358,7 @@ def _held(closure: Closure, branch: Branch) -> tuple[complex, float, complex, co
 
 
 def _block(closure: Closure, block: str) -> Body:
-    """Return the block that a pin in a slot stands for."""
+    """Return the block that represents a pin in a slot."""
     name = next(slider for slider, of in closure.structure.blocks.items() if of == block)
     slider, width = closure.linkage.sliders[name], bar_width(closure)
     angle = phase(complex(*slider.direction))
@@ -367,7 +367,7 @@ def _block(closure: Closure, block: str) -> Body:
 
 
 def _weight(body: Body) -> float:
-    """Return about what the solids of a link weigh, in [kg]."""
+    """Return the approximate mass of the solids of a link, in [kg]."""
     return sum(
         (LIGHT if solid.kind == 'slot' else DENSITY)
         * prod((solid.length, solid.width, solid.height))
@@ -376,7 +376,7 @@ def _weight(body: Body) -> float:
 
 
 def _limit(joint: ET.Element, limits: Limits) -> None:
-    """Write what a joint can do, as far as the engine has words for it: no rate is limited."""
+    """Write the limits of a joint that MJCF can express: it has none for rates."""
     if limits.bounded:
         joint.set('range', numbers(max(limits.low, -_FARTHEST), min(limits.high, _FARTHEST)))
     if limits.effort < inf:
@@ -410,19 +410,14 @@ def _geoms(element: ET.Element, body: Body, origin: complex) -> None:
         ET.SubElement(element, 'geom', where, type='box', size=size)
 
 
-# A linkage as MJCF, MuJoCo's format: nested bodies, and equality constraints where pins are cut.
-#
-# The axes of a body are parallel to its link's own; its origin lies at the pin or slider that it
-# hangs by. Springs are spatial tendons, which pull as those of `linkage_ros.dynamics` do.
-
 _STEP = 5e-4
-"""Of the integration, in [s]."""
+"""Step of the integration, in [s]."""
 
 _STIFF = {'solref': f'{number(4.0 * _STEP)} 1', 'solimp': '0.9999 0.9999 0.001 0.5 2'}
-"""How cut pins are held: errors die away within 2 ms, and loads open them next to nothing."""
+"""Solver parameters of cut pins: errors decay within 2 ms, and loads hardly open the pins."""
 
 _PACE = 30.0
-"""Of the position servo of an input, in [rad/s]."""
+"""Bandwidth of the position servo of an input, in [rad/s]."""
 
 _HEAD = f"""\
 A planar linkage in the plane z = 0. Bodies hang by their pins and sliders; pins that close loops
@@ -440,14 +435,14 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
     Parameters
     ----------
     name
-        Of the model.
+        Name of the model.
     parts
         Its linkages.
 
     Raises
     ------
     PartError
-        Where one has another gravity than the first, or names that are taken.
+        If one has another gravity than the first, or names that are taken.
 
     """
     model = ET.Element('mujoco', model=name)
@@ -485,9 +480,9 @@ def mjcf(name: str, parts: Sequence[Part]) -> bytes:
 
 
 def _gravity(parts: Sequence[Part]) -> tuple[float, float]:
-    found = [part.loads.gravity if part.loads else (0.0, 0.0) for part in parts]
-    for count, gravity in enumerate(found):
-        if gravity != found[0]:
+    gravities = [part.loads.gravity if part.loads else (0.0, 0.0) for part in parts]
+    for count, gravity in enumerate(gravities):
+        if gravity != gravities[0]:
             raise PartError(
                 count,
                 'loads.gravity',
@@ -495,11 +490,11 @@ def _gravity(parts: Sequence[Part]) -> tuple[float, float]:
                 'give all linkages one gravity: MuJoCo has one',
                 of_linkage=False,
             )
-    return found[0]
+    return gravities[0]
 
 
 def _close(sections: Mapping[str, ET.Element], part: Part, bodies: Bodies) -> None:
-    """Write what joins bodies beside their joints: cut pins, and springs."""
+    """Write the connections that are not joints: cut pins and springs."""
     linkage = part.closure.linkage
     for point in linkage.traced:
         bodies.site(next(a for a, points in linkage.links.items() if point in points), point)
@@ -522,7 +517,7 @@ def _close(sections: Mapping[str, ET.Element], part: Part, bodies: Bodies) -> No
 
 
 def _drive(actuators: ET.Element, part: Part, bodies: Bodies) -> None:
-    """Drive the inputs by servos, as stiff as what they move asks for."""
+    """Drive the inputs by servos whose stiffness suits the inertia that they move."""
     motor = part.loads.drive_inertia if part.loads else 0.0
     for count, given in enumerate(part.closure.linkage.inputs):
         inertia = bodies.inertia(count) + motor

@@ -13,13 +13,13 @@
 # limitations under the License.
 
 """
-How far joints go: what a published joint comes to while the input goes through its range.
+Range of each published joint while the input goes through its range.
 
-Of a single input, the range is the one that the linkage starts in (`usual_inputs`). It is sampled;
-between two samples a joint is taken to go no farther than it goes from one to the next, and a
-margin is added. An angle that passes π on the way has no limit: what the node publishes begins in
-(−π, π] wherever the input is then, so that it can be on either side, and a wrapped one is on both.
-With several inputs nobody can say: angles have no limit then, slides that of the linkage's reach.
+For a single input, the range is the one that contains the linkage's start (`usual_inputs`). It is
+sampled. Between two samples a joint is assumed to go no farther than its step from one to the
+next, and a margin is added. An angle that passes π has no limit: the node first publishes it in
+(−π, π], wherever the input is then, so it may start on either side; a wrapped angle is on both.
+With several inputs the ranges are unknown: angles have no limit, slides the linkage's reach.
 """
 
 from __future__ import annotations
@@ -39,12 +39,11 @@ if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array
 
 
-# The orientation of one link against another, as a sum of published joints.
+# The orientation of one link relative to another, as a sum of published joints.
 #
-# A published angle is that of its child less that of its parent, whether or not the two are pinned
-# together; a block keeps its angle to what it slides along. So every link whose angle can be told
-# from messages hangs in a graph together with the ground, and the way between two links in it is
-# the sum.
+# A published angle is that of its child minus that of its parent, whether or not a pin joins the
+# two; a block keeps its angle to the link it slides along. So the links whose angles messages
+# determine form a connected graph with the ground, and the path between two links is the sum.
 
 
 class Turn(NamedTuple):
@@ -56,7 +55,7 @@ class Turn(NamedTuple):
     joint
         Name of the published joint; '' for a constant.
     sign
-        With which the joint counts, +1 or −1.
+        Sign of the joint in the sum, +1 or −1.
     constant
         In [rad]; 0 for a joint.
 
@@ -68,7 +67,7 @@ class Turn(NamedTuple):
 
 
 def named_joints(linkage: Linkage) -> dict[str, RevoluteJoint | SlideJoint]:
-    """Return all joints that messages name: the inputs, then what is published."""
+    """Return all joints with a name in messages: the inputs, then the published ones."""
     inputs: dict[str, RevoluteJoint | SlideJoint] = {
         given.joint: SlideJoint(given.slider)
         if given.slider
@@ -80,7 +79,7 @@ def named_joints(linkage: Linkage) -> dict[str, RevoluteJoint | SlideJoint]:
 
 class Orientations:
     """
-    What messages say of the angles of links against each other.
+    The relative angles of links that messages determine.
 
     Parameters
     ----------
@@ -105,50 +104,50 @@ class Orientations:
 
     def between(self, link: str, other: str) -> tuple[Turn, ...] | None:
         """
-        Return the angle of the other link less that of the link, by as few joints as will do.
+        Return the angle of ``other`` minus that of ``link``, with the fewest joints.
 
-        None where messages do not tell it. After each term stands the orientation of some link.
+        None if messages do not determine it. Each partial sum is the orientation of some link.
         """
         return self._from(link).get(other)
 
     def known_from(self, link: str) -> Iterator[str]:
-        """Yield the links whose angles against this one are told, in the order of the linkage."""
+        """Yield the links whose angles relative to this one are known, in the linkage's order."""
         known = self._from(link)
         return (other for other in self._links if other in known)
 
     def _from(self, link: str) -> dict[str, tuple[Turn, ...]]:
-        """Search from a link, the fewest joints first; a constant is no joint."""
-        found: dict[str, tuple[Turn, ...]] = {}
+        """Search from a link, fewest joints first; a constant does not count as a joint."""
+        paths: dict[str, tuple[Turn, ...]] = {}
         ahead: list[tuple[int, int, str, tuple[Turn, ...]]] = [(0, 0, link, ())]
         count = 0
         while ahead:
             joints, _, reached, turns = heappop(ahead)
-            if reached in found:
+            if reached in paths:
                 continue
-            found[reached] = turns
+            paths[reached] = turns
             for other, turn in self._next[reached]:
-                if other not in found:
+                if other not in paths:
                     count += 1
                     more = joints + bool(turn.joint)
                     heappush(ahead, (more, count, other, (*turns, turn)))
-        return found
+        return paths
 
 
 _SAMPLES = 2880
 _MARGIN = 1e-3
-"""Added at both ends, in [rad] or of the linkage's reach."""
+"""Margin at both ends, in [rad] or as a fraction of the linkage's reach."""
 
 
 class Span(NamedTuple):
     """
-    Where a joint can be.
+    The range of a joint.
 
     Attributes
     ----------
     lowest, highest
-        In [rad] or [m]; of an angle without limits −π and π.
+        In [rad] or [m]; −π and π for an angle without limits.
     limited
-        Whether these are limits.
+        Whether the two are limits.
 
     """
 
@@ -158,16 +157,16 @@ class Span(NamedTuple):
 
     @property
     def passes_pi(self) -> bool:
-        """Whether an angle that goes so far leaves (−π, π]."""
+        """Whether an angle with this range leaves (−π, π]."""
         return self.lowest < -pi or self.highest > pi
 
 
 _ROUND = Span(-pi, pi, False)
-"""Of an angle without limits."""
+"""Range of an angle without limits."""
 
 
 def spans(closure: Closure) -> dict[str, Span]:
-    """Return how far each joint goes that messages name."""
+    """Return the range of each joint that has a name in messages."""
     joints = named_joints(closure.linkage)
     if len(closure.linkage.inputs) > 1:
         far = reach(closure)
@@ -178,23 +177,23 @@ def spans(closure: Closure) -> dict[str, Span]:
     (start,) = usual_inputs(closure)
     interval = InputSweep(closure).range_about(start)
     assert interval is not None, 'what is usual lies in a range'
-    found = dict(zip(closure.linkage.joints, _published(closure, start, interval), strict=True))
+    ranges = dict(zip(closure.linkage.joints, _published(closure, start, interval), strict=True))
     (given,) = closure.linkage.inputs
     margin = _MARGIN * (1.0 if interval.turning else reach(closure))
     own = Span(interval.lowest - margin, interval.highest + margin)
     if interval.whole or (interval.turning and own.passes_pi):
         own = _ROUND
-    found.setdefault(given.joint, own)
-    return {name: found[name] for name in joints}
+    ranges.setdefault(given.joint, own)
+    return {name: ranges[name] for name in joints}
 
 
 def _published(closure: Closure, start: float, interval: InputRange) -> list[Span]:
-    import numpy as np  # local import: the batch alone needs it
+    import numpy as np  # local import: only the batch needs it
 
     values = np.array(samples(interval, _SAMPLES))
     rows = closure.solve(values, derivatives=0).positions
     for i in np.flatnonzero(np.isnan(rows).any(axis=0)):
-        # A batch leaves out toggles, and so the ends of most ranges; the node publishes them.
+        # The batch leaves out toggles, and so the ends of most ranges; the node publishes them.
         if joints := closure.position(float(values[i])).joints:
             rows[:, i] = joints
     closed = ~np.isnan(rows).any(axis=0)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Names of frames and joints in a robot model: those of links and messages, and free ones."""
+"""Linkages as parts of a robot model, and the names of frames and joints there."""
 
 from __future__ import annotations
 
@@ -25,8 +25,6 @@ from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.robot_models.orientation import named_joints
 
-# A linkage that is to stand in a robot model.
-
 
 class Part(NamedTuple):
     """
@@ -37,9 +35,9 @@ class Part(NamedTuple):
     closure
         The linkage.
     prefix
-        What its links and joints have before their names.
+        Prefix of the names of its links and joints.
     loads
-        What acts on it; nothing where nobody says.
+        Its loads; None if none are given.
     wrapped
         Whether its angles are published in (−π, π].
 
@@ -53,16 +51,16 @@ class Part(NamedTuple):
 
 class PartError(DefinitionError):
     """
-    A linkage of which no model can be made.
+    A linkage that cannot be written as a model.
 
     Parameters
     ----------
     number
-        Of the linkage, from 0.
+        Number of the linkage, from 0.
     where, reason, remedy
-        As in `DefinitionError`.
+        See `DefinitionError`.
     of_linkage
-        Whether its own file is at fault, and not that of the scene.
+        Whether its own file is at fault, not the scene's.
 
     """
 
@@ -76,10 +74,10 @@ class PartError(DefinitionError):
 
 class Names:
     """
-    The names of a model that one or more linkages stand in.
+    The names of a model of one or more linkages.
 
-    What links and messages name is named so, with the linkage's prefix; whatever else there is
-    gets a name that is free, with a number where it has to.
+    Links, and joints with a name in messages, keep their names, after the linkage's prefix. Other
+    items get a free name, with a number if needed.
     """
 
     def __init__(self) -> None:
@@ -89,12 +87,12 @@ class Names:
 
     def of(self, prefix: str, linkage: Linkage) -> PrefixedNames:
         """
-        Return the names of one of its linkages; all are to be asked for before any is used.
+        Return the names of one of its linkages; call it for all linkages before using any.
 
         Raises
         ------
         PartError
-            Where two linkages come to the same name.
+            If two linkages lead to the same name.
 
         """
         for kind, taken, found in (
@@ -115,13 +113,13 @@ class Names:
         return PrefixedNames(prefix, self)
 
     def frame(self, name: str) -> str:
-        """Return a free name for a frame, like this one."""
+        """Return a free name for a frame, similar to this one."""
         free = free_name(name, self._frames)
         self._frames.add(free)
         return free
 
     def joint(self, name: str) -> str:
-        """Return a free name for a joint, like this one."""
+        """Return a free name for a joint, similar to this one."""
         free = free_name(name, self._joints)
         self._joints.add(free)
         return free
@@ -135,23 +133,23 @@ class PrefixedNames:
         self._names = names
 
     def own(self, name: str) -> str:
-        """Return the name of a link, or of a joint that messages name."""
+        """Return the name of a link, or of a joint with a name in messages."""
         return self.prefix + name
 
     def frame(self, name: str) -> str:
-        """Return a free name for a frame, like this one."""
+        """Return a free name for a frame, similar to this one."""
         return self._names.frame(self.prefix + name)
 
     def text_on(self, name: str, link: str) -> str:
-        """Return NAME_on_LINK, both as they are named here."""
+        """Return NAME_on_LINK, with both names as in the model."""
         return f'{self.prefix}{name}_on_{self.prefix}{link}'
 
     def on(self, name: str, link: str) -> str:
-        """Return a free name for a frame, like NAME_on_LINK."""
+        """Return a free name for a frame, similar to NAME_on_LINK."""
         return self._names.frame(self.text_on(name, link))
 
     def joint(self, name: str) -> str:
-        """Return a free name for a joint, like this one."""
+        """Return a free name for a joint, similar to this one."""
         return self._names.joint(self.prefix + name)
 
 
@@ -162,7 +160,7 @@ def prefixed(linkages: Sequence[tuple[str, Linkage]]) -> tuple[Names, list[Prefi
 
 
 def free_name(name: str, taken: Collection[str]) -> str:
-    """Return a name that is not taken: this one, or with a number behind it."""
+    """Return a name that is not taken: this one, or one with a number appended."""
     free, number = name, 1
     while free in taken:
         number += 1

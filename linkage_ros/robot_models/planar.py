@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-A URDF laid into its plane: bodies, which are links that fixed joints hold together, and joints.
+Reduce a URDF to its plane: bodies, which are links joined by fixed joints, and their joints.
 
-All joints of the loops turn about one direction, or slide across it. Where all joints are at 0,
-all bodies have the frame of the ground: a joint is at 0 where the frames of its bodies are
-parallel, as in a linkage file.
+All joints of the loops turn about one direction or slide across it. With all joints at 0, all
+bodies have the frame of the ground: a joint is at 0 where the frames of its bodies are parallel,
+as in a linkage file.
 """
 
 from __future__ import annotations
@@ -32,25 +32,24 @@ from linkage_ros.kinematics.linkage import Mass
 from linkage_ros.robot_models.urdf_file import MOVING, UrdfFile, UrdfJoint
 import numpy as np
 
-# The pins that close the loops of a URDF, and what of it is in these loops.
-#
-# Closed by pins that were asked for, and by frames that are named PIN_on_LINK.
+# The pins that close the loops of a URDF, as requested or by frames named PIN_on_LINK, and the
+# links and joints of these loops.
 
 _LINE = '_line'
 
 
 class Closing(NamedTuple):
     """
-    Frames that are to meet.
+    Frames that coincide.
 
     Attributes
     ----------
     name
-        Of the pin or slider.
+        Name of the pin or slider.
     frames
         Links of the URDF, two or more.
     line
-        Whether the second need only be on the x axis of the first.
+        True if the second only has to lie on the x axis of the first.
 
     """
 
@@ -63,19 +62,19 @@ def find_closings(
     urdf: UrdfFile, asked: Sequence[tuple[str, str]]
 ) -> tuple[list[Closing], dict[str, str]]:
     """
-    Return what closes the loops, and the frames that stand alone: points, with their names.
+    Return the closing constraints, and the single frames, which are points, with their names.
 
     Parameters
     ----------
     urdf
         The robot.
     asked
-        Pairs of links whose origins are to meet.
+        Pairs of links whose origins coincide.
 
     Raises
     ------
     FileError
-        Where a link that is named is not there.
+        If a named link does not exist.
 
     """
     found: dict[str, list[str]] = {}
@@ -109,16 +108,16 @@ def find_closings(
 
 class Loops(NamedTuple):
     """
-    What of a URDF is in its loops.
+    The links and joints of a URDF that belong to its loops.
 
     Attributes
     ----------
     ground
-        The link that all of it hangs on.
+        The root link of the loops.
     joints
-        The joints that move in it, or are driven.
+        Joints that move in the loops, or are driven.
     left_out
-        All others, and the links that hang on them alone, in words.
+        All other joints, and the links connected only by them, in words.
 
     """
 
@@ -128,7 +127,7 @@ class Loops(NamedTuple):
 
 
 def find_loops(urdf: UrdfFile, closings: Sequence[Closing], inputs: Sequence[str]) -> Loops:
-    """Leave out what hangs by one joint alone that is not driven: at the ends, and at the root."""
+    """Find the loops: leave out bodies held by a single joint that is not driven, repeatedly."""
     body_of = {urdf.root: urdf.root}
     edges: list[tuple[str, str, str]] = []
     for joint in urdf.joints.values():
@@ -156,14 +155,14 @@ def find_loops(urdf: UrdfFile, closings: Sequence[Closing], inputs: Sequence[str
 
 
 Array = Any
-"""A vector of three, or a matrix of three by three."""
+"""A vector of 3, or a matrix of 3 × 3."""
 
 _PARALLEL = 1e-6
-"""Sine of the angle that joints may be off their plane by, and be in it."""
+"""Sine of the largest angle between a joint and the plane that still counts as planar."""
 
 
 class Frame(NamedTuple):
-    """Where a link is on its body, in [m], and its x axis there, as complex numbers."""
+    """Position of a link on its body, in [m], and its x axis there, as complex numbers."""
 
     body: str
     place: complex
@@ -177,17 +176,17 @@ class PlanarJoint(NamedTuple):
     Attributes
     ----------
     name
-        Of the URDF's joint.
+        Name of the URDF's joint.
     kind
         ``R`` or ``P``.
     parent, child
         Bodies.
     place
-        On the parent, in [m]; the child has its origin there.
+        Position on the parent, in [m]; it is the child's origin.
     axis
-        Of a slide a unit vector; of a turn +1 or −1.
+        A unit vector for a slide; +1 or −1 for a turn.
     mimics, multiplier, offset
-        The joint that it follows, '' for none, and how.
+        The joint that it follows, '' if none, with factor and offset.
 
     """
 
@@ -205,22 +204,22 @@ class PlanarJoint(NamedTuple):
 @dataclass(slots=True)
 class Planar:
     """
-    A URDF in its plane.
+    A URDF in the plane.
 
     Attributes
     ----------
     root
-        The body that the others hang on: the ground.
+        The root of the tree of bodies: the ground.
     frames
-        Of all links of the URDF.
+        Frames of all links of the URDF.
     joints
-        In an order in which parents come first.
+        Joints, parents first.
     bodied
-        Bodies of which there is something to be seen or to be weighed.
+        Bodies with a shape or a mass.
     marks
-        Names of places on bodies.
+        Named positions on bodies.
     masses
-        Of bodies, as far as they are given.
+        Masses of bodies, as far as they are given.
 
     """
 
@@ -234,12 +233,12 @@ class Planar:
 
 def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
     """
-    Lay the loops of a URDF into their plane.
+    Reduce the loops of a URDF to their plane.
 
     Raises
     ------
     FileError
-        Where its joints are not in one plane, with the first that is not.
+        If its joints are not in one plane; it names the first that is not.
 
     """
     turns: dict[str, Array] = {loops.ground: np.eye(3)}
@@ -300,7 +299,7 @@ def lay_flat(urdf: UrdfFile, loops: Loops) -> Planar:
 
 
 def _together(parts: list[tuple[float, complex, float]]) -> Mass:
-    """Return masses that are fixed to each other as one (by the theorem of Steiner)."""
+    """Return the total of masses fixed to each other (parallel axis theorem)."""
     mass = sum(each for each, _, _ in parts)
     centre = sum(each * place for each, place, _ in parts) / mass
     inertia = sum(own + each * abs(place - centre) ** 2 for each, place, own in parts)
@@ -313,8 +312,8 @@ def _basis(urdf: UrdfFile, turns: dict[str, Array], loops: Loops) -> Array:
     """
     Return x and y of the plane and its normal in the frame of the ground, as rows.
 
-    They are the ground's own axes where the plane is one of its own; the normal has its largest
-    part positive.
+    They are the ground's own axes if the plane is one of its coordinate planes; the largest
+    component of the normal is positive.
     """
 
     def axis(joint: UrdfJoint) -> Array:
@@ -358,7 +357,7 @@ def _unit(vector: Any) -> Array:
 
 
 def _turned(rpy: tuple[float, float, float]) -> Array:
-    """Return the matrix of roll, pitch and yaw about fixed axes, as URDF has them."""
+    """Return the rotation matrix of roll, pitch and yaw about fixed axes, as in URDF."""
     (cr, cp, cy), (sr, sp, sy) = map(cos, rpy), map(sin, rpy)
     return np.array(
         [

@@ -15,11 +15,11 @@
 """
 A linkage as a tree of frames whose joints are those that messages name.
 
-The frame of a link is parallel to the link's own, with its origin where the link hangs: at a pin,
-or at the point that its slider is measured to. Every published joint is a joint of the tree once,
-with its own sign and zero. Where the angle of a link against the one it hangs on is not published
-itself, it is a sum of published joints; for each term there is a frame without a body, and where
-such a joint is in the tree already, one that mimics it.
+The frame of a link is parallel to the link's own. Its origin lies where the link is attached: at a
+pin, or at the point whose position its slider measures. Every published joint is a joint of the
+tree once, with its own sign and zero. If the angle of a link relative to its parent is not
+published itself, it is a sum of published joints: each term has a frame without a body, and a
+term that is in the tree already has a joint that mimics it.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint, Slide
 from linkage_ros.robot_models.orientation import named_joints, Orientations, Turn
 from linkage_ros.robot_models.part import free_name, Names, PrefixedNames
 
-# What would have to be published, where the joints that are do not tell where a link stands.
+# The remedy if the published joints do not determine the position of a link.
 
 
 def remedy(
     linkage: Linkage, placed: Collection[str]
 ) -> tuple[str, str, RevoluteJoint | SlideJoint]:
-    """Return a link that is joined to placed ones, and the joint that would tell of it."""
+    """Return a link that is joined to placed ones, and a joint that would determine its place."""
     known = {*Orientations(linkage).known_from(GROUND)}
     links = linkage.links
     for link in links:
@@ -61,7 +61,7 @@ def remedy(
 
 
 def joint_text(name: str, joint: RevoluteJoint | SlideJoint) -> str:
-    """Return a joint as a linkage file says it."""
+    """Return a joint as it is written in a linkage file."""
     if isinstance(joint, SlideJoint):
         return f'{name}: {{slider: {joint.slider}}}'
     return f'{name}: {{parent: {joint.parent}, child: {joint.child}}}'
@@ -77,19 +77,19 @@ class TreeJoint(NamedTuple):
     Attributes
     ----------
     name
-        As messages name it, where it moves and mimics none.
+        Name in messages, if it moves and does not mimic another.
     kind
-        What it does.
+        Type of the joint.
     parent, child
         Frames, by name.
     place
-        Of the child's frame in the parent's where the joint is at 0, in [m].
+        Position of the child's frame in the parent's with the joint at 0, in [m].
     turn
-        Likewise its angle, in [rad].
+        Angle of the child's frame in the parent's with the joint at 0, in [rad].
     axis
-        Of a slide a unit vector in the child's frame; of a pin +1 or −1, about z.
+        For a slide a unit vector in the child's frame; for a pin +1 or −1, about z.
     mimics
-        The joint whose value it takes; '' for its own.
+        The joint that it mimics; '' if none.
 
     """
 
@@ -113,15 +113,15 @@ class Tree:
     linkage
         The linkage.
     joints
-        All joints, each after the one that its parent hangs on.
+        All joints, each after the one that moves its parent.
     origins
-        For each link where the origin of its frame is in the link's own, in [m].
+        For each link the origin of its frame in the link's own frame, in [m].
     pins
         Pins of the tree: the point, and the two links that it holds together.
     slides
         Sliders of the tree.
     spare
-        Joints that messages name and no link hangs by.
+        Joints with a name in messages that attach no link.
 
     """
 
@@ -133,28 +133,28 @@ class Tree:
     spare: list[str] = field(default_factory=list)
 
     def place(self, link: str, point: str) -> complex:
-        """Return where a point of a link is in the frame of the link, in [m]."""
+        """Return the position of a point of a link in the tree's frame of the link, in [m]."""
         return complex(*self.linkage.links[link][point]) - self.origins[link]
 
 
 class _Hang(NamedTuple):
     """
-    A way to hang a link on another that is in the tree.
+    A way to attach a link to another that is in the tree.
 
     Attributes
     ----------
     link, on
-        The two.
+        The two links.
     at
-        Name of the point at which they meet: of ``on``, for a slider that it carries ``through``.
+        Point at which they meet: on ``on``; for a slider that ``on`` carries, its ``through``.
     point
-        Name of the point of ``link`` that becomes its origin.
+        Point of ``link`` that becomes its origin.
     turns
-        Angle of ``link`` against ``on``.
+        Angle of ``link`` relative to ``on``.
     slider
         Slider between them; '' for a pin.
     slide
-        Joint that says how far.
+        Joint that measures the slide.
 
     """
 
@@ -169,19 +169,19 @@ class _Hang(NamedTuple):
 
 def grow(linkage: Linkage, names: PrefixedNames) -> Tree:
     """
-    Hang all links of a linkage on its ground.
+    Attach all links of a linkage to its ground.
 
     Parameters
     ----------
     linkage
         The linkage.
     names
-        Gives frames and joints that messages do not name names of their own.
+        Provides names for frames and joints without a name in messages.
 
     Raises
     ------
     DefinitionError
-        Where the joints that are published do not tell where a link is; it names what would.
+        If the published joints do not determine a link's position; it names a joint that would.
 
     """
     growth = _Growth(linkage, names)
@@ -192,7 +192,7 @@ def grow(linkage: Linkage, names: PrefixedNames) -> Tree:
 
 
 class _Growth:
-    """The tree as it grows, and the joints that are not in it yet."""
+    """The growing tree, and the joints that are not in it yet."""
 
     def __init__(self, linkage: Linkage, names: PrefixedNames) -> None:
         self._linkage = linkage
@@ -207,7 +207,7 @@ class _Growth:
                 self._slides[joint.slider].append(name)
 
     def grow(self) -> Collection[str]:
-        """Hang link after link, as long as there is a way; return those that hang."""
+        """Attach link after link while possible; return the attached links."""
         while ways := list(self._ways()):
             self._hang(min(ways, key=self._cost))
         return self.tree.origins
@@ -240,9 +240,9 @@ class _Growth:
 
     def _cost(self, way: _Hang) -> tuple[int, int]:
         """
-        Return what a way costs: frames without a body, and joints that another link may need.
+        Return the cost of a way: frames without a body, and joints that another link may need.
 
-        What is left of a choice is in the order of the file.
+        Ways of equal cost are tried in the order of the file.
         """
         turning = [turn.joint for turn in way.turns if turn.joint]
         moving = turning + [way.slide] * bool(way.slider)
@@ -275,10 +275,10 @@ class _Growth:
             parent, place = child, 0j
 
     def _moves(self, way: _Hang) -> Iterator[TreeJoint]:
-        """Yield joints, from that of the parent to that of the link, between no frames yet."""
+        """Yield joints from parent to link; their frames are not yet assigned."""
         turning = [i for i, turn in enumerate(way.turns) if turn.joint]
-        # A constant stands before the joint behind it, the last ones before the last joint: they
-        # turn about one axis.
+        # A constant precedes the next joint, and the last ones precede the last joint: all turn
+        # about one axis, so the order does not matter.
         constant = 0.0 if turning else sum(turn.constant for turn in way.turns)
         slide = None
         if way.slider:
@@ -305,11 +305,11 @@ class _Growth:
 
 
 _DEAR = 9
-"""What it costs to take a joint away from the link that it is there for."""
+"""Cost of using a joint that another link may need."""
 
 
 def _missing(linkage: Linkage) -> DefinitionError:
-    """Return the error that names the joints without which no tree holds all links."""
+    """Return the error that names the joints that a complete tree would need."""
     whole, lost, added = linkage, dict[str, None](), dict[str, RevoluteJoint | SlideJoint]()
     while True:
         growth = _Growth(whole, Names().of('', whole))

@@ -15,8 +15,8 @@
 """
 A linkage as URDF: the tree of its published joints, and frames where pins close its loops.
 
-Root is the ground; where several linkages stand in one model, a frame without a body that holds
-their grounds, since a scene does not say where they stand.
+The root is the ground. If several linkages share a model, the root is a frame without a body that
+holds their grounds, since a scene does not position them.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from linkage_ros.robot_models.part import Part, PartError, prefixed, PrefixedNam
 from linkage_ros.robot_models.tree import grow, Tree, TreeJoint
 from linkage_ros.robot_models.xml import comment, document, number, numbers, rough
 
-# What a tree of frames leaves open: the pins and sliders that close its loops, as pairs of frames.
+# The loop joints: pins and sliders that the tree leaves open, as pairs of frames.
 #
-# Frames named PIN_on_LINK lie where a link has the pin: that they meet is the proof that the model
-# is right. So do those of a slider, where its slide is published; else SLIDER_line_on_LINK has its
-# x axis along the line.
+# Frames named PIN_on_LINK mark the pin on each of its links: in a correct model they coincide. So
+# do those of a slider whose slide is published; otherwise the x axis of SLIDER_line_on_LINK lies
+# along the line.
 
 
 class LoopJoint(NamedTuple):
@@ -51,10 +51,10 @@ class LoopJoint(NamedTuple):
     Attributes
     ----------
     kind
-        ``pin``, ``slide`` (whose frames meet too) or ``line`` (the second lies on the x axis of
-        the first).
+        ``pin``, ``slide`` (the frames coincide as well) or ``line`` (the second lies on the x
+        axis of the first).
     name
-        Of the point or of the slider.
+        Name of the point or slider.
     frames
         Two or more.
 
@@ -66,7 +66,7 @@ class LoopJoint(NamedTuple):
 
 
 def add_frames(tree: Tree, names: PrefixedNames) -> list[LoopJoint]:
-    """Add to a tree the frames of all cuts, of joints that no link needs, and of traced points."""
+    """Add frames of all cuts, of joints that attach no link, and of traced points to a tree."""
     adding = _Adding(tree, names)
     cuts = [*adding.pins(), *adding.sliders()]
     adding.spare()
@@ -89,7 +89,7 @@ class _Adding:
                 if pin == point:
                     joined, kept = apart[link], apart[on]
                     apart = {a: kept if of == joined else of for a, of in apart.items()}
-            # The first link of each part that holds together stands for it.
+            # The first link of each connected part represents it.
             ends = list({of: link for link, of in reversed(apart.items())}.values())[::-1]
             if len(ends) > 1:
                 frames = tuple(self._fixed(point, link, point) for link in ends)
@@ -116,7 +116,7 @@ class _Adding:
         return cuts
 
     def spare(self) -> None:
-        """Give a frame of its own to every published joint that no link hangs by."""
+        """Give a frame to every published joint that attaches no link."""
         links, names = self._tree.linkage.links, self._names
         for name in self._spare:
             frame, joint = names.frame(f'{name}_frame'), self._joints[name]
@@ -166,19 +166,19 @@ def _carriers(linkage: Linkage) -> dict[str, list[str]]:
 
 
 EFFORT, VELOCITY = 1000.0, 100.0
-"""Limits that URDF asks for and nobody knows, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
+"""Limits that URDF requires but are unknown, in [N·m] or [N], and [rad/s] or [m/s]: wide."""
 
 FARTHEST = 1e9
-"""In [rad]: where an angle is limited that goes on and on to this side, and to the other not."""
+"""Stands for the missing limit of an angle that is limited on one side only, in [rad]."""
 
 _ROOT = 'world'
 
 _EXPRESSION = re.compile(r'\$[{(]')
-"""What xacro evaluates (https://wiki.ros.org/xacro)."""
+"""Text that xacro evaluates (https://wiki.ros.org/xacro)."""
 
 
 class _Model(NamedTuple):
-    """A linkage, ready to be written."""
+    """A linkage with its tree, ready to be written."""
 
     part: Part
     names: PrefixedNames
@@ -195,14 +195,14 @@ def urdf(name: str, parts: Sequence[Part]) -> bytes:
     Parameters
     ----------
     name
-        Of the robot.
+        Name of the robot.
     parts
         Its linkages.
 
     Raises
     ------
     PartError
-        Where the published joints of one do not tell where all its links are, or xacro would
+        If the published joints of a linkage do not determine all its links, or xacro would
         evaluate one of its names.
 
     """
@@ -215,8 +215,8 @@ def urdf(name: str, parts: Sequence[Part]) -> bytes:
         except DefinitionError as error:
             raise PartError(count, error.where, error.reason, error.remedy) from None
         cuts = add_frames(tree, its)
-        found = spans(part.closure)
-        models.append(_Model(part, its, tree, cuts, found, bodies(part.closure, found, layers)))
+        ranges = spans(part.closure)
+        models.append(_Model(part, its, tree, cuts, ranges, bodies(part.closure, ranges, layers)))
         layers += len(part.closure.linkage.links)
     robot = ET.Element('robot', name=name)
     robot.append(comment(list(_head(models))))
@@ -241,8 +241,8 @@ def _refuse_expressions(number: int, element: ET.Element, *, of_linkage: bool = 
     """
     Refuse names that xacro would evaluate.
 
-    A launch file reads a URDF by way of xacro or as it is; what is escaped for the one is another
-    name in the other.
+    A launch file may read a URDF with or without xacro: a name that is escaped for one is a
+    different name for the other.
     """
     for each in element.iter():
         for text in each.attrib.values():
@@ -301,13 +301,13 @@ def _write(robot: ET.Element, model: _Model) -> None:
     for joint in model.tree.joints:
         if joint.child not in links:
             ET.SubElement(robot, 'link', name=joint.child)
-    found = {names.own(name): span for name, span in model.spans.items()}
+    ranges = {names.own(name): span for name, span in model.spans.items()}
     given = {names.own(name): limits for name, limits in linkage.limits.items()}
     computed: dict[str, dict[str, str]] = {}
     for joint in model.tree.joints:
         of = joint.mimics or joint.name
         limits = given.get(of, NO_LIMITS)
-        computed[of] = _joint(robot, joint, found.get(of), limits, model.part.wrapped)
+        computed[of] = _joint(robot, joint, ranges.get(of), limits, model.part.wrapped)
     _start(robot, model, computed)
 
 
@@ -342,10 +342,10 @@ def _visuals(link: ET.Element, name: str, body: Body, origin: complex) -> None:
 def _joint(
     robot: ET.Element, joint: TreeJoint, span: Span | None, limits: Limits, wrapped: bool = False
 ) -> dict[str, str]:
-    """Write a joint; return those of its limits that the linkage does not give."""
+    """Write a joint; return the limits that were made up because the linkage has none."""
     kind: str = joint.kind
     if kind == 'revolute' and span is not None:
-        # Wrapped, an angle is on both sides of what it passes at π.
+        # A wrapped angle that passes π is on both sides.
         passing = wrapped and Span(limits.low, limits.high).passes_pi
         if passing if limits.bounded else not span.limited:
             kind = 'continuous'
@@ -361,7 +361,7 @@ def _joint(
     else:
         axis = numbers(joint.axis.real, joint.axis.imag, 0.0)
     ET.SubElement(element, 'axis', xyz=axis)
-    # What is limited on one side only, and turns on and on to the other, is limited far away.
+    # A continuous angle that is limited on one side only gets a far limit on the other.
     lowest, highest = (span.lowest, span.highest) if span.limited else (-FARTHEST, FARTHEST)
     known = {
         'lower': (limits.low, lowest),
@@ -387,10 +387,10 @@ def _origin(element: ET.Element, place: complex, turn: float = 0.0) -> None:
 
 def _start(robot: ET.Element, model: _Model, computed: Mapping[str, Mapping[str, str]]) -> None:
     """
-    Say what URDF has no words for: the inputs, and a pose in which the loops close.
+    Write the data that URDF has no elements for: the inputs, and a pose that closes the loops.
 
-    Of each joint also those limits that the linkage does not give. Readers of URDF pass over
-    elements that they do not know; ``linkage import`` knows these.
+    Also write which joint limits were made up. Readers of URDF ignore unknown elements;
+    ``linkage import`` reads these.
     """
     closure, names = model.part.closure, model.names
     inputs = usual_inputs(closure)
@@ -398,12 +398,12 @@ def _start(robot: ET.Element, model: _Model, computed: Mapping[str, Mapping[str,
     values = {driven.joint: value for driven, value in given}
     position = closure.position(*inputs)
     if not position.joints:
-        return  # of several inputs: it closes nowhere
+        return  # several inputs may each be in range, but not close together
     values |= dict(zip(closure.linkage.joints, position.joints, strict=True))
     element = ET.SubElement(robot, 'linkage_start')
     for name in named_joints(closure.linkage):
         kind = 'input' if name in [each.joint for each in closure.linkage.inputs] else 'joint'
-        own = names.own(name)
-        joint = ET.SubElement(element, kind, name=own, value=number(values[name]))
-        if own in computed:
-            ET.SubElement(joint, 'computed', dict(computed[own]))
+        named = names.own(name)
+        joint = ET.SubElement(element, kind, name=named, value=number(values[name]))
+        if named in computed:
+            ET.SubElement(joint, 'computed', dict(computed[named]))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A URDF as it stands: links and joints by name, each joint checked for what URDF asks of it."""
+"""Read a URDF: links and joints by name, each joint checked against the rules of URDF."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from xml.etree import ElementTree as ET
 from linkage_ros.errors import FileError, listed, quoted
 from linkage_ros.kinematics.linkage import Limits, NO_LIMITS
 
-# What a URDF says: links and joints by name.
+# The content of a URDF: links and joints by name.
 
 Vector = tuple[float, float, float]
 
@@ -32,7 +32,7 @@ MOVING = ('revolute', 'continuous', 'prismatic')
 
 
 class Inertial(NamedTuple):
-    """Mass [kg], its centre and the turn of its axes [m, rad], and ixx ixy ixz iyy iyz izz."""
+    """Mass [kg], its centre [m], rotation of its axes [rad], and ixx ixy ixz iyy iyz izz."""
 
     mass: float
     xyz: Vector
@@ -47,11 +47,11 @@ class UrdfLink(NamedTuple):
     Attributes
     ----------
     inertial
-        Its mass, if it has one.
+        Its inertial data, or None.
     bodied
-        Whether anything is to be seen of it, or to be weighed.
+        Whether it has a shape or a mass.
     marks
-        Names of what is to be seen, with their places, in [m].
+        Names of its visuals, with their positions, in [m].
 
     """
 
@@ -67,17 +67,17 @@ class UrdfJoint(NamedTuple):
     Attributes
     ----------
     name, kind
-        As the file has them.
+        As in the file.
     parent, child
         Links.
     xyz, rpy
-        Of the child's frame in the parent's where the joint is at 0, in [m] and [rad].
+        Child's frame in the parent's with the joint at 0, in [m] and [rad].
     axis
-        In the child's frame, of any length but 0.
+        In the child's frame, of any length except 0.
     mimics, multiplier, offset
-        The joint that it follows, '' for none, and how.
+        The joint that it follows, '' if none, with factor and offset.
     limits
-        As ``<limit>`` has them, but for those that ``linkage urdf`` has made up.
+        As in ``<limit>``, without those that ``linkage urdf`` made up.
 
     """
 
@@ -103,19 +103,19 @@ class UrdfFile(NamedTuple):
     file
         Name of the file, for messages.
     name
-        Of the robot.
+        Name of the robot.
     root
-        The link that no joint leads to.
+        The link that is no joint's child.
     links
-        By name.
+        Links by name.
     joints
-        By name; in an order in which parents come before what hangs on them.
+        Joints by name, parents first.
     order
-        Names of the joints as they stand in the file.
+        Names of the joints in the order of the file.
     inputs
-        Of joints that are driven, where the file is one of ours.
+        Names of driven joints, if ``linkage urdf`` wrote the file.
     start
-        Likewise the values of joints in a pose in which all loops close.
+        Values of joints in a pose in which all loops close, if ``linkage urdf`` wrote the file.
 
     """
 
@@ -140,7 +140,7 @@ def read_urdf(data: bytes, file: str) -> UrdfFile:
     Raises
     ------
     FileError
-        With the file and the link or joint that is at fault, and what would help.
+        With file, link or joint, and remedy.
 
     """
     try:
@@ -148,7 +148,7 @@ def read_urdf(data: bytes, file: str) -> UrdfFile:
     except ET.ParseError as error:
         line, _ = error.position
         raise FileError(file, '', f'is no XML ({error})', 'name a URDF file', line) from None
-    except (ValueError, LookupError) as error:  # an encoding that is said and is none
+    except (ValueError, LookupError) as error:  # unknown encoding in the XML declaration
         raise FileError(file, '', f'is no XML ({error})', 'name a URDF file') from None
     return _Reader(file).read(root)
 
@@ -246,7 +246,7 @@ class _Reader:
             self._values(tensor, key, where, 1, '0')[0] for key in keys
         )
         if weight <= 0.0:
-            return None  # as some exporters write frames
+            return None  # some exporters write frames this way
         return Inertial(
             weight,
             self._vector(origin, 'xyz', where, '0 0 0'),
@@ -287,10 +287,10 @@ class _Reader:
 
     def _limits(self, joint: ET.Element, name: str, made_up: Mapping[str, str] | None) -> Limits:
         """
-        Return what ``<limit>`` says, as far as it says something.
+        Return the usable limits of ``<limit>``.
 
-        Nothing do numbers that ``linkage urdf`` had to make up, bounds of a continuous joint, two
-        bounds of 0, and a velocity or an effort of 0, which exporters write who do not know them.
+        Not used are numbers that ``linkage urdf`` made up, bounds of a continuous joint, two
+        bounds of 0, and a velocity or an effort of 0, which some exporters write for unknown.
         """
         limit, where = joint.find('limit'), f'joint {name}'
         if limit is None or joint.get('type') not in MOVING:
@@ -301,7 +301,7 @@ class _Reader:
         }
         book = dict(made_up or {})
         if any(book.get(key, limit.get(key)) != limit.get(key) for key in ('lower', 'upper')):
-            # Somebody has put one of the two right, and left the other as it was.
+            # A user has corrected one of the two and left the other.
             book = {key: text for key, text in book.items() if key not in ('lower', 'upper')}
         for key, text in book.items():
             if key in told and text == limit.get(key):
@@ -373,13 +373,13 @@ class _Reader:
 
 
 def _made_up(joint: ET.Element) -> Mapping[str, str] | None:
-    """Return the limits of a joint that ``linkage urdf`` made up; None where it kept no book."""
+    """Return the limits of a joint that ``linkage urdf`` made up; None if it noted none."""
     computed = joint.find('computed')
     return None if computed is None else computed.attrib
 
 
 def _below(root: str, joints: Mapping[str, UrdfJoint]) -> Iterator[UrdfJoint]:
-    """Yield joints, those that hang on a link after that link's own."""
+    """Yield joints, parents before children."""
     reached = [root]
     for link in reached:
         for joint in joints.values():

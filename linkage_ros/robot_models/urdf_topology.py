@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A URDF, and what closes it, as links, pins, sliders and joints."""
+"""Convert a planar URDF and its loop joints to links, pins, sliders and joints."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from linkage_ros.robot_models.part import free_name
 from linkage_ros.robot_models.planar import Closing, Frame, Planar, PlanarJoint
 from linkage_ros.robot_models.urdf_file import UrdfFile
 
-# What holds two bodies of a URDF together: the joints between them, through frames without a body.
+# The connections of two bodies of a URDF: joints between them, through frames without a body.
 #
-# URDF gives a frame to whatever a joint leads to. Joints that follow each other at one place, with
-# nothing between them that can be seen or weighed, are one pin, or a pin in a slot::
+# URDF gives every joint a child link. Consecutive joints at one place, with no shape or mass
+# between them, are one pin, or a pin in a slot::
 #
 #     R+  a pin      P  a block on its line      P R+  a pin in a slot      R+ P  a rod in a swivel
 
 Symbol = tuple[tuple[tuple[str, float], ...], float]
-"""An angle as a sum of joints with their factors, and a constant, in [rad]."""
+"""An angle as a sum of joints with factors, and a constant, in [rad]."""
 
 _PATTERNS = 'R+|P|PR+|R+P'
 
 
 class Chain(NamedTuple):
-    """Joints from a body to another, with nothing between them."""
+    """Joints from one body to another, with no body between them."""
 
     parent: str
     child: str
@@ -54,22 +54,22 @@ class Chain(NamedTuple):
 
     @property
     def slide(self) -> PlanarJoint | None:
-        """Return the slide of the chain, if it has one."""
+        """Return the slide of the chain, or None."""
         return next((joint for joint in self.joints if joint.kind == 'P'), None)
 
 
 def chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
     """
-    Return what holds the bodies together.
+    Return the connections of the bodies.
 
     Parameters
     ----------
     planar
         The URDF.
     marked
-        Bodies with something at which a loop closes: they stay.
+        Bodies that carry a loop joint: they are kept even without shape or mass.
     near
-        What places may be apart by and be one, in [m].
+        Positions closer than this are one, in [m].
 
     """
     hung: dict[str, list[PlanarJoint]] = {}
@@ -77,18 +77,18 @@ def chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
         hung.setdefault(joint.parent, []).append(joint)
 
     def grown(start: PlanarJoint) -> Iterator[tuple[PlanarJoint, ...]]:
-        """Yield the chain from a joint on, longer and longer."""
-        found = [start]
-        yield tuple(found)
+        """Yield longer and longer chains that start with a joint."""
+        chain = [start]
+        yield tuple(chain)
         while True:
-            body = found[-1].child
+            body = chain[-1].child
             onward = hung.get(body, [])
             if body in planar.bodied or body in marked or len(onward) != 1:
                 return
             if abs(onward[0].place) > near:
                 return
-            found.append(onward[0])
-            yield tuple(found)
+            chain.append(onward[0])
+            yield tuple(chain)
 
     made, ahead = [], [planar.root]
     for body in ahead:
@@ -105,16 +105,16 @@ def chains(planar: Planar, marked: Collection[str], near: float) -> list[Chain]:
 
 def symbols(planar: Planar) -> dict[str, Symbol]:
     """Return the angle of every body as a sum of joints."""
-    found: dict[str, Symbol] = {planar.root: ((), 0.0)}
+    angles: dict[str, Symbol] = {planar.root: ((), 0.0)}
     for joint in planar.joints:
-        found[joint.child] = found[joint.parent]
+        angles[joint.child] = angles[joint.parent]
         if joint.kind == 'R':
-            found[joint.child] = plus(found[joint.parent], joint)
-    return found
+            angles[joint.child] = plus(angles[joint.parent], joint)
+    return angles
 
 
 def plus(symbol: Symbol, joint: PlanarJoint) -> Symbol:
-    """Return the angle behind a joint that turns."""
+    """Return the angle after a revolute joint."""
     terms: Mapping[str, float] = dict(symbol[0])
     sign = joint.axis.real
     factor = sign * (joint.multiplier if joint.mimics else 1.0)
@@ -124,17 +124,17 @@ def plus(symbol: Symbol, joint: PlanarJoint) -> Symbol:
     return tuple(sorted((each, of) for each, of in more.items() if of)), constant
 
 
-# Points of bodies, by where they are: a pin is one point that several bodies have.
+# Points of bodies by position: a pin is one point that several bodies share.
 
 
 class Points:
     """
-    Points as they are found, one after the other.
+    Points, in the order in which they are added.
 
     Parameters
     ----------
     near
-        Places on a body that are nearer to each other are one, in [m].
+        Positions on a body that are closer than this are one point, in [m].
 
     """
 
@@ -145,7 +145,7 @@ class Points:
         self._hints: list[tuple[int, int, str]] = []
 
     def at(self, body: str, place: complex, hint: str = '', rank: int = 9) -> int:
-        """Return the number of the point of a body at a place; a hint may become its name."""
+        """Return the number of the point at a position of a body; a hint may become its name."""
         number = self.there(body, place)
         if number is None:
             number = len(self._found)
@@ -156,24 +156,24 @@ class Points:
         return number
 
     def there(self, body: str, place: complex) -> int | None:
-        """Return the number of a point, if there is one."""
+        """Return the number of the point at a position, or None."""
         for number, (other, there) in enumerate(self._found):
             if other == body and abs(there - place) <= self._near:
                 return number
         return None
 
     def hint(self, number: int, name: str, rank: int) -> None:
-        """Say what a point may be called; the lowest rank wins."""
+        """Suggest a name for a point; the lowest rank wins."""
         self._hints.append((rank, number, name))
 
     def join(self, one: int, other: int) -> int:
-        """Make two points one pin."""
+        """Merge two points into one pin."""
         kept, gone = self._same[one], self._same[other]
         self._same = [kept if of == gone else of for of in self._same]
         return one
 
     def named(self, bodies: Collection[str]) -> tuple[dict[str, dict[str, complex]], list[str]]:
-        """Return the points of each body by name, and for each number the name."""
+        """Return the points of each body by name, and the name of each number."""
         taken: dict[int, str] = {}
         for _, number, hint in sorted(self._hints, key=lambda hint: hint[:2]):
             point = self._same[number]
@@ -188,14 +188,14 @@ class Points:
 
 
 NEAR = 1e-9
-"""Of the size, what places may be apart by and be one."""
+"""Positions closer than this fraction of the linkage's size are one."""
 
 _TREE, _CUT, _MARK, _ALONE = 8, 0, 1, 2
-"""Where the name of a point comes from; the lowest is taken."""
+"""Sources of a point's name; the lowest wins."""
 
 
 class _Rail(NamedTuple):
-    """A slider between bodies, its points by their numbers."""
+    """A slider between bodies, with the numbers of its points."""
 
     point: int
     along: str
@@ -208,18 +208,18 @@ class _Rail(NamedTuple):
 @dataclass(slots=True)
 class UrdfTopology:
     """
-    What a URDF comes to.
+    The linkage elements of a URDF.
 
     Attributes
     ----------
     links
         Points of every link, by name, in [m].
     bodies
-        Of each link the body of the URDF.
+        For each link its body of the URDF.
     sliders, joints
         By name.
     traced
-        Names of points.
+        Names of traced points.
 
     """
 
@@ -237,21 +237,21 @@ def urdf_topology(
     alone: dict[str, str],
 ) -> UrdfTopology:
     """
-    Put the loops of a URDF together.
+    Find the linkage elements of a URDF's loops.
 
     Parameters
     ----------
     urdf, planar
         The robot.
     closings
-        What closes it.
+        The loop joints.
     alone
-        Frames that are points, with their names.
+        Single frames, which are points, with their names.
 
     Raises
     ------
     FileError
-        Where a joint or a closing is one that a linkage cannot have.
+        If a linkage cannot have such a joint or closing.
 
     """
     return _Building(urdf, planar, closings, alone).built()
@@ -271,7 +271,7 @@ class _Building:
         self.near = NEAR * (max(places, default=0.0) or 1.0)
         self._symbols = symbols(planar)
         closing = {frame for each in closings for frame in each.frames}
-        # A slide that ends in a frame is the place of a slider's point, not a link.
+        # A slide that ends in a frame gives the position of a slider's point, not a link.
         leaves = {j.child for j in planar.joints} - {j.parent for j in planar.joints}
         self._tips = {j.child: j for j in planar.joints if j.kind == 'P' and j.child in leaves}
         self._tips = {b: j for b, j in self._tips.items() if b not in planar.bodied}
@@ -331,7 +331,7 @@ class _Building:
             yield name, body
 
     def _hold(self, chain: Chain, kept: Sequence[str]) -> None:
-        """Take the pin or slider that holds a body."""
+        """Add the pin or slider that connects a body."""
         first, last = chain.joints[0], chain.joints[-1]
         at_parent = self._points.at(chain.parent, first.place, f'{last.name}_pin', _TREE)
         at_child = self._points.at(chain.child, 0j)
@@ -345,7 +345,7 @@ class _Building:
             angle = self._symbols[chain.child][1] - self._symbols[chain.parent][1]
             rail = _Rail(at_child, chain.parent, at_parent, slide.axis, block, angle)
         else:
-            # The rod slides; its way counts against the direction in which it moves.
+            # The rod slides: its position counts opposite to its direction of motion.
             block = chain.parent if self._rigid(chain.parent, chain.child) else ''
             angle = self._symbols[chain.parent][1] - self._symbols[chain.child][1]
             rail = _Rail(at_parent, chain.child, at_child, -slide.axis, block, angle)
@@ -353,14 +353,14 @@ class _Building:
         self._joints[slide.name] = slide.name
 
     def _turns(self, chain: Chain, kept: Sequence[str]) -> None:
-        """Find between which links the angles of a chain's joints are."""
+        """Find the two links of the angle that each joint of a chain measures."""
         symbol = self._symbols[chain.parent]
         for joint in chain.joints:
             if joint.kind != 'R':
                 continue
             before, symbol = symbol, plus(symbol, joint)
             if joint.mimics and len(chain.joints) > 1:
-                continue  # it turns a frame until it is parallel to some link
+                continue  # it turns an auxiliary frame until it is parallel to a link
             ends = []
             for where, likely in ((before, chain.parent), (symbol, chain.child)):
                 found = [likely, *kept]
@@ -395,7 +395,7 @@ class _Building:
             joint = self._tips[tips[0].body]
             other = next(frame for frame in frames if frame is not tips[0])
             line = Frame(joint.parent, joint.place + tips[0].place, joint.axis)
-            # What is held at the tip besides may turn about it: the tip is a point.
+            # Another body at the tip may turn about it: the tip becomes a point.
             self._line(closing, line, other, joint.axis, joint.name)
             return
         first, *others = frames
@@ -413,7 +413,7 @@ class _Building:
     def _line(
         self, closing: Closing, line: Frame, point: Frame, direction: complex, joint: str
     ) -> None:
-        """Take a slider that no body hangs by."""
+        """Add a slider that connects no body of the tree."""
         name = joint or closing.name
         at = self._points.at(point.body, point.place, f'{closing.name}_point', _TREE)
         through = self._points.at(line.body, line.place, f'{closing.name}_line', _TREE)

@@ -14,11 +14,11 @@
 
 
 """
-XML as robot models have it: numbers that read as the same floats, comments of any text.
+XML for robot models: numbers that read back as the same floats, and comments of any text.
 
 ``-p robot_description:="$(cat leg.urdf)"`` and a substitution in a launch file are read as YAML.
-So a whole file is a plain scalar of YAML too: no colon stands before a blank in it, and no hash
-behind one (https://yaml.org/spec/1.1/, ns-plain-char).
+Therefore a whole file is also a plain YAML scalar: no colon before a blank, and no hash after one
+(https://yaml.org/spec/1.1/, ns-plain-char).
 """
 
 from __future__ import annotations
@@ -29,30 +29,30 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 _STRUCTURE = re.compile(r':(?=\s)|(?<=\s)#')
-"""What ends a plain scalar. In a file of ours that is in names only, and in comments."""
+"""Text that ends a plain scalar. In our files only names and comments can contain it."""
 
 _UNREADABLE = re.compile('[^\\n -~\xa0-\u2027\u202a-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]')
-"""What XML or YAML has no character for; of all names only that of a file can hold it."""
+"""Characters that XML or YAML does not allow; of all names only a file's can contain them."""
 
 
 def number(value: float) -> str:
-    """Return the shortest text that reads as the same float; never a negative zero."""
+    """Return the shortest text that reads back as the same float; never a negative zero."""
     value = float(value) + 0.0
     return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
 
 
 def numbers(*values: float) -> str:
-    """Return numbers with blanks between them."""
+    """Return numbers separated by blanks."""
     return ' '.join(map(number, values))
 
 
 def rough(*values: float) -> str:
-    """Return numbers to six digits: sizes of what is only looked at."""
+    """Return numbers to six digits, for sizes that are only displayed."""
     return ' '.join(f'{value:.6g}' for value in values)
 
 
 def comment(lines: Sequence[str]) -> Any:
-    """Return a comment; XML does not let two hyphens stand together in one."""
+    """Return a comment; XML forbids two adjacent hyphens in it."""
     text = '\n'.join(f'  {line}'.rstrip() for line in lines)
     while '--' in text:
         text = text.replace('--', '- -')
@@ -60,7 +60,7 @@ def comment(lines: Sequence[str]) -> Any:
 
 
 def document(root: ET.Element) -> bytes:
-    """Return a whole file, the same bytes for the same content."""
+    """Return a whole file; the same content gives the same bytes."""
     ET.indent(root)
     text = _UNREADABLE.sub('\ufffd', ET.tostring(root, 'unicode'))
     text = _STRUCTURE.sub(lambda found: f'&#{ord(found[0])};', text)

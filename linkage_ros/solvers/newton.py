@@ -57,8 +57,6 @@ from linkage_ros.kinematics.topology import Dyad, Iterated
 from linkage_ros.solvers.loops import LoopFinder, Loops, Vector
 from linkage_ros.solvers.solver import Solver
 
-if TYPE_CHECKING:
-    pass
 
 
 _PER_TURN = 256

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What a scene publishes, less the truth: by effects whose error has a formula."""
+"""The error of published states, for effects whose error has a formula."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ import pytest
 
 from ..kinematics.linkages import four_bar_linkage
 
-# Each method is as accurate, and fails where, its theory says; against the reference.
+# Every method has the accuracy of its theory, and fails where it says, against the reference.
 
 
 FOUR_BARS = ('four_bar', 'double_rocker', 'drag_link', 'parallelogram', 'hoeken')
@@ -232,7 +232,7 @@ def _end_error(way: Poses, name: str, steps: int, projected: bool, truth: Any) -
     return off(way.linkage, joints, truth)
 
 
-# Tables and Newton's method have their orders, against the reference.
+# The order of convergence of tables and of Newton's method, against the reference.
 
 
 SOME = ('four_bar', 'slider_crank', 'jansen_leg', 'class_3', 'five dyads')
@@ -299,7 +299,7 @@ def test_a_table_holds_what_its_knots_need(kind: Order) -> None:
     assert small.memory >= 64 * 2 * 8 * (2 if kind == 'linear' else 4)
 
 
-# Iterated links start from the curve of their branch, wherever the last state was.
+# Iterated links start from the curve of their branch, whatever the last state was.
 @pytest.mark.parametrize('name', ['four_bar', 'slider_crank', 'jansen_leg'])
 def test_a_step_of_newton_squares_the_distance_that_it_starts_from(name: str) -> None:
     linkage = dyads_of(name)

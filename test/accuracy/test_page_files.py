@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""The folder of a page: what lies in it, whole or not at all, and what the files say."""
+"""The folder of a page: its files are complete or absent, and have the expected content."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ from ..browser.opened import opened
 pytest.importorskip('matplotlib', reason='draws the pictures')
 pytest.importorskip('plotly', reason='is within the page')
 
-# Of marks that are drawn in a diagram, how many there are.
+# Number of marks drawn in a diagram.
 MARKS = '(key) => document.querySelectorAll(`[data-diagram=${key}] .scatterlayer .point`).length'
 COLOURS = """() => {
   const style = getComputedStyle(document.body);

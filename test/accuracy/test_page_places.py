@@ -30,7 +30,7 @@ import pytest
 
 from .shown import DIAGRAMS, EMPTY, FAILED, POSITION, RESULTS
 
-# Points lie where their numbers say; what an axis has no place for stands on its edge, hollow.
+# Points lie at their values; a value outside the axis lies on the edge, as a hollow mark.
 
 
 LOGARITHMIC, LINEAR = Axis('x', 'm'), Axis('x', 'm', logarithmic=False)
@@ -154,10 +154,10 @@ def test_methods_that_never_meet_share_the_first_look():
     assert styles['one'] == styles['two']
 
 
-# Numbers are written with the digits that tell something, ticks where a reader expects them.
+# Numbers are written with their significant digits, and ticks stand where a reader expects them.
 
 
-# The very greatest, rounded to three digits, are beyond a double.
+# The largest doubles, rounded to three digits, overflow.
 FINITE = strategies.floats(-1e308, 1e308)
 
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What recording costs: the accounts of real runs close, and figures by hand come out."""
+"""Cost of recording: the counts of real runs agree, and figures equal those computed by hand."""
 
 from __future__ import annotations
 

@@ -199,7 +199,7 @@ def test_errors_of_two_runs_are_the_same_to_the_last_bit() -> None:
     assert len(one) > 15
 
 
-# Words and pictures.
+# Texts and diagrams.
 
 
 def found(name: str, micros: float, error: float, key: str = 'easy', spread: float = 0.01,

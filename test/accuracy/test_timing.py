@@ -36,7 +36,7 @@ from linkage_ros.resources import shipped
 from linkage_ros.scene.load import load_scene
 import pytest
 
-# Times are of a state, of all methods in turn, and nothing else happens meanwhile.
+# Times are per state, of all methods in turn, and nothing else runs meanwhile.
 
 
 class Clock:
@@ -116,7 +116,7 @@ def test_of_nothing_there_are_no_times() -> None:
     assert in_turn([], 1.0) == []
 
 
-# What a subscriber has of the joint states when it uses them, over DDS.
+# The error of the joint states when a subscriber uses them, over DDS.
 
 
 LINKAGES = ('four_bar', 'double_rocker', 'scotch_yoke', 'excavator_bucket', 'class_3')

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What each file of a bag begins with: a message that was published once, as a robot model is."""
+"""The beginning of each file of a bag: messages published once, such as a robot model."""
 
 from __future__ import annotations
 

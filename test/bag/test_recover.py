@@ -14,7 +14,7 @@
 
 
 """
-What `recover` makes of bags that are cut, flipped, holed and forged.
+`recover` on bags that are cut, flipped, holed and forged.
 
 Whatever the damage: what is saved is true, in order, and read by our reader, mcap's and rosbags;
 the damaged bag stays as it was.

@@ -144,7 +144,7 @@ def test_what_was_taken_stays_as_it_was_while_the_memory_goes_on():
     assert min(number for _, _, number, _ in last.kept().messages()) == 7999
 
 
-# The memory: offers from any thread.
+# The buffer: messages from any thread.
 
 
 @pytest.fixture

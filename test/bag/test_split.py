@@ -261,7 +261,7 @@ def test_packed_chunks_are_smaller_and_checked(tmp_path, topics, messages, compr
         assert any(content[begin:end])
 
 
-# A process that is killed at its n-th call to the system that changes something on the disk.
+# A process that is killed at its n-th system call that changes something on the disk.
 KILLED = """
 import os, pathlib, pickle, signal, sys
 from linkage_ros.bag.storage import Storage

@@ -117,7 +117,7 @@ def recovered(folder: Path, topics: object) -> Path:
     return recovery.folder
 
 
-# Of each bag whether an end is missing, and how many messages it holds.
+# For each bag whether an end is missing, and its number of messages.
 BAGS: dict[Callable[[Path, object], Path], tuple[bool, int]] = {
     killed_in_a_file: (True, 15),
     killed_between_files: (True, 10),

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""A bag as `BagWriter` leaves it: what other readers find in it, and what it never touches."""
+"""A bag written by `BagWriter`, as other readers see it, and the files it never touches."""
 
 from __future__ import annotations
 

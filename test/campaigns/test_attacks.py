@@ -28,7 +28,7 @@ from campaigns.in_process import Ended
 from linkage_ros.cli.main import COMMANDS
 import pytest
 
-# A sample of the attacks: no traceback, no hang, no screenful; and the judge sees them.
+# A sample of the attacks: no traceback, no hang, no long output; and the judge detects them.
 
 
 SEED = 20261122
@@ -104,7 +104,7 @@ def test_the_judge_knows_an_end_that_must_not_be(command, code, said, found) -> 
     assert bool(files.judged(command, code, said)) is found
 
 
-# A sample of the attacks with bags: each command tells what it can, or why not in a line.
+# A sample of the attacks with bags: each command shows what it can read, or one line with why not.
 
 
 BAG_SEED = 20261123

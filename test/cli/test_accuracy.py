@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``linkage accuracy``: what it prints, writes and refuses."""
+"""``linkage accuracy``: its output, its files and its errors."""
 
 from __future__ import annotations
 
@@ -27,9 +27,6 @@ from linkage_ros.errors import LinkageError
 from linkage_ros.measuring import Spread
 from linkage_ros.resources import shipped
 import pytest
-
-# ``linkage accuracy``: what it prints and writes, and what it refuses.
-
 
 DEMO = str(shipped('scenes/demo.yaml'))
 
@@ -102,7 +99,7 @@ def test_it_can_be_stopped_and_leaves_nothing(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-# What a terminal shows of what accuracy costs.
+# The tables of ``linkage accuracy`` on a terminal.
 
 
 RESULTS = Results(

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Bags of strangers: what they say may be anything, and nothing of it is run."""
+"""Hostile bags: any content is shown safely, and none of it is executed."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ from .recorded import answer, BEGIN, FOUR_BAR, JOINT_STATE, MS, scene_file
 from .test_bounds import told
 from .test_replay import recorded
 
-# What a bag says of its run may be anything: one clear line for it, and never a traceback.
+# The run account of a bag may hold anything: the result is one clear line, never a traceback.
 
 
 DEEP = '[' * 100_000
@@ -66,7 +66,7 @@ ACCOUNTS = {
 }
 
 
-# By key what it is replaced by, as JSON.
+# The replacement of each key, as JSON.
 VALUES = {
     'a number': '3',
     'nothing': 'null',
@@ -83,7 +83,7 @@ VALUES = {
 KEYS = ('scene', 'joint_states_topic', 'crank_topic', 'withheld_topic', 'extra_topics')
 
 
-# Names of files may be anything, and a scene has the name of its file.
+# A file may have any name, and a scene has the name of its file.
 GOOD = {('scene', 'control characters'), ('scene', 'half a character')}
 
 
@@ -188,10 +188,10 @@ def test_a_tick_beyond_all_stamps_is_told_in_a_line(tmp_path, capsys, time) -> N
         answer(replay, odd)
 
 
-# A bag calls its topics, types, joints and files what it likes: what is shown is printable.
+# A bag may hold any names of topics, types, joints and files: the output is printable.
 #
-# Escapes of a terminal, line breaks, letters that turn the direction of writing, and halves of
-# letters come out as Python writes them; what is too long loses its middle.
+# Escape sequences, line breaks, characters that change the direction of writing, and lone
+# surrogates are shown as Python escapes; a long text loses its middle.
 
 
 ODD = {
@@ -283,7 +283,7 @@ def test_lines_stay_lines(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == 'one\\x1b[0m\ntwo\\r\n'
 
 
-# A bag names modules; no command runs them unless its user says so.
+# A bag names modules; no command imports them unless the user allows it.
 #
 # The canary is a package beside the bag. It writes down that it was imported.
 
@@ -317,7 +317,7 @@ def sensor(parameters, context):
 """
 
 
-# What is typed behind the bag, by the command; of each that takes a bag at least one line.
+# Arguments after the bag, by command; at least one line for each command that takes a bag.
 TYPED = {
     'info': [[], ['--json']],
     'report': [[]],
@@ -334,7 +334,7 @@ TYPED = {
 }
 
 
-# Commands that do take a scene, and may be told so to follow a bag.
+# Commands that take a scene; its drive may play a bag.
 FOLLOWS = 'linkage: l.yaml\ndrive: {bag: {file: bag}}\n'
 
 

@@ -31,9 +31,6 @@ import yaml
 
 from .conftest import environment, on_terminal, Run
 
-# ``linkage check``, ``solve`` and ``draw``: what a user types and reads, on real files.
-
-
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
 
 
@@ -53,7 +50,7 @@ def shipped(name: str) -> str:
     return str(LINKAGES / f'{name}.yaml')
 
 
-# What `check` must say of each linkage, in words of its file's head and of its textbook.
+# What `check` must report for each linkage, in words of its file's head and of its textbook.
 SAID = {
     'andrews_squeezer': ['RRR dyad', 'every angle', 'loops               3'],
     'class_3': ["Newton's method, 12 equations", 'crank_arm, platform, lower_arm, upper_arm'],
@@ -372,7 +369,7 @@ def test_check_ends_in_a_sentence_where_no_pose_can_be_told(
     assert said in answer.stdout
 
 
-# What `linkage check` and `solve` say of links that are iterated: branch, range, assemblies.
+# `linkage check` and `solve` on iterated links: branch, range, assemblies.
 
 
 DEFECTS = Path(__file__).parents[1] / 'kinematics' / 'defects'

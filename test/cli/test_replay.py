@@ -52,7 +52,7 @@ from .recorded import (
 )
 from ..support.messages import read_joint_state
 
-# ``linkage replay``: a run comes to the same bytes again, or is told where it does not.
+# ``linkage replay``: a run gives the same bytes again, or the report shows where it differs.
 
 
 TICKS = 300
@@ -285,8 +285,8 @@ def test_a_tick_that_withheld_and_would_not_now_is_a_difference(tmp_path, capsys
     assert account['topics'][0]['not_recorded'] == account['different_ticks'] == len(withheld)
 
 
-# Begun in mid-run: text of the scene, first tick in the bag, its begun, exit code, verdict, and
-# how many ticks cannot be told.
+# Bags that begin in mid-run: text of the scene, first tick in the bag, the report's word for where
+# it begins, exit code, verdict, and the number of ticks that cannot be compared.
 MID_RUN = {
     'a sample is soon there': ('effects: {velocity: {}}\n', 31, 'mid-run', 0, 'identical', 2),
     'at a sample': ('effects: {velocity: {}}\n', 30, 'mid-run', 0, 'identical', 0),
@@ -460,7 +460,7 @@ class BagWriterOf:
         self._writer.close()
 
 
-# How two runs are held against each other: message by message, and to the last place.
+# The comparison of two runs: message by message, and to the last digit.
 
 
 NAMES = ['crank', 'slide']

@@ -37,7 +37,7 @@ def as_it_is(_number: int, message: BagMessage) -> BagMessage:
     return message
 
 
-# Effects, exit code, verdict, and what cannot come again.
+# Effects, exit code, verdict, and the part that cannot be reproduced.
 RINGS = {
     'nothing remembered': ('velocity: {}', 0, 'identical', ''),
     'a delay that fills': ('velocity: {}, delay: {seconds: 0.02}', 0, 'identical', ''),

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""``linkage replay --scene``: what would have been, by the closed form; and into a new bag."""
+"""``linkage replay --scene``: counterfactual runs, by the closed form; and into a new bag."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ drive: {{topic: {{max_lead: 10.0, max_age: 10.0}}}}
 faults: {{back: {{time_jump: {{by: -0.05}}, at: [0.101], seconds: 0.05}}}}
 """
 
-# The scene that was run, its linkage, the other, its linkage, and how many joint states that has.
+# The recorded scene and its linkage, the other scene and its linkage, number of joint states.
 RUNS = {
     'the same': (PLAIN, FOUR_BAR, PLAIN, FOUR_BAR, TICKS),
     'noise': (PLAIN, FOUR_BAR, f'effects: {{{NOISE}}}\n', FOUR_BAR, TICKS),

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Signals end every command, whatever it is at."""
+"""Signals end every command at any moment."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ import pytest
 
 from .conftest import environment
 
-# SIGINT, SIGTERM and SIGHUP end every command, whatever it is at: exit code 1, one line.
+# SIGINT, SIGTERM and SIGHUP end every command at any moment: exit code 1, one line.
 
 
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
 
-# What each command is told, and what it reads with. Where it computes, all of them close loops.
+# Arguments and input of each command. Where a command computes, it closes loops.
 PARSE = 'linkage_ros.files.yaml_file:parse_yaml'
 
 
@@ -64,7 +64,7 @@ CLOSES = 'linkage_ros.kinematics.closure:Closure.position'
 WRITES = 'os:fsync'
 
 
-# The command, with something in it that takes for ever, and says so when it begins.
+# The command, with a step that takes for ever and reports when it begins.
 PROGRAM = """
 import os, pkgutil, sys, time
 from linkage_ros.cli.main import main
@@ -79,7 +79,7 @@ sys.exit(main())
 """
 
 
-# Where what is raised is lost: Python can only say that something was raised in a finalizer.
+# An exception in a finalizer is lost: Python only prints it.
 FINALIZER = """
 import os, sys, time
 from linkage_ros.cli.main import main
@@ -97,7 +97,7 @@ sys.exit(main())
 """
 
 
-# The main thread waits for the wish again and again, and signals come all the time.
+# The main thread waits for the stop event again and again, while signals keep coming.
 STORM = """
 import signal, time
 from linkage_ros.signals import stop_on_signals
@@ -229,7 +229,7 @@ def test_a_signal_that_comes_while_its_wish_is_waited_for_is_no_deadlock(folder)
     subprocess.run([sys.executable, '-c', STORM], cwd=folder, timeout=60, check=True)
 
 
-# Ctrl-C is heeded while a bag is opened whose end is missing, and which is searched for it.
+# Ctrl-C also ends the search through a bag without an end, while the bag is opened.
 
 
 SIZE = 50_000_000
@@ -238,7 +238,7 @@ SIZE = 50_000_000
 MESSAGES = 30_000  # in a chunk
 
 
-# What is typed beside the bag, and what the command says when it was stopped.
+# Arguments beside the bag, and the output of the stopped command.
 COMMANDS = {
     'info': ([], 'linkage info: stopped\n'),
     'replay': ([], 'linkage replay: stopped\n'),

@@ -29,7 +29,7 @@ from .conftest import on_terminal, Run
 SOURCE_003 = ['--pair', '25', '30', '--pair', '35', '40', '--pair', '50', '60', '--ground', '1.0']
 """Freudenstein's three positions as a textbook has them; it prints a 5.598, b 0.176, c 4.88."""
 
-# To 50 digits and rounded, worked out apart from this package.
+# Computed to 50 digits, independently of this package, and rounded.
 EXACT_003 = {'crank': 5.5965383934988620854, 'coupler': 0.16985782027961906789}
 EXACT_003 |= {'rocker': 4.8786334643580194266, 'ground': 1.0}
 

@@ -29,9 +29,6 @@ import pytest
 from .conftest import environment, Run
 from ..support.scenes import closure_of
 
-# Wrong input to ``linkage``: one line that names it, exit code 2, no traceback.
-
-
 BAD = [
     # what is typed, what the answer names
     ([], 'COMMAND'),
@@ -80,7 +77,7 @@ def test_every_command_explains_itself(linkage: Run, command: str) -> None:
     assert answer.stdout.startswith(f'usage: linkage {command}')
 
 
-# What is no regular file is refused at once, by every command, in one line.
+# A path that is no regular file is refused at once, by every command, in one line.
 
 
 READS = {
@@ -140,7 +137,7 @@ def make(kind: str, place: Path) -> None:
             os.close(folder)
 
 
-# Where a package is missing that is needed: one line that says how to get it, exit code 2.
+# A missing package: one line that says how to install it, exit code 2.
 
 
 COMMAND = 'from linkage_ros.cli.main import main'
@@ -216,7 +213,7 @@ def test_without_ros_a_run_says_how_to_get_it(folder) -> None:
     )
 
 
-# Files that were made to break a command: each is answered, in full or in one line.
+# Hostile files: each gives a full answer or one line.
 
 
 ATTACKS = Path(__file__).parent / 'attacks'

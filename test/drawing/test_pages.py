@@ -31,7 +31,7 @@ from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.scene.load import parse_scene
 import pytest
 
-# The gallery shows every linkage that comes with the package, as its file is now.
+# The gallery shows every shipped linkage, as its file is now.
 
 
 ROOT = Path(__file__).parents[2]
@@ -71,7 +71,7 @@ def test_nothing_else_is_in_the_gallery(page: str) -> None:
     assert drawn == {file.stem for file in FILES}
 
 
-# The page of drives, effects and faults says what the code declares, and shows its own scenes.
+# The page of drives, effects and faults agrees with the code, and shows its own scenes.
 
 
 LINKAGES = ROOT / 'config' / 'linkages'

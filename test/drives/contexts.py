@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""What drives are built for in these tests: linkages of one input and of two, and a scene."""
+"""Contexts for drives in tests: linkages of one input and of two, and a scene."""
 
 from __future__ import annotations
 

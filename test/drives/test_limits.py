@@ -57,7 +57,7 @@ def pipeline(drive, linkage):
 
 CHIRP = 'chirp: {amplitude: 0.6, mean: 1, start_frequency: 0.01, end_frequency: 0.02, seconds: 5}'
 
-# Drive and limits; what is said, '' where it is run.
+# Drive, limits, and the error; '' if the scene runs.
 DRIVES = {
     'at rest': ('constant_rate: {rate: 0, start: 1}', OWN, ''),
     'on and on': (

@@ -35,8 +35,8 @@ from ..support.messages import read_joint_state
 
 # The crank from a topic, as timelines.
 #
-# Each line of a timeline is a time in ms and what happens then: a sample is offered, with its
-# stamp in ms, angle and rate, and what becomes of it; or the state is asked for, and what it is.
+# Each line of a timeline has a time in ms and an event: a sample is offered, with its stamp in
+# ms, angle and rate, and the drive's verdict; or the state is read, with its expected value.
 
 
 MS = 1_000_000
@@ -267,13 +267,12 @@ def test_of_several_inputs_one_that_is_bad_spoils_the_sample(bad, reason, place)
     assert drive.state(NOW) is None
 
 
-# The system of docs/how_to/stand_in.md, with what ros2_control's topic-based hardware makes of
-# it.
+# The system of docs/how_to/stand_in.md, with ros2_control's topic-based hardware.
 #
 # `Hardware` does what read() and write() of joint_state_topic_hardware_interface do in the
-# versions 1.0.0 and 1.1.0 (joint_state_topic_hardware_interface.cpp), of get_state() and
-# set_state() what hardware_component_interface.hpp of Jazzy does: they throw where there is no
-# such interface.
+# versions 1.0.0 and 1.1.0 (joint_state_topic_hardware_interface.cpp). Its get_state() and
+# set_state() follow hardware_component_interface.hpp of Jazzy: they throw if there is no such
+# interface.
 
 
 PAGE = (Path(__file__).parents[2] / 'docs' / 'how_to' / 'stand_in.md').read_text('utf-8')

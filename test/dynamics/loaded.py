@@ -13,7 +13,7 @@
 # limitations under the License.
 
 
-"""Linkages of the gallery with masses and loads, and states of theirs to look at."""
+"""Linkages of the gallery with masses and loads, and states of them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from linkage_ros.kinematics.linkage import (
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'
 
-# What each is here for, and values of its inputs, away from toggles.
+# The purpose of each, and values of its inputs, away from toggles.
 STATES: dict[str, tuple[tuple[float, ...], ...]] = {
     'four_bar': ((0.3,), (1.9,), (-2.0,)),
     'slider_crank': ((0.4,), (2.5,), (-1.3,)),  # a pin in a slot: a block without mass

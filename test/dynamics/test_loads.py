@@ -37,7 +37,7 @@ from .loaded import shipped
 RUBBING = JointFriction(0.1, 0.2)
 SPRING = Spring('ground', 'O2', 'rocker', 'B', 100.0, 0.1, 3.0)
 
-# The linkage, the loads, the friction, and what is said.
+# The linkage, the loads, the friction, and the error.
 REFUSED = {
     'a link that is not there': (
         'four_bar',

@@ -29,7 +29,7 @@ import pytest
 
 from .sensors import ANGLES, BEGIN, context, MS, published, reading
 
-# Delay: exact to the nanosecond, nothing before it is there, and no more kept than that takes.
+# Delay: exact to the nanosecond, no value before the first, and no more history than needed.
 
 
 def delayed(seconds, **parameters):
@@ -220,7 +220,7 @@ def test_between_ticks_a_scene_is_where_the_crank_then_was():
         assert found.rates == pytest.approx(rates, abs=2.3e3 * 0.001**2 / 8)
 
 
-# A history: exact where the motion is a cubic, of the order that it says, and never long.
+# The history: exact for cubic motions, with the order that it declares, and of bounded length.
 
 
 def remembered(signal, times, span=10**12):

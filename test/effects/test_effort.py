@@ -35,7 +35,7 @@ from ..support.messages import joint_state as serialized
 from ..support.messages import read_joint_state, STORE
 from ..support.scenes import linkage_of, LINKAGES, pipeline_of, shipped
 
-# Effort: what the drive must give, against closed forms and the energy worked out by hand.
+# Effort that the drive must exert, against closed forms and energy balances by hand.
 
 
 FOUR_BAR = shipped('four_bar')
@@ -212,10 +212,10 @@ def test_without_masses_it_is_refused_in_one_line():
     assert '\n' not in str(caught.value)
 
 
-# What the published effort is under the torque drive: moving freely, stuck, at a stop, braked.
+# The published effort under the torque drive: moving freely, stuck, at a stop, braked.
 #
-# Timelines of a crank with a weight, and of a ram. They are cut free by hand: the effort is what
-# drive, brake, stop and static friction exert together.
+# Timelines of a crank with a weight, and of a ram. The free-body diagrams are by hand: the effort
+# is what drive, brake, stop and static friction exert together.
 
 
 MS = 1_000_000

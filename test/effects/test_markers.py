@@ -105,7 +105,7 @@ def some_inputs(closure):
     return [inputs for inputs in found if closure.position(*inputs).joints]
 
 
-# Where things are.
+# Positions.
 
 
 @pytest.mark.parametrize('linkage', GALLERY)
@@ -252,7 +252,7 @@ def test_a_trace_is_the_way_of_the_last_seconds():
         assert places(trace) == pytest.approx(expected, abs=1e-12)
 
 
-# When they come.
+# Times.
 
 
 def ticked(effects, times, scene='rate: 1000'):
@@ -353,7 +353,7 @@ def test_of_several_linkages_each_has_its_own():
         assert {marker.header.frame_id for marker in markers} == {f'{side}_ground'}
 
 
-# Trouble.
+# Failures.
 
 
 def transmission_angle(theta):

@@ -29,10 +29,10 @@ import pytest
 
 from ..support.scenes import scene_of
 
-# Faults, as timelines: what is published before, while and after, and when they begin and end.
+# Faults, as timelines: what is published before, during and after, and when they begin and end.
 #
-# The crank turns at 1 rad/s from 0, so that the crank's joint is the time in seconds: a tick's
-# position says of which instant it is.
+# The crank turns at 1 rad/s from 0, so that the crank's position is the time in seconds: the
+# position in a tick shows which instant it belongs to.
 
 
 MS = 1_000_000
@@ -197,11 +197,11 @@ def test_several_faults_at_once():
     assert stamps(messages) == [0, 1010, 1020, NOTHING, 40, 50]
 
 
-# Faults where the ticks are samples (`rate: 0`), as timelines of messages that come.
+# Faults if ticks follow samples (`rate: 0`), as timelines of messages.
 #
-# The loop is the node's own; only what waits for messages is left out. Samples come with stamps
-# that are 3 ms old. Times of faults are those of the node's clock, counted from when the first
-# message came, and not those of stamps.
+# The loop is the node's own, without the waiting for messages. The stamps of samples are 3 ms old.
+# Times of faults are those of the node's clock, counted from the arrival of the first message,
+# not those of stamps.
 
 
 OLD = 3

@@ -33,7 +33,7 @@ from linkage_ros.kinematics.linkage import (
 )
 from linkage_ros.kinematics.step import State
 
-# Linkage objects for the tests: textbook shapes, in frames as plain or as odd as a test wants.
+# Linkage objects for the tests: textbook shapes, in plain or arbitrary frames.
 
 
 Frame = tuple[float, float, float]
@@ -154,7 +154,7 @@ def class_3_linkage() -> Linkage:
     )
 
 
-# A dyad on a crank and the ground, alone: its coordinates are those of the loop's own frame.
+# A single dyad on a crank and the ground: its coordinates are those of the loop's own frame.
 
 
 class _OnCrank:

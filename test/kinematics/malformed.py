@@ -82,7 +82,7 @@ def rename(old: str, new: str) -> Change:
     return change
 
 
-# What can be wrong with a linkage: how to make each fault, the key that is named, the remedy.
+# Possible faults of a linkage: how to make each, the key that the error names, the remedy.
 
 
 FOUR_BAR = fields(four_bar_linkage((0.04, 0.12, 0.08, 0.1), 'left'))
@@ -103,7 +103,7 @@ def swivel(**changes: Any) -> Change:
     return put('sliders', 'swivel', Slider(**parts))
 
 
-# What is wrong: the linkage it is wrong in, the change, the key named, and words of the remedy.
+# Fault: the linkage, the change, the key named, and words of the remedy.
 MALFORMED: dict[str, tuple[Fields, Change, str, str]] = {
     'no ground': (FOUR_BAR, rename('ground', 'frame'), 'links', "name the frame 'ground'"),
     'no input': (FOUR_BAR, put('inputs', ()), 'input', 'name a joint that is'),

@@ -32,17 +32,17 @@ from typing import Any, NamedTuple
 from linkage_ros.kinematics.status import Status
 from mpmath import mp, mpc, mpf
 
-# The truth that the kinematics are measured against, to as many digits as a test asks for.
+# The reference of the kinematics tests, with any number of digits.
 #
 # Nothing here is taken from the package. A loop is solved in coordinates, by intersecting
 # circles (or a circle with a line), and differentiated implicitly: with the unit complex numbers
-# of its links, the derivative of its closing equation is linear in what is sought, for every
-# input and for the crank's rate alike. Coordinates cancel near a change point; digits are cheap,
-# so they may.
+# of its links, the derivative of its closing equation is linear in the unknowns, for every
+# input and for the crank's rate alike. Coordinates cancel near a change point; this is harmless,
+# since the number of digits is free.
 #
-# An error is stated in units of u·κ, with u = 2⁻⁵³ and κ = Σ|xᵢ ∂y/∂xᵢ| + |y| over the lengths
-# and the crank's direction within (-π, π]: what rounding inputs and result once may cause by
-# itself.
+# An error is given in units of u·κ, with u = 2⁻⁵³ and κ = Σ|xᵢ ∂y/∂xᵢ| + |y| over the lengths
+# and the crank's direction within (-π, π]: the error that rounding inputs and result once may
+# cause by itself.
 
 
 UNIT_ROUNDOFF = 2.0**-53
@@ -252,10 +252,9 @@ def _quantity(value: mpf, inputs: tuple[mpf, ...], slopes: list[mpf]) -> Quantit
     )
 
 
-# How wrong a result may be, in units of u·κ (`reference`), and a record of the worst that was
-# met.
+# Limits of the error of a result, in units of u·κ (`reference`), and a record of the worst.
 #
-# Each limit stands with what was measured over 220,000 random loops of other seeds.
+# Beside each limit stands the value measured over 220,000 random loops of other seeds.
 
 
 ANGLE = 4.0

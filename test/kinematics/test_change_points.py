@@ -30,15 +30,15 @@ from .flat_linkages import FLAT, Flat
 from .linkages import FourBar, InvertedSliderCrank
 from .reference import ANGLE, four_bar, inverted_slider_crank, LENGTH, RATE, TOGGLE, UNIT_ROUNDOFF
 
-# Where all links lie along the ground, a linkage may go on as either of two; it goes on as it
-# was.
+# Where all links lie along the ground, a linkage may continue in two ways; it continues in its
+# assembly.
 #
 # The half-angle form decides that in closed form. κ grows beyond all bounds near a change point,
-# so that the references here are motions known exactly: a parallelogram, whose coupler does not
+# so the references here are motions known exactly: a parallelogram, whose coupler does not
 # turn, and kites.
 
 
-# a = c and b = d; the last as decimals, which do not cancel exactly.
+# a = c and b = d; the last ones as decimals, which do not cancel exactly.
 PARALLELOGRAMS = {
     'longer ground': (1.0, 2.0, 1.0, 2.0),
     'longer crank': (2.0, 1.0, 2.0, 1.0),
@@ -47,7 +47,7 @@ PARALLELOGRAMS = {
 }
 
 
-# From as far as the eye sees to next to where rates are no normal numbers any more.
+# From a visible distance to just above the one at which rates become subnormal numbers.
 NEAR = [1e-3, 1e-6, 1e-9, 1e-12, 1e-100, 1e-290]
 
 
@@ -244,7 +244,7 @@ def test_where_the_crank_pin_meets_the_ground_pivot_rates_stay_right(
 DISTANCES = [10.0**-exponent for exponent in range(3, 16)]
 
 
-# Lengths a, b, c, d and whether it is by stretching or folding that the dyad limits the crank.
+# Lengths a, b, c, d, and whether the dyad limits the crank by stretching or by folding.
 LIMITS = {
     'stretched': ((4.0, 5.0, 3.0, 6.5), 'stretch'),
     'folded, long coupler': ((4.0, 5.0, 3.0, 2.5), 'fold'),
@@ -383,9 +383,9 @@ def test_the_gap_is_what_the_links_miss_each_other_by(
 
 # One rule of sides for all dyads, also at change points (docs/conventions.md).
 #
-# Where a linkage folds flat, the named side holds while the crank points to one side of the line
-# on which it folds; beyond it the linkage goes on as it moves. Sides are read off the points'
-# places.
+# When a linkage folds flat, the named side holds while the crank points to one side of the
+# folding line; beyond it the linkage continues its motion. Sides are read off the positions of
+# the points.
 
 
 COUNT = 150

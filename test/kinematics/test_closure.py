@@ -38,7 +38,7 @@ from .reference import four_bar, inverted_slider_crank, UNIT_ROUNDOFF
 from .test_gallery import closure_of, FOLDER
 from .test_ranges import FILES
 
-# Published joints are child less parent and slides in metres, whatever the links' frames.
+# Published joints are child minus parent, and slides in metres, whatever the links' frames.
 
 
 CRANK_ANGLES = [-3.0, -1.2, 0.1, 0.9, 2.2, 3.1]
@@ -232,7 +232,7 @@ def test_a_slide_line_may_be_given_in_any_length_and_from_any_of_its_points() ->
         assert Closure(linkage).position(1.0).joints == pytest.approx((expected,), rel=1e-15)
 
 
-# A step closed alone has the pose that it has among all others, to the last bit.
+# A step closed alone gives the same pose as in an array, to the last bit.
 
 
 @pytest.mark.parametrize('name', [file.stem for file in FILES])
@@ -288,14 +288,13 @@ def counted(close, closings):
     return counting
 
 
-# Followed points: each lies where its link carries it, and its rates are the slopes of its
-# places.
+# Tracked points: each moves with its link, and its rates are the derivatives of its position.
 #
-# Places are held against those of two named points of the link, which the closure places by
-# steps of their own; velocities and accelerations against differences of the places.
+# Positions are compared with those of two named points of the link, which the closure computes by
+# steps of their own; velocities and accelerations with differences of the positions.
 
 
-# The values of the inputs: at all of them every loop closes, away from toggles.
+# Values of the inputs: at all of them every loop closes, away from toggles.
 INPUTS = {
     'four_bar': (0.7,),
     'slider_crank': (2.5,),

@@ -257,10 +257,10 @@ def test_a_bent_rod_that_just_reaches_its_swivel_is_at_a_change_point(
     assert across == pytest.approx(0.0, abs=1e-15)
 
 
-# Cylinders: of two ranges that are mirror images a user is told that of positive length.
+# Cylinders: of two ranges that are mirror images, the one of positive length is reported.
 #
-# Each family draws a rod in a tube, each on a pin of its own, with other places of the pins on
-# the line; and linkages that look alike, whose negative slides are poses of their own.
+# Each family has a rod in a tube, each on a pin of its own, with varied positions of the pins on
+# the line; and similar linkages whose negative slides are poses of their own.
 
 
 TEXT = """
@@ -385,7 +385,7 @@ def test_a_slide_on_the_ground_is_no_cylinder():
     assert low.highest < 0.0 < high.lowest
 
 
-# Metres, micrometres or light years, slender or stout, turned once or often: all the same.
+# The scale does not matter: metres, micrometres or light years, slender or stout, any turn.
 
 
 FOUR_BAR = (0.04, 0.12, 0.08, 0.1)

@@ -38,7 +38,7 @@ from ..support.scenes import size_of
 FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'
 EXPECTED = json.loads((Path(__file__).parent / 'gallery.json').read_text('utf-8'))
 
-# The dyads that each linkage is known to consist of, and where that stands.
+# The known dyads of each linkage, and the source.
 KINDS = {
     'andrews_squeezer': 'RRR RRR RRR',
     'class_3': 'iterated',

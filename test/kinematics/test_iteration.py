@@ -38,7 +38,7 @@ from .linkages import class_3_linkage
 from .platforms import linkage_of, platform
 from ..support.scenes import shipped
 
-# What is iterated is what the closed form would say, depends on no history, and ends honestly.
+# Iteration agrees with the closed form, depends on no history, and reports when it fails.
 
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'

@@ -57,7 +57,7 @@ def closed(text, limits=''):
     return closure_of(text.replace('LIMITS', limits))
 
 
-# Linkage, limits, and for values of the input what is found there.
+# Linkage, limits, and the result at values of the input.
 STATES = {
     'within': (CRANK_ROCKER, ', input: {limits: [0.5, 1.5]}', {0.5: CLOSED, 1.0: CLOSED}),
     'beyond, either way': (

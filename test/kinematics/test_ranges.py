@@ -46,7 +46,7 @@ from .linkages import four_bar_linkage, inverted_slider_crank_linkage
 from .reference import four_bar, inverted_slider_crank, UNIT_ROUNDOFF
 from .test_gallery import closure_of as shipped
 
-# Where the crank can turn: the ends of its range are where the loop stops closing.
+# The range of the crank: its ends are where the loop stops closing.
 
 
 # Lengths a, b, c, d and what limits the crank: (folds, stretches).
@@ -250,7 +250,7 @@ def test_what_is_narrower_than_the_samples_is_found(narrow: float, gap: bool) ->
         assert min(abs(remainder(end - one, 2.0 * pi)) for one in found) < 1e-7
 
 
-# What is found over a range: its limits as a user says them, extremes, residuals, four-bars.
+# Results over a range: its limits in the user's units, extremes, residuals, four-bars.
 
 
 LINKAGES = Path(__file__).parents[2] / 'config' / 'linkages'
@@ -302,7 +302,7 @@ def test_every_shipped_linkage_closes_to_rounding_all_over_its_range(file: Path)
     assert count > 400
 
 
-# A pose, and where a linkage is shown and starts then; of a crank-rocker, and one that folds.
+# A pose, and the start of a linkage with it; for a crank-rocker, and one that folds.
 POSES = {
     'none': ((2.0, 7.0, 9.0, 6.0), None, radians(60.0)),
     'a start': ((2.0, 7.0, 9.0, 6.0), Pose((0.436,), {}), 0.436),
@@ -449,7 +449,7 @@ def test_a_grid_goes_over_all_inputs() -> None:
     assert len({inputs for inputs, _ in found}) == len(found) == 36
 
 
-# The name of a four-bar: Barker's fourteen, and what Grashof's inequality says of the motion.
+# The name of a four-bar: Barker's fourteen types, and Grashof's inequality for the motion.
 
 
 # Barker's fourteen types as R. L. Norton, Design of Machinery, ch. 2, lists them: by which link

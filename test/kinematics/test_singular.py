@@ -30,7 +30,7 @@ from .flat_linkages import FLAT
 from .linkages import four_bar_linkage
 from ..support.scenes import closure_of
 
-# Where an input meets toggles and change points: listed, with what is met there.
+# Inputs at toggles and change points: a list with the kind of each.
 
 
 COUNT = 100
@@ -160,8 +160,8 @@ def test_the_files_that_had_none(name: str, status: Status, places: list[float])
 
 # Dyads on a rocker that lie flat, have parallel lines, or whose pins meet.
 #
-# The rocker is that of a parallelogram: it turns as the crank does, so that all that follows is
-# known without solving anything.
+# The rocker is that of a parallelogram: it turns as the crank does, so that everything that
+# follows is known without solving.
 
 
 PARALLELOGRAM = """

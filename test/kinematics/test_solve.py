@@ -87,7 +87,7 @@ def slider_crank_linkage(
     )
 
 
-# What the gallery does not have: diagonals and rails between links that share no pin, two lines
+# Cases that the gallery lacks: diagonals and rails between links that share no pin, two lines
 # that cross, a link that a motor on another one turns, a motor within a dyad, change points that
 # are not passed.
 OTHERS: dict[str, tuple[Linkage, Inputs]] = {

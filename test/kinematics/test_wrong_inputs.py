@@ -32,7 +32,7 @@ import pytest
 from .malformed import Fields, FOUR_BAR, MALFORMED, SLIDER_CRANK
 from .test_gallery import closure_of as shipped
 
-# What is no input: one line that names it, or a state without a pose; never a made-up one.
+# Invalid inputs: one line that names the input, or a state without a pose; never a wrong pose.
 
 
 ONE, TWO = shipped('four_bar'), shipped('five_bar')
@@ -115,7 +115,7 @@ def test_a_position_without_rates_has_none() -> None:
             closure.velocity(position, 1.0)
 
 
-# A linkage that cannot be built is refused in one line: where, what is wrong, what would help.
+# A linkage that cannot be built is refused in one line with place, reason and remedy.
 
 
 @pytest.mark.parametrize('name', MALFORMED)

@@ -184,7 +184,7 @@ def compare(text: str, happens: Iterable[Moment]) -> int:
         return len(published)
 
 
-# What was found to differ, once: the scene, and what happens.
+# Differences found once: the scene, and the events.
 FOUND = {
     'play goes on where the loop is open': (scene('topic', ['backlash']), Plan()),
     'a curve begins where the loop is open': (scene('constant_rate', []), Plan()),

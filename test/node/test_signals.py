@@ -29,8 +29,8 @@ from .graph import crank, wait_for
 
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
 
-# The node, on a middleware that never comes down: it has the interpreter's lock meanwhile, or the
-# interpreter is gone.
+# The node, on a middleware that never shuts down: it keeps the interpreter's lock meanwhile, or
+# the interpreter is gone.
 STUCK = {
     'node': 'node.LinkageNode.destroy_node = lambda _: ctypes.PyDLL(None).sleep(600)',
     'library': 'c = ctypes.CDLL(None); c.__cxa_atexit(c.sleep, ctypes.c_void_p(600), None)',

@@ -44,7 +44,7 @@ SAID = (
 TURNING = 'drive: {constant_rate: {rate: 1.0}}\nrate: 1000'
 OWN_NETWORK = [shutil.which('unshare') or 'unshare', '--map-root-user', '--net']
 
-# As a process that holds the node among others: rclpy is up before the node is made.
+# A process that hosts the node among others: rclpy is initialised before the node is created.
 COMPONENT = """
 import rclpy
 rclpy.init()

@@ -25,7 +25,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 
-# What a sourced workspace or an editable install would lend to a build.
+# Variables by which a sourced workspace or an editable install would affect a build.
 LENT = (
     'AMENT_PREFIX_PATH',
     'CMAKE_PREFIX_PATH',

@@ -36,7 +36,7 @@ HEADER = """\
 # limitations under the License.
 """
 
-# Named one by one: a linter let loose on `.` would read build/ and install/ too.
+# Folders are named one by one: a linter on `.` would also read build/ and install/.
 NAMES = ('setup.py', 'bench', 'examples', 'launch', 'linkage_ros', 'test')
 
 

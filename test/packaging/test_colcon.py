@@ -22,7 +22,7 @@ import sys
 
 import pytest
 
-# Set for the tests that colcon runs here: they must not start colcon in their turn.
+# Set for tests that colcon runs here: they must not start colcon themselves.
 INSIDE = 'LINKAGE_ROS_INSIDE_COLCON'
 COLCON = Path(sys.executable).with_name('colcon')
 

@@ -24,8 +24,8 @@ import pytest
 
 PACKAGE = 'linkage_ros'
 
-# Packages by height: each may import from below its own height, and from its neighbours as long
-# as no two import each other.
+# Packages by height: a package may import from lower ones, and from its neighbours as long as no
+# two import each other.
 HEIGHTS = (
     ('errors', 'signals', 'generated_code', 'measuring', 'processes'),
     ('kinematics', 'resources', 'messages'),
@@ -58,8 +58,8 @@ ROS = (
     'visualization_msgs',
 )
 
-# An import of ours within a function is for pipeline/pipeline.py, which imports what a scene calls
-# for, and for the command line, which starts fast. Elsewhere its line says why.
+# Imports of our own modules within functions: pipeline/pipeline.py imports only what a scene
+# needs, and the command line starts fast. Elsewhere the line gives its reason.
 LOCAL_IMPORTS = ('pipeline', 'cli')
 MARK = '# local import: '
 

@@ -36,7 +36,7 @@ from linkage_ros.report.run import Lane, Silences
 import numpy as np
 import pytest
 
-# Lateness out of times alone; the clock of a run; silences; how durations are spread.
+# Lateness from times alone; the clock of a run; silences; distribution of durations.
 
 
 MS = 1_000_000
@@ -109,7 +109,7 @@ def test_no_ticks_are_not_late():
     assert not len(lateness(1000.0, np.empty(0, np.int64)))
 
 
-# Log times, by how much a message may stand too late, the times of the run, and jumps.
+# Log times, by how much a message may come too late, run times, and jumps.
 CLOCKS = {
     'forward': ([5, 7, 7, 20], 0, [0, 2, 2, 15], []),
     'back': ([5, 7, 3, 4], 0, [0, 2, 2, 3], [(2, 4)]),
@@ -193,7 +193,7 @@ def test_percentiles_are_those_of_the_durations_to_a_bin(durations):
         assert told == found.greatest or true <= told <= max(100.0, true * 10**0.1 * (1 + 1e-12))
 
 
-# Decimation curves keep what is least and greatest, in a bounded number of intervals.
+# Decimated curves keep minima and maxima, in a bounded number of intervals.
 
 
 NUMBERS = st.floats(-1e300, 1e300) | st.sampled_from([np.nan, np.inf, -np.inf, 0.0, -0.0])

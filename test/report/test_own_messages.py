@@ -42,7 +42,7 @@ from .runs import (
     TYPES,
 )
 
-# Curves are what the messages of a run say; numbers that no joint has break nothing.
+# Curves agree with the messages of a run; implausible numbers break nothing.
 
 
 STATE = 'sensor_msgs/msg/JointState'
@@ -133,7 +133,7 @@ def test_numbers_that_no_joint_has_break_no_page(tmp_path, value):
     json.loads(text.split('id="data">')[1].split('</script>')[0], parse_constant=pytest.fail)
 
 
-# What the diagnostics of a run add: ticks lost, messages dropped, warnings, and when it ended.
+# The diagnostics of a run: lost ticks, dropped messages, warnings, and when it ended.
 
 
 SHORT_MEMORY = 'drive: {topic: {max_age: 0.2}}\n'
@@ -228,7 +228,7 @@ def test_what_could_not_be_known_is_not_said_to_be_none(tmp_path):
     }
 
 
-# Samples of the crank: rejected for the reason of the run, and as old at a tick as they were.
+# Samples of the crank: rejected for the reason of the run, with the same age at each tick.
 
 
 def joint_state(stamp, names, positions, rates):

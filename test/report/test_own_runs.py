@@ -69,7 +69,7 @@ def flat(tick, moment):
     return moment._replace(messages=(sample(tick, -1.0 + 0.125 * tick, 1.0),))
 
 
-# Scene, what is changed of `turning`, its linkage, and what is on the lanes, in [ms].
+# Scene, change of `turning`, its linkage, and the spans on the lanes, in [ms].
 HAPPENS = {
     'nothing': ('', None, '', {}),
     'a fault, on and off': (
@@ -217,7 +217,7 @@ def both(tick, moment):
 INJECTED = Said(350.5, 'faults', {'quiet (silence)': 'injected', 'worn (stuck)': 'off'})
 OFF = Said(350.5, 'faults', {'quiet (silence)': 'off', 'worn (stuck)': 'off'})
 
-# Of a bag that begins at 300 ms: what was turned on and off and said in the run, and its faults.
+# For a bag that begins at 300 ms: switches and diagnostics of the run, and its faults.
 BEGUN_LATER = {
     'on before, and turned off': (
         asking(tick_200=('quiet', True), tick_500=('quiet', False)),

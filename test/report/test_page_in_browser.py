@@ -55,21 +55,21 @@ TRACE = """([plot, name]) => {
   const {x, y, text, rows, line} = data.find((each) => each.name === name);
   return {x, y, text, rows, colour: line?.color};
 }"""
-# Where pins are put; nothing without a pose.
+# Positions of pins; None without a pose.
 PINS = f"""() => {{
   const [linkage] = Report.linkages;
   const at = (link, x) => linkage.place(link, x, 0, Report.number);
   if (!linkage.hasPose(Report.number, Report.time)) return null;
   return [at('crank', {bags.A}), at('coupler', {bags.B}), at('rocker', {bags.C})];
 }}"""
-# A copy of a picture: its own surface is not meant to be read.
+# A copy of a canvas: the canvas itself is not meant to be read.
 COPY = """const copied = (canvas) => {
   const copy = new OffscreenCanvas(canvas.width, canvas.height);
   const pen = copy.getContext('2d', {willReadFrequently: true});
   pen.drawImage(canvas, 0, 0);
   return pen.getImageData(0, 0, canvas.width, canvas.height).data;
 };"""
-# Of each canvas how many pixels have each colour.
+# For each canvas the number of pixels of each colour.
 PAINTED = f"""() => {{ {COPY}
   return [...document.querySelectorAll('canvas')].map((canvas) => {{
     const data = copied(canvas);
@@ -82,7 +82,7 @@ PAINTED = f"""() => {{ {COPY}
     return found;
   }});
 }}"""
-# The colour at a place of the linkage, in [m]; nothing of what is not painted.
+# The colour at a position of the linkage, in [m]; None where nothing is painted.
 COLOUR_AT = f"""([x, y]) => {{ {COPY}
   const canvas = document.querySelector('canvas');
   const [px, py] = Report.canvases[0].toPixel([x, y]).map((each) =>

@@ -40,7 +40,7 @@ import pytest
 from .runs import BEGIN, MS, read
 from ..node.ticked import Moment, run
 
-# Links stand where the closure puts them, by the published joints alone, in the whole gallery.
+# Links are at the closure's poses, from the published joints alone, in the whole gallery.
 
 
 FILES = sorted(shipped('linkages/four_bar.yaml').parent.glob('*.yaml'))
@@ -158,7 +158,7 @@ def test_where_joints_do_not_tell_of_a_link_the_loops_are_closed_at_the_input():
             assert abs(rect(1.0, angle) - rect(1.0, frames[link].angle)) < 1e-12
 
 
-# Every linkage of the gallery is drawn where its messages say that it was, from its bag.
+# From its bag, every linkage of the gallery is drawn at its recorded poses.
 
 
 TICKS = 40

@@ -205,7 +205,7 @@ joints:
 """,
 }
 
-# Linkages whose joints do not tell all, and what would.
+# Linkages whose published joints do not determine all links, and the joints that would.
 UNTOLD = {
     'the coupler': (
         FOUR_BAR + 'joints: {rocker_joint: {parent: ground, child: rocker}}',

@@ -60,8 +60,8 @@ def weighed(name, mass, xyz='0 0 0', rpy='0 0 0', inertia=(1e-4, 2e-4, 3e-4)):
     )
 
 
-# An arm whose wrist turns about z, and on it a finger that a four-bar keeps: joints about y, all
-# closed where they are at 0. The finger's joint mimics the motor, as URDFs without loops have it.
+# An arm whose wrist turns about z, and on it a finger moved by a four-bar: joints about y, all
+# closed with the joints at 0. The finger's joint mimics the motor, as in URDFs without loops.
 # Shape of the loop, in the wrist's frame (x, z): motor (0, 0) to (0.03, 0.04); finger (0.05, 0) to
 # (0.08, 0.05); the bar between their ends.
 BAR_END = 0.05 * cos(0.7) + 0.01 * sin(0.7)

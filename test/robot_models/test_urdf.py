@@ -40,7 +40,7 @@ from .odd import closure_of, ODD, UNTOLD
 from .walked import BEGIN, heard, moving, moving_text, MS, said, Walked
 from ..support.scenes import linkage_of, LINKAGES, ONE_INPUT, scene_of, size_of
 
-# The URDF of a linkage: valid, the same every time, with limits that its joints keep.
+# The URDF of a linkage: valid, reproducible, with limits that its joints keep.
 
 
 SCENES = LINKAGES.parent / 'scenes'
@@ -280,7 +280,7 @@ def test_pinocchio_reads_it_too(name):
     assert set(model.names) - {'universe'} == set(limits_of(data))
 
 
-# Linkage to URDF and back: the joints have the same values all over the range.
+# Linkage to URDF and back: the joints have the same values over the whole range.
 
 
 WITHIN = 1e-12

@@ -24,7 +24,7 @@ import pytest
 
 from .files import CONFIG, FOUR_BAR, is_one_line, SCENE
 
-# A scene that cannot be used: one line that says where, what, and what would help.
+# An invalid scene: one line with place, reason and remedy.
 #
 # Linkages follow in `test_bad_linkages`; `test_damaged_files` damages the shipped files at
 # random.
@@ -208,7 +208,7 @@ def test_a_scene_that_cannot_be_read(tmp_path, name):
     assert 'name a file' in str(caught.value)
 
 
-# A linkage file that cannot be used: one line that says where, what, and what would help.
+# An invalid linkage file: one line with place, reason and remedy.
 
 
 # Without its first line, which is for editors.

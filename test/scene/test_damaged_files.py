@@ -36,7 +36,7 @@ import yaml
 
 from .files import CONFIG, is_one_line
 
-# The shipped files, damaged at random: what comes of them runs, or is refused with one line.
+# The shipped files, damaged at random: each still runs, or is refused in one line.
 
 
 SHIPPED = [load_scene(scene).files for scene in sorted((CONFIG / 'scenes').glob('*.yaml'))]
@@ -116,7 +116,7 @@ def test_damaged_contents(data):
     either_runs_or_says_why({name: yaml.safe_dump(file).encode() for name, file in files.items()})
 
 
-# A gallery file that was spoilt is answered, or refused in one line; never with a traceback.
+# A damaged gallery file gives an answer, or one line; never a traceback.
 
 
 FOLDER = Path(__file__).parents[2] / 'config' / 'linkages'

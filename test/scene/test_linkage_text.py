@@ -79,7 +79,7 @@ NEAR = st.floats(-0.1, 0.1)
 POINTS = st.tuples(NUMBERS, NUMBERS)
 MOST = st.just(inf) | st.floats(0.0, 1e9, exclude_min=True)
 EXERTIONS = st.builds(Limits, velocity=MOST, effort=MOST)
-# Limits that leave every state where it is: nothing else is asked of them here.
+# Limits that do not affect any state: tests here need no others.
 FAR = st.sampled_from([(-inf, inf), (-1e9, inf), (-inf, 1e9), (-1e9, 1e9)])
 LIMITS = st.builds(lambda ends, of: replace(of, low=ends[0], high=ends[1]), FAR, EXERTIONS)
 
@@ -236,7 +236,7 @@ def test_a_file_takes_the_place_of_the_one_before(tmp_path: Path) -> None:
     assert sorted(tmp_path.iterdir()) == [link, file]
 
 
-# A name within the test's folder, and what is said of it.
+# A name within the test's folder, and the error.
 NOT_WRITTEN = {
     'no/linkage.yaml': 'cannot be written (No such file or directory); name another file',
     'file/linkage.yaml': 'cannot be written (Not a directory); name another file',

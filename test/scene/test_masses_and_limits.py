@@ -28,7 +28,7 @@ import pytest
 from .files import CONFIG, is_one_line
 from ..support.scenes import linkage_of, scene_of
 
-# The masses of a linkage file: what they say, and one line for what they cannot.
+# The masses of a linkage file: valid ones, and one line for invalid ones.
 
 
 FILE = (CONFIG / 'linkages' / 'four_bar.yaml').read_text('utf-8')
@@ -71,7 +71,7 @@ def test_shipped_linkages_that_forces_can_move(file):
     assert {*linkage.masses} == {*linkage.links} - {'ground'}
 
 
-# What stands after `masses: `, and what is said.
+# The text after `masses: `, and the error.
 BAD = {
     'a list': ('[crank]', "masses: ['crank'] is not a mapping; write masses: {…}"),
     'a number': ('{crank: 0.1}', 'masses.crank: 0.1 is not a mapping; write crank: {…}'),
@@ -123,7 +123,7 @@ def test_bad_masses_are_refused_in_a_line(kind):
     assert str(caught.value).startswith(f'linkage.yaml:{LINE}: {expected}')
 
 
-# Limits in linkage files: what may be said, what is refused, and that it is written again.
+# Limits in linkage files: valid ones, refused ones, and that they are written again.
 
 
 SHORT = 'four_bar: {a: 0.04, b: 0.12, c: 0.08, d: 0.1, SAID}'
@@ -186,7 +186,7 @@ def test_where_nothing_is_said_there_are_none():
 START = 'pose: {inputs: [1.0]}\n'
 
 
-# What the input, the rocker and the coupler say, and what stands behind; the error and its remedy.
+# Text of the input, the rocker and the coupler, and the text after it; the error and its remedy.
 REFUSED = {
     'one number': ([', limits: 3'], ':7: input.limits: 3 is not two numbers; write [low, high]'),
     'three': ([', limits: [1, 2, 3]'], ':7: input.limits: [1, 2, 3] is not two numbers; write'),

@@ -33,7 +33,7 @@ import pytest
 
 from .files import CONFIG, FOUR_BAR, is_one_line, SCENE
 
-# What scene and linkage files say: the shipped ones, defaults, numbers, shorthands.
+# Content of scene and linkage files: the shipped ones, defaults, numbers, shorthands.
 
 
 ANGLES = [-7.0, -pi, -1.0, 0.0, 1e-9, 0.5, 2.0, 3.0, 100.0]
@@ -267,7 +267,7 @@ def test_a_bag_holds_enough_to_build_the_scene_again(build):
     assert Pipeline(again).closures[0].position(1.0) == pipeline.closures[0].position(1.0)
 
 
-# A linkage file where a scene is expected: it moves, from where it starts, within its range.
+# A linkage file in place of a scene: the linkage moves from its start, within its range.
 
 
 BEGIN = 1_700_000_000_000_000_000
@@ -279,7 +279,7 @@ MS = 1_000_000
 SIXTY = pi / 3.0
 
 
-# Where the inputs of the gallery end, from one triangle each; all others turn fully.
+# Ends of the input ranges in the gallery, from one triangle each; all others turn fully.
 _FARTHEST = 2.0 * acos(0.75)
 
 
@@ -364,7 +364,7 @@ NEAR = 0.02 * (HIGH - LOW)
 TURNS = FOLDS.replace('[4, 0]', '[2, 0]').replace('[3, 0]', '[5, 0]')
 
 
-# Text of the file; where it starts; the lowest and the highest value that it comes to in 4 s.
+# Text of the file; the start; the lowest and the highest value reached in 4 s.
 STARTS = {
     'a full turn': (TURNS, 0.436, 0.436, 4.436),
     'a full turn, backward beyond one': (TURNS, -7.0, -7.0, -3.0),
@@ -480,7 +480,7 @@ def test_what_stands_for_it_is_a_scene_of_the_user_s_own(tmp_path: Path) -> None
 NEITHER = 'is neither a scene nor a linkage; write linkage: FILE for a scene, links: {…} for a'
 
 
-# Text of the file; what is said of it.
+# Text of the file, and the error.
 WRONG = {
     'nothing': ('{}', f': {NEITHER}'),
     'parameters of a node': ('/**: {ros__parameters: {scene: x.yaml}}', f': {NEITHER}'),

@@ -145,7 +145,7 @@ def test_no_mapping_lets_strangers_in():
             assert one['additionalProperties'] != {}
 
 
-# Appended to a scene that says no more than its linkage. A schema cannot know what follows in
+# Appended to a scene with only a linkage. Errors that a schema cannot detect follow in
 # SEEN_BY_THE_READER.
 BAD_SCENES = {
     'unknown key': 'rtae: 5',
@@ -285,7 +285,7 @@ def slider(text: bytes) -> bytes:
     return full.replace(old, text)
 
 
-# The whole file; what a schema cannot know follows in SEEN_IN_A_LINKAGE.
+# The whole file; errors that a schema cannot detect follow in SEEN_IN_A_LINKAGE.
 BAD_LINKAGES = {
     'nothing known': b'bars: 4',
     'shorthand without a side': b'four_bar: {a: 1, b: 1, c: 1}',

@@ -106,7 +106,7 @@ def test_the_gallery_moves_as_in_closed_form(file, start: str) -> None:
         assert newton.points(solved).keys() == closure.points(found).keys()
 
 
-# Change points, and linkages that come within a hair of one.
+# Change points, and linkages that come very close to one.
 NEAR_CHANGE_POINTS: dict[str, Lengths] = {
     'parallelogram': (1.0, 2.0, 1.0, 2.0),
     'kite': (1.0, 1.0, 2.0, 2.0),

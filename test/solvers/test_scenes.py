@@ -226,7 +226,7 @@ def test_what_is_read_the_schema_takes() -> None:
         assert not violations(content, scene_schema())
 
 
-# The cheapest solver that proves an accuracy: what may be chosen, what is, and what is said.
+# The cheapest solver that guarantees an accuracy: candidates, choice, and output.
 
 
 def timed(monkeypatch, **times: float) -> list[set[str]]:
@@ -241,7 +241,7 @@ def timed(monkeypatch, **times: float) -> list[set[str]]:
     return asked
 
 
-# Times in units of one, and who wins: what is faster by less than a tenth is not faster.
+# Times relative to one, and the winner: less than a tenth faster does not count as faster.
 TIMINGS = [
     ({'closed_form': 1.0, 'table': 0.8, 'newton': 2.0}, 'table'),
     ({'closed_form': 1.0, 'table': 0.8, 'newton': 0.7}, 'newton'),
@@ -263,7 +263,7 @@ def test_the_fastest_is_chosen(monkeypatch, times, winner: str) -> None:
     assert worst_error(CRANK_ROCKER, 1.0, found.position(1.0).joints) <= 1e-6
 
 
-# Who proves what.
+# The accuracy that each solver guarantees.
 ABLE = {
     'four_bar': {'closed_form', 'table', 'newton'},
     'watt_1': {'closed_form', 'table'},

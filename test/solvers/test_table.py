@@ -51,10 +51,10 @@ from ..kinematics.linkages import four_bar_linkage
 from ..kinematics.reference import turned
 from ..support.scenes import shipped
 
-# Tables: their orders, what they prove, and where they are refused.
+# Tables: their orders, their guarantees, and where they are refused.
 
 
-# Between the knots, so that no doubling of these meets them.
+# Values between the knots, which no doubling of the knots meets.
 PLACES = [tau * (k + 0.137) / 97.0 for k in range(97)]
 
 
@@ -260,7 +260,7 @@ def test_the_residual_tells_of_the_table() -> None:
     assert max(residuals) > 1e-8
 
 
-# The proof behind a table: discs that hold, and a bound that no derivative exceeds.
+# The guarantee of a table: discs that contain the truth, and a bound of every derivative.
 
 
 reals = st.floats(-3.0, 3.0)

@@ -31,7 +31,7 @@ import pytest
 
 SPAN = np.linspace(0.05, 0.95, 19)
 
-# Each formula, and the same in 50 digits.
+# Each formula, and the same with 50 digits.
 FORMULAS = {
     'log10(x)': mp.log10,
     'x^1.5': lambda x: x ** mp.mpf('1.5'),
@@ -265,7 +265,7 @@ class _Audit:
             self.told.append(event)
 
 
-# There is no taking a hook away again.
+# A hook cannot be removed again.
 _AUDIT = _Audit()
 
 

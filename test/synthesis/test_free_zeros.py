@@ -433,8 +433,8 @@ def test_a_linkage_that_needs_no_zero_is_listed_once() -> None:
 
 THETA = [0.1, 0.5, 1.0, 1.7, 2.4]
 
-# The rocker turns with the crank (parallelograms), against it, or by a constant ratio with it, so
-# that columns of the equations are those of each other.
+# The rocker turns with the crank (parallelograms), against it, or in a constant ratio to it, so
+# that columns of the equations are equal.
 SINGULAR = {
     'parallelogram': THETA,
     'turned parallelogram': [theta + 0.3 for theta in THETA],

@@ -254,7 +254,7 @@ def test_sines_of_twofold_angles(kind: str, data: st.DataObject) -> None:
         assert error <= 2.0**-68 * abs(true) + 2.0**-104 * abs(angle)
 
 
-# Pairs in degrees: crank, rocker, and what is said of them.
+# Pairs in degrees: crank, rocker, and the error.
 REFUSED: dict[str, tuple[Angles, Angles, str]] = {
     'the same twice': (
         (25, 35, 25),

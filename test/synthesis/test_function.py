@@ -34,14 +34,14 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebval
 import pytest
 
-# A function becomes pairs of angles: scales, Chebyshev's points, and what cannot be generated.
+# A function becomes pairs of angles: scales, Chebyshev points, and functions that are refused.
 
 
 Case = tuple[str, tuple[float, float], tuple[float, float], tuple[float, float]]
 
 
-# Formulas that textbooks set, in 50 digits, with ranges of x, crank and rocker in degrees. No
-# printed solution could be read; what is expected is worked out here.
+# Formulas of textbooks, in 50 digits, with ranges of x, crank and rocker in degrees. No printed
+# solution was legible; the expected values are computed here.
 TASKS: dict[str, tuple[Case, object]] = {
     'log': (('log10(x)', (1, 2), (45, 105), (135, 225)), mp.log10),
     'power': (('x^1.5', (1, 4), (30, 120), (60, 150)), lambda x: x * mp.sqrt(x)),
@@ -264,7 +264,7 @@ def test_chebyshev_points_of_the_angles_are_those_of_x() -> None:
     assert np.degrees(crank) == pytest.approx(expected, rel=1e-14)
 
 
-# A function that has no value somewhere in its range is refused, with where that is.
+# A function without a value somewhere in its range is refused; the error says where.
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def exact(numbers):
     return [mpc(complex(number)) for number in numbers]
 
 
-# Poses of many kinds; each gives places (n, 3), angles (n, 3) and a pivot (n,).
+# Poses of many kinds; each gives positions (n, 3), angles (n, 3) and a pivot (n,).
 
 
 def anywhere(generator, count):
@@ -172,7 +172,7 @@ def test_one_at_a_time_is_as_all_at_once():
             assert one.sensitivity == many.sensitivity[index]
 
 
-# Round trips: a four-bar is driven, in 50 digits, and asked for again.
+# Round trips: a four-bar is driven, in 50 digits, and designed back from its poses.
 
 
 def driven(generator):
@@ -297,7 +297,7 @@ def test_whole_turns_are_the_same_pose(turns):
     assert abs(np.subtract(design.four_bar.coupler, other.four_bar.coupler)).max() < 1e-11
 
 
-# What does not exist.
+# Tasks without a solution.
 
 START, RAISED, OVER = pose(0, 0, 0), pose(0, 1, 20), pose(2, 1, 50)
 ABOUT = [pose(0, 0, 0), pose(0, 0, 20), pose(0, 0, 50)]

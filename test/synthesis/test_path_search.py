@@ -41,7 +41,7 @@ import pytest
 
 from .by_hand import Lengths, on, pins, transmission
 
-# Where path generation begins: four-bars that close, laid upon the points by least squares.
+# Start of path generation: four-bars that close, fitted to the points by least squares.
 
 
 POINTS = np.array([0.1 + 0.2j, 0.3 + 0.3j, 0.4 - 0.1j, 0.1 - 0.4j, -0.4 - 0.2j, -0.5 + 0.2j])
@@ -155,13 +155,13 @@ def test_steps_keep_what_was_asked_for(aim: Aim, closed: bool, guard: float) -> 
         assert np.exp(1j * world) == pytest.approx(1.0)
 
 
-# Coupler curves of many four-bars: places by compass and ruler, derivatives by differences.
+# Coupler curves of many four-bars: positions by compass and ruler, derivatives by differences.
 
 
 length = st.floats(0.2, 4.0)
 
 
-# Where the crank's pin can meet the rocker's pivot, no circle says where the other pin is.
+# If the crank's pin can meet the rocker's pivot, no circle determines the other pin.
 lengths_of_any = st.tuples(length, length, length, length).filter(
     lambda lengths: abs(lengths[0] - lengths[3]) > 1e-3
 )

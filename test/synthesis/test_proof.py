@@ -32,7 +32,7 @@ import pytest
 
 from .by_hand import design, Lengths, on, transmission
 
-# A design is proved by the closure that a node runs, and put on the assembly that meets it.
+# A design is verified by the node's own closure, and gets the assembly that meets the task.
 
 
 # sources/003, exactly: 25° → 30°, 35° → 40°, 50° → 60°.
@@ -224,10 +224,10 @@ def test_random_designs_in_odd_frames_are_met_where_they_were_made() -> None:
         assert max(abs(left[0].angle), abs(right[0].angle)) > 1e-3, 'only one can be right'
 
 
-# What a user needs is missed by so much, and said with what was found instead.
+# A requirement that is missed: by how much, and the result found instead.
 
 
-# One of each of Barker's kinds that a word may stand for.
+# One of each of Barker's types that a word may stand for.
 FOUR_BARS = {
     'crank-rocker': (2.0, 7.0, 9.0, 6.0),
     'double rocker': (4.0, 1.0, 5.0, 5.0),

@@ -49,7 +49,7 @@ from scipy.optimize import minimize
 from . import by_hand
 from .test_function import task_of, TASKS
 
-# The structural error of a design is that of the same four-bar with compass and ruler.
+# The structural error of a design equals that of the same four-bar by compass and ruler.
 
 
 CRANK_ROCKER = (2.0, 7.0, 9.0, 6.0)
@@ -310,7 +310,7 @@ def test_where_there_is_no_rocker_angle_there_is_no_error() -> None:
     assert np.isnan(errors).all()
 
 
-# The rocker's own error: linkages found again, starts improved on, and minima by other means.
+# The rocker's error: linkages found again, improved starts, and minima by other methods.
 
 
 SEED = 20261121

@@ -26,7 +26,7 @@ from linkage_ros.synthesis.study import CHUNK, distributed, Found, scipy_optimiz
 import numpy as np
 import pytest
 
-# A study finds the best of all its candidates, whoever works them out.
+# A study finds the best of all its candidates, whichever process evaluates them.
 
 
 CAST = 3 * CHUNK + 7
@@ -145,7 +145,7 @@ def test_any_number_of_workers_finds_the_same():
                 assert done[-1] == study['count']
 
 
-# A library that only some kinds of synthesis need is named, with what installs it.
+# A missing library that only some kinds of synthesis need is named, with how to install it.
 
 
 @pytest.mark.parametrize(

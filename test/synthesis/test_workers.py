@@ -29,7 +29,7 @@ import pytest
 distributed = pytest.importorskip('distributed')
 cloudpickle = pytest.importorskip('cloudpickle')
 
-# Workers cannot import this module, whose name only pytest knows.
+# Workers cannot import this module, since only pytest knows its name.
 cloudpickle.register_pickle_by_value(sys.modules[__name__])
 
 WITHOUT_US = """

@@ -42,7 +42,7 @@ from linkage_ros.kinematics.status import Status
 import numpy as np
 import pytest
 
-# How a path is written for arrays: what is asked, what is kept, and how constants are written.
+# Code of a path for arrays: what it computes, what it keeps, and how it writes constants.
 
 
 def written(root: object, condition: object = True, **given: int) -> BlockFunction:
@@ -94,7 +94,7 @@ def test_a_row_is_used_again_when_nobody_needs_what_is_in_it() -> None:
     assert written(total.operation).rows <= 2
 
 
-# What is compiled answers as the plain steps do, to the last bit, and does nothing unasked.
+# Compiled code agrees with the plain steps to the last bit, and computes nothing unasked.
 
 
 LINKAGES = sorted((Path(__file__).parents[3] / 'config' / 'linkages').glob('*.yaml'))
