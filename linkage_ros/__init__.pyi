@@ -28,9 +28,9 @@ from linkage_ros.messages.joint_state import (
     Rejection as Rejection,
 )
 from linkage_ros.kinematics.batch import Batch as Batch
-from linkage_ros.kinematics.closure import (
+from linkage_ros.kinematics.closure import Closure as Closure
+from linkage_ros.kinematics.results import (
     Acceleration as Acceleration,
-    Closure as Closure,
     Position as Position,
     Velocity as Velocity,
 )
@@ -43,7 +43,7 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint as SlideJoint,
     Slider as Slider,
 )
-from linkage_ros.kinematics.ranges import InputRange as InputRange
+from linkage_ros.kinematics.results import InputRange as InputRange
 from linkage_ros.kinematics.status import Status as Status
 from linkage_ros.pipeline.pipeline import Pipeline as Pipeline, Tick as Tick
 from linkage_ros.replay.replay import recorded_scene as recorded_scene

@@ -32,14 +32,8 @@ from statistics import median
 from time import perf_counter_ns
 from typing import NamedTuple
 
-from linkage_ros.effects.stage import (
-    bringing,
-    dependencies,
-    EFFECTS,
-    FORCE_EFFECTS,
-    in_order,
-    module_of,
-)
+from linkage_ros.effects.dispatch import bringing, dependencies, in_order, module_of
+from linkage_ros.effects.stage import EFFECTS, FORCE_EFFECTS
 from linkage_ros.errors import FileError
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs

@@ -95,11 +95,11 @@ def named_file(named: str | PathLike[str], folder: str) -> Path:
     except TypeError:
         message = f'{quoted(named)} is neither a path nor a name; name a file, or one of '
         raise TypeError(message + listed(_names(folder))) from None
-    if named != path.stem or path.is_file():
-        return path
     names = _names(folder)
-    if named in names:
+    if named in names and (path.is_dir() or not path.exists()):
         return shipped(f'{folder}/{named}.yaml')
+    if named != path.stem or path.exists():
+        return path
     raise FileError(
         named or "''",
         '',

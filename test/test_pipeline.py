@@ -345,4 +345,4 @@ def test_a_delay_delays_the_silence_of_slow_and_lossy_sensors_too():
 def test_what_the_linkage_lacks_is_told_of_the_linkage_file():
     with pytest.raises(FileError) as caught:
         pipeline(b'drive: {constant_rate: {rate: 1.0}}\neffects: {effort: {}}')
-    assert str(caught.value).startswith("test: linkage.yaml: masses: link 'crank' has no mass")
+    assert str(caught.value).startswith("here: linkage.yaml: masses: link 'crank' has no mass")

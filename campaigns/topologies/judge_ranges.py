@@ -27,7 +27,7 @@ from campaigns.topologies.judge import Findings
 from campaigns.topologies.topology import Topology, Walks
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.singularity_margin import SingularInput
+from linkage_ros.kinematics.results import SingularInput
 from linkage_ros.kinematics.status import Status
 import numpy as np
 

@@ -35,8 +35,8 @@ from typing import Any
 
 from linkage_ros.cli.main import COMMANDS, module_of
 from linkage_ros.cli.scene import REGISTRIES, table_of
-from linkage_ros.files.schema import linkage_schema, scene_schema
 from linkage_ros.pages.markdown import table_lines
+from linkage_ros.scene.schema import linkage_schema, scene_schema
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -43,7 +43,7 @@ from linkage_ros.dynamics.loads import Loads
 from linkage_ros.dynamics.mechanics import Mechanics
 from linkage_ros.dynamics.motion import Motion, OneFreedom
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.ranges import InputRange
+from linkage_ros.kinematics.results import InputRange
 from linkage_ros.measuring import alternating, Progress, Spread, spread_of
 from linkage_ros.scene.scene import Scene, SceneLinkage
 

@@ -43,8 +43,9 @@ from cmath import rect
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Linkage, RevoluteJoint
+from linkage_ros.kinematics.results import Position
 from mpmath import MPContext
 
 __all__ = ('DIGITS', 'Reference', 'SingularError', 'Truth')

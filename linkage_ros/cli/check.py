@@ -28,7 +28,7 @@ from linkage_ros.files.linkage_file import load
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bars
 from linkage_ros.kinematics.linkage import Limits
-from linkage_ros.kinematics.ranges import InputRange
+from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import (
     conditionings,

@@ -28,16 +28,17 @@ from typing import Any
 
 from linkage_ros.cli.terminal import show, Table
 from linkage_ros.drives.drive import DRIVES
-from linkage_ros.effects.stage import bringing, EFFECTS, module_of
+from linkage_ros.effects.dispatch import bringing, module_of
+from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import did_you_mean, FileError, LinkageError, listed
 from linkage_ros.faults.fault import FAULTS
 from linkage_ros.files.parameters import declared, default_of, is_required, parameter_rows, summary
-from linkage_ros.files.schema import as_text, linkage_schema, scene_schema
 from linkage_ros.files.section import Section
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.pipeline.pipeline import LinkagePipeline, Pipeline
 from linkage_ros.scene.load import kind_of, load_scene
 from linkage_ros.scene.scene import Scene
+from linkage_ros.scene.schema import as_text, linkage_schema, scene_schema
 from linkage_ros.solvers.registry import SOLVERS
 
 _WHERE = {

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from math import nan, pi, remainder, tau
 from typing import NamedTuple
 
-from linkage_ros.kinematics.ranges import InputRange
+from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.sweep_analysis import InputSweep, samples
 
 _SAME_PATH = 0.01

@@ -40,9 +40,9 @@ from linkage_ros.drawing.painting import (
 )
 from linkage_ros.drawing.shapes import Circle, Polygon, Shape, shapes, skeleton
 from linkage_ros.errors import LinkageError
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
-from linkage_ros.kinematics.ranges import InputRange
+from linkage_ros.kinematics.results import InputRange, Position
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 
 _GHOSTS = 5

@@ -29,8 +29,9 @@ from typing import Any, NamedTuple
 from linkage_ros.drawing.figure import all_places, symbol_size, View
 from linkage_ros.drawing.painting import corners, outline
 from linkage_ros.drawing.shapes import carried_shapes, Circle, Segment, Shape
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.results import Position
 
 _DIGITS = 6
 """Significant ones of what is drawn: a thousandth of a pixel."""

@@ -28,8 +28,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import ceil, pi, tau
 from typing import Literal, NamedTuple
 
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Slider
+from linkage_ros.kinematics.results import Position
 
 Role = Literal[
     'link', 'input', 'plate', 'block', 'tube', 'rail', 'slot', 'ground', 'hatch', 'pin', 'ghost'

@@ -24,7 +24,8 @@ from linkage_ros.drawing.figure import all_places, symbol_size, view
 from linkage_ros.drawing.painting import COLOURS, corners, FACES, GHOST, INK, outline, STROKES
 from linkage_ros.drawing.shapes import Circle, Polygon, shapes, skeleton
 from linkage_ros.errors import quoted
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
 _LONGER_SIDE = 420.0
@@ -59,6 +60,7 @@ def svg(shown: Closure | Position) -> str:
     if not isinstance(position, Position):
         raise TypeError(f'svg: {quoted(shown)} is not drawn; give a Closure or a Position')
     closure = position.closure
+    assert isinstance(closure, Closure)
     seen = view(closure, position.inputs)
     size = symbol_size(seen)
     drawn = shapes(closure, position, size, seen.sweep.travels)

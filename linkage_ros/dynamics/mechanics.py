@@ -43,10 +43,11 @@ from typing import NamedTuple
 
 from linkage_ros.dynamics.loads import check_loads, check_masses, Friction, Loads
 from linkage_ros.kinematics.arithmetic import all_finite, copysign, where
-from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Compiled
 from linkage_ros.kinematics.compiling.trace import Motion as CompiledMotion
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 
 _ROUNDING = 1e-9
 """A slip below this part of the rates that it comes from is none."""

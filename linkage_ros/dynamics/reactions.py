@@ -39,8 +39,9 @@ from typing import NamedTuple
 
 from linkage_ros.dynamics.mechanics import Mechanics, resistance, stretched
 from linkage_ros.kinematics.arithmetic import called, facing, is_found, vector
-from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, RevoluteJoint
+from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.topology import Joint
 import numpy as np

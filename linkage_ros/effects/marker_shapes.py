@@ -32,8 +32,9 @@ from typing import NamedTuple
 from linkage_ros.drawing.figure import all_places, symbol_size, view
 from linkage_ros.drawing.painting import COLOURS, corners, FACES, INK, outline
 from linkage_ros.drawing.shapes import carried_shapes, Circle, Polygon, Segment, Shape
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Input
+from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.messages.marker_array import (
     ARROW,

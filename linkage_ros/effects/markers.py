@@ -43,8 +43,8 @@ from linkage_ros.drives.drive import Context
 from linkage_ros.effects.marker_shapes import ALARM, Arrows, Key, marker_shapes
 from linkage_ros.effects.stage import MechanismState, SensorReading, Writer
 from linkage_ros.files.parameters import number, text
-from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.linkage import GROUND
+from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.topology import Driven, Dyad, Group

@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 from linkage_ros.drives.drive import Context
 from linkage_ros.faults.fault import Switch
 from linkage_ros.files.parameters import name
-from linkage_ros.kinematics.closure import Position
+from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 
 

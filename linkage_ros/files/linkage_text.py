@@ -47,7 +47,8 @@ from linkage_ros.kinematics.linkage import (
     SlideJoint,
     Slider,
 )
-from linkage_ros.kinematics.ranges import describe, InputRange
+from linkage_ros.kinematics.ranges import describe
+from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.sweep_analysis import InputSweep, usual_inputs
 
 _WIDTH = 99

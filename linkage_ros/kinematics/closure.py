@@ -22,12 +22,11 @@ Position first; what a scene calls for beyond it starts from the position and re
 from __future__ import annotations
 
 from cmath import rect
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from numbers import Real
 from operator import mul
-from typing import Any, ClassVar, NamedTuple, TYPE_CHECKING
+from typing import Any, ClassVar, TYPE_CHECKING
 
 from linkage_ros.errors import clean, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
@@ -35,13 +34,17 @@ from linkage_ros.kinematics.checks import check
 from linkage_ros.kinematics.limits import Bounds, limited, without_mirrored, zero_length
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
 from linkage_ros.kinematics.plan import SolutionPlan
-from linkage_ros.kinematics.ranges import closing_ranges, input_ranges, InputRange
-from linkage_ros.kinematics.singularity_margin import (
-    singular_inputs,
+from linkage_ros.kinematics.ranges import closing_ranges, input_ranges
+from linkage_ros.kinematics.results import (
+    Acceleration,
+    InputRange,
+    PointMotion,
+    Position,
     SingularInput,
-    singularity_margin,
     SingularityMargin,
+    Velocity,
 )
+from linkage_ros.kinematics.singularity_margin import singular_inputs, singularity_margin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import Pose, State
 from linkage_ros.kinematics.topology import assur_groups, Structure
@@ -55,164 +58,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-class _JointValues(Mapping[str, float]):
-    """A value for each published joint, by its name: ``found['rocker_joint']``."""
-
-    __slots__ = ()
-
-    joints: tuple[float, ...]
-    closure: Closure
-
-    def __getitem__(self, joint: str) -> float:
-        """
-        Return the value of a joint.
-
-        Raises
-        ------
-        KeyError
-            If the linkage publishes no joint of this name.
-        ValueError
-            If the linkage has no pose.
-
-        """
-        names = self.closure.joint_names
-        if joint not in names:
-            raise KeyError(f'{quoted(joint)} is not a published joint; use {listed(names)}')
-        if not self.joints:
-            raise ValueError(f'{joint}: {self!r} has no joint values; check its status first')
-        return self.joints[names.index(joint)]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.closure.joint_names)
-
-    def __len__(self) -> int:
-        return len(self.closure.joint_names)
-
-    def __repr__(self) -> str:
-        values = zip(self.closure.joint_names, self.joints, strict=False)
-        shown = listed(f'{name} {value:.6g}' for name, value in values)
-        return f'<{self._title}: {shown}>' if shown else f'<{self._title}>'
-
-    @property
-    def _title(self) -> str:
-        return type(self).__name__
-
-
-# Not frozen: that takes five times as long, and the tick of a scene with forces makes three.
-@dataclass(slots=True, repr=False)
-class Position(_JointValues):
-    """
-    The linkage at one state of its inputs; ``position['rocker_joint']`` is a joint's value.
-
-    Attributes
-    ----------
-    status
-        Whether every loop closes, and whether the position has rates.
-    gap
-        Distance by which links miss each other where a loop is open, in [m]; else 0.
-    joints
-        Values of the published joints, in the order of the linkage, in [rad] or [m]; empty where a
-        loop is open or indeterminate.
-    state
-        Coordinates and pins that the steps found.
-    poses
-        One pose for each step; where a step failed, the last one is its pose.
-    closure
-        The closure that found the position.
-
-    """
-
-    status: Status
-    gap: float
-    joints: tuple[float, ...]
-    state: State
-    poses: list[Pose]
-    closure: Closure = field(compare=False)
-
-    @property
-    def inputs(self) -> tuple[float, ...]:
-        """Values of the driven joints, in [rad] or [m]."""
-        return self.closure.inputs_of(self.state)
-
-    @property
-    def points(self) -> dict[str, complex]:
-        """
-        Every named point in the frame of the ground, as x + iy, in [m].
-
-        Raises
-        ------
-        ValueError
-            If the linkage has no pose.
-
-        """
-        return {point: place for (_, point), place in self.closure.points(self).items()}
-
-    @property
-    def _title(self) -> str:
-        by = f' by {self.gap:.3g} m' if self.gap else ''
-        return f'Position {self.status.value}{by}'
-
-    def _repr_svg_(self) -> str | None:
-        from linkage_ros import svg  # local import: only a notebook asks for pictures
-
-        return svg(self) if self.joints else None
-
-
-@dataclass(slots=True, repr=False)
-class Velocity(_JointValues):
-    """
-    The rates of a linkage; ``velocity['rocker_joint']`` is that of a joint.
-
-    Attributes
-    ----------
-    joints
-        Rates of the published joints, in [rad/s] or [m/s].
-    state, rates
-        Rates of coordinates and pins, and what each step needs for its accelerations.
-    closure
-        The closure that found them.
-
-    """
-
-    joints: tuple[float, ...]
-    state: State
-    rates: list[Any]
-    closure: Closure = field(compare=False)
-
-
-@dataclass(slots=True, repr=False)
-class Acceleration(_JointValues):
-    """
-    The accelerations of a linkage; ``acceleration['rocker_joint']`` is that of a joint.
-
-    Attributes
-    ----------
-    joints
-        Accelerations of the published joints, in [rad/s²] or [m/s²].
-    state
-        Accelerations of coordinates and pins.
-    closure
-        The closure that found them.
-
-    """
-
-    joints: tuple[float, ...]
-    state: State
-    closure: Closure = field(compare=False)
-
-
 def _no_motion(what: str, given: tuple[float, ...], status: Status) -> ValueError:
     if not status.has_rates:
         return ValueError(f'{what}: a linkage that is {status.value} has none; ask its status')
     return ValueError(f'{what}: {list(given)} is not finite')
-
-
-class PointMotion(NamedTuple):
-    """Place, velocity and acceleration of a point in the frame of the ground, in [m]."""
-
-    place: complex
-    velocity: complex
-    acceleration: complex
 
 
 class Closure:

@@ -34,8 +34,7 @@ from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.batch import Array, Mask
-    from linkage_ros.kinematics.closure import Position
-    from linkage_ros.kinematics.ranges import InputRange
+    from linkage_ros.kinematics.results import InputRange, Position
     from linkage_ros.kinematics.topology import Structure
 
 

@@ -61,7 +61,7 @@ from linkage_ros.kinematics.topology import Joint
 import numpy as np
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.plan import SolutionPlan
+    from linkage_ros.kinematics.known_links import KnownLinks
 
 
 _ACCEPTED = 256.0 * UNIT_ROUNDOFF
@@ -529,7 +529,7 @@ class Constraints:
         linkage: Linkage,
         joints: Sequence[Joint],
         links: Sequence[str],
-        planner: SolutionPlan,
+        planner: KnownLinks,
     ) -> None:
         self._linkage = linkage
         self._planner = planner

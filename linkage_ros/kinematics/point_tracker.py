@@ -34,7 +34,7 @@ from linkage_ros.kinematics.known_links import KnownLinks
 from linkage_ros.kinematics.linkage import GROUND
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Acceleration, Position, Velocity
+    from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 
 
 class _Node(NamedTuple):

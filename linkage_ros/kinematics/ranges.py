@@ -25,17 +25,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from math import acos, asin, ceil, floor, inf, lcm, pi, remainder, sqrt, tau
-from typing import NamedTuple, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from linkage_ros.kinematics.diagonals import CrankDiagonal
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, RelativeAngle
+from linkage_ros.kinematics.results import InputRange, LoopClosure, Position
 
 if TYPE_CHECKING:
     from linkage_ros.kinematics.branch import Branch
-    from linkage_ros.kinematics.closure import Closure, Position
     from linkage_ros.kinematics.limits import Bound
-
 
 # The lowest value of a function between two places, by golden sections (Kiefer, 1953).
 
@@ -71,78 +70,7 @@ _ROUNDED = 1e-9
 _CLOSE_EVERYWHERE = (FixedPoint, PointOnLink, PointOnRail, RPPDyad, RelativeAngle)
 
 
-class InputRange(NamedTuple):
-    """
-    An interval of an input in which every loop closes, in [rad] or [m]; turns not wrapped.
-
-    Attributes
-    ----------
-    lowest, highest
-        The ends.
-    turning
-        Whether the input is an angle.
-    limited
-        Of each end whether the linkage ends there; a slide may go on, beyond what was searched,
-        and so may an angle that is limited on one side.
-    turns
-        How many whole turns of the input change nothing: one where dyads alone are solved, several
-        where links that are iterated come back after so many, and 0 where they never do, so that
-        each turn has poses of its own.
-    by
-        Of each end the joint whose limits it is at; '' where there is another reason: a toggle.
-
-    """
-
-    lowest: float
-    highest: float
-    turning: bool = True
-    limited: tuple[bool, bool] = (True, True)
-    turns: int = 1
-    by: tuple[str, str] = ('', '')
-
-    @property
-    def whole(self) -> bool:
-        """Whether the input turns fully, on and on."""
-        width = self.highest - self.lowest
-        comes_round = self.turning and self.turns > 0 and self.by == ('', '')
-        return comes_round and width >= self.turns * tau
-
-    @property
-    def toggles(self) -> tuple[float, ...]:
-        """Return the ends at which a toggle lies: those that the linkage's lengths set."""
-        if self.whole:
-            return ()
-        ends = zip((self.lowest, self.highest), self.limited, self.by, strict=True)
-        return tuple(end for end, limited, by in ends if limited and not by)
-
-    def shift(self, value: float) -> float:
-        """Return the whole turns, in [rad], that bring a value nearest the middle of the range."""
-        if not (self.turning and self.turns):
-            return 0.0
-        period = self.turns * tau
-        return period * round((0.5 * (self.lowest + self.highest) - value) / period)
-
-    def __str__(self) -> str:
-        if self.whole:
-            return 'every crank angle'
-        if self.limited == (False, False) and not self.turning:
-            return 'every slide'
-        low, high, unit = f'{self.lowest:.6g}', f'{self.highest:.6g}', self.unit
-        if self.by != ('', '') and self.limited != (True, True):
-            return f'{low} {unit} and more' if self.limited[0] else f'{high} {unit} and less'
-        return f'{low} to {high} {unit}'
-
-    def shifted(self, shift: float) -> InputRange:
-        """Return the range as far away as this."""
-        return self._replace(lowest=self.lowest + shift, highest=self.highest + shift)
-
-    @property
-    def unit(self) -> str:
-        """Return the unit of the input."""
-        return 'rad' if self.turning else 'm'
-
-
-def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:
+def closing_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
     """
     Return where the lengths let a single input go, whatever limits its joints have.
 
@@ -183,24 +111,24 @@ def closing_ranges(closure: Closure) -> tuple[InputRange, ...]:
     return tuple(InputRange(low, high) for low, high in intervals)
 
 
-def iterated(closure: Closure) -> bool:
+def iterated(closure: LoopClosure) -> bool:
     """Return whether a linkage has links that only iteration solves."""
     return any(hasattr(step, 'branch') for step in closure.steps)
 
 
-def whole_turns(closure: Closure) -> int:
+def whole_turns(closure: LoopClosure) -> int:
     """Return how many whole turns of the inputs change nothing, 0 where each turn is another."""
     if len(closure.linkage.inputs) > 1:
         return 0 if iterated(closure) else 1
     return lcm(*(branch.interval.period if branch else 1 for branch in _branches(closure)))
 
 
-def _branches(closure: Closure) -> list[Branch | None]:
+def _branches(closure: LoopClosure) -> list[Branch | None]:
     """Return the branch of each iterated group."""
     return [step.branch() for step in closure.steps if hasattr(step, 'branch')]
 
 
-def _on_a_branch(closure: Closure, branch: Branch | None) -> Iterator[InputRange]:
+def _on_a_branch(closure: LoopClosure, branch: Branch | None) -> Iterator[InputRange]:
     """Yield the intervals of a branch in which what comes behind it closes, too."""
     if branch is None:
         return
@@ -258,7 +186,7 @@ def _crank_intervals(diagonal: CrankDiagonal) -> list[tuple[float, float]]:
     return [(-highest, -lowest), (lowest, highest)]
 
 
-def reach(closure: Closure) -> float:
+def reach(closure: LoopClosure) -> float:
     """Return a length that no slide needs to exceed for a link to be stretched, in [m]."""
     return sum(
         max(abs(complex(*p) - complex(*q)) for p in points.values() for q in points.values())
@@ -323,7 +251,7 @@ def _turning_points(
             yield golden(lambda x: -margin(x), values[i - 1], values[i + 1])[1]
 
 
-def _margin(closure: Closure, value: float) -> float:
+def _margin(closure: LoopClosure, value: float) -> float:
     """Return how far a state is from the limits of its dyads, negative where it does not close."""
     position = closure.posed(value)
     if not position.status.has_pose:
@@ -338,7 +266,7 @@ def _margin(closure: Closure, value: float) -> float:
 
 
 def _searched(
-    closure: Closure, low: float, high: float, samples: int
+    closure: LoopClosure, low: float, high: float, samples: int
 ) -> list[tuple[float, float]]:
     """Return the parts of an interval in which loops close, the narrow ones, too."""
 
@@ -381,7 +309,7 @@ _COPIES = 8
 """How many turns of a range are told of an input whose limits are turns apart."""
 
 
-def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
+def input_ranges(closure: LoopClosure) -> tuple[InputRange, ...]:
     """
     Return where a single input can go: every loop closes, every joint is within its limits.
 
@@ -395,14 +323,14 @@ def input_ranges(closure: Closure) -> tuple[InputRange, ...]:
     return ranges
 
 
-def within_own(closure: Closure, ranges: Sequence[InputRange]) -> tuple[InputRange, ...]:
+def within_own(closure: LoopClosure, ranges: Sequence[InputRange]) -> tuple[InputRange, ...]:
     """Return what the limits of the single input itself leave of ranges."""
     (bound,) = closure.bounds.inputs
     return tuple(part for one in ranges for part in _cut(closure, one, bound))
 
 
 def within_published(
-    closure: Closure, ranges: Sequence[InputRange], bounds: Sequence[Bound]
+    closure: LoopClosure, ranges: Sequence[InputRange], bounds: Sequence[Bound]
 ) -> tuple[InputRange, ...]:
     """Return what limits of published joints leave of ranges of the single input."""
     if not closure.bounds.inputs:
@@ -410,7 +338,7 @@ def within_published(
     return tuple(part for one in ranges for part in _within_limits(closure, one, bounds))
 
 
-def _assemblies(closure: Closure, interval: InputRange) -> Iterator[InputRange]:
+def _assemblies(closure: LoopClosure, interval: InputRange) -> Iterator[InputRange]:
     """Yield a range, and the same a turn on where the poses there are others."""
     yield interval
     if not interval.turning or interval.whole or interval.turns != 1:
@@ -422,7 +350,7 @@ def _assemblies(closure: Closure, interval: InputRange) -> Iterator[InputRange]:
         yield copy
 
 
-def turns(closure: Closure, position: Callable[[float], Position]) -> int:
+def turns(closure: LoopClosure, position: Callable[[float], Position]) -> int:
     """Return after how many turns of an input that turns fully all joints are the same."""
     count = max(1, whole_turns(closure))
     once = all(repeats(closure, position, 0.1 + i, count * tau) for i in range(6 * count))
@@ -430,7 +358,7 @@ def turns(closure: Closure, position: Callable[[float], Position]) -> int:
 
 
 def repeats(
-    closure: Closure, position: Callable[[float], Position], value: float, shift: float
+    closure: LoopClosure, position: Callable[[float], Position], value: float, shift: float
 ) -> bool:
     """Return whether all joints are the same again after a shift, but for whole turns."""
     here, there = position(value).joints, position(value + shift).joints
@@ -441,7 +369,7 @@ def repeats(
     )
 
 
-def _cut(closure: Closure, interval: InputRange, bound: Bound) -> Iterator[InputRange]:
+def _cut(closure: LoopClosure, interval: InputRange, bound: Bound) -> Iterator[InputRange]:
     """Yield what the limits of the input itself leave of a range; angles count with turns."""
     limits = closure.linkage.inputs[0].limits
     if not (interval.turning and interval.turns):
@@ -469,7 +397,7 @@ def _cut(closure: Closure, interval: InputRange, bound: Bound) -> Iterator[Input
             yield from _between(copy, limits.low, limits.high, bound.name)
 
 
-def _copied(closure: Closure, interval: InputRange, shift: float) -> InputRange | None:
+def _copied(closure: LoopClosure, interval: InputRange, shift: float) -> InputRange | None:
     """Return a range some turns on, none where the linkage does not close there."""
     inside = 0.6 * interval.lowest + 0.4 * interval.highest
 
@@ -503,7 +431,7 @@ def _between(interval: InputRange, low: float, high: float, name: str) -> Iterat
 
 
 def _within_limits(
-    closure: Closure, interval: InputRange, bounds: Sequence[Bound]
+    closure: LoopClosure, interval: InputRange, bounds: Sequence[Bound]
 ) -> Iterator[InputRange]:
     """Yield the parts of a range in which published joints are within their limits."""
 
@@ -537,7 +465,7 @@ def _within_limits(
         )
 
 
-def _by(closure: Closure, bounds: Sequence[Bound], end: float, inside: float) -> str:
+def _by(closure: LoopClosure, bounds: Sequence[Bound], end: float, inside: float) -> str:
     """Return the joint whose limits end a range."""
     step = 1e-9 * (end - inside)
     for outside in (end, end + step, end + 1e3 * step):

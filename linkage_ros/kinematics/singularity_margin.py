@@ -21,15 +21,16 @@ from collections.abc import Callable
 from functools import lru_cache, partial
 from math import atan, inf, pi, remainder, sin, sqrt, tau
 from operator import attrgetter
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from linkage_ros.kinematics.dyads.prp import CrankPRPDyad, PRPDyad
 from linkage_ros.kinematics.dyads.rpp import RPPDyad
 from linkage_ros.kinematics.dyads.rpr import RPRDyad
+from linkage_ros.kinematics.results import SingularInput, SingularityMargin
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Closure, Position
+    from linkage_ros.kinematics.results import LoopClosure, Position
 
 
 _SAME = 1e-9
@@ -43,53 +44,7 @@ _STATES = 4096
 """How many states are kept while a linkage is searched for singular inputs."""
 
 
-class SingularInput(NamedTuple):
-    """
-    An input at which the linkage is singular.
-
-    Attributes
-    ----------
-    value
-        In [rad] or [m].
-    status
-        ``TOGGLE`` where the linkage ends or turns back, ``CHANGE_POINT`` where it goes on, and
-        ``INDETERMINATE`` where it has no pose that could be told: two pins meet, or two lines are
-        parallel.
-
-    """
-
-    value: float
-    status: Status
-
-
-class SingularityMargin(NamedTuple):
-    """
-    How near trouble a position is; the smaller, the nearer.
-
-    Attributes
-    ----------
-    transmission_angle
-        The smallest of all dyads, folded into [0, π/2], in [rad]; π/2 where there is none.
-    conditioning
-        The smallest singular value of a loop's Jacobian, of rows of length 1: for a dyad of
-        transmission angle μ it is √2·sin(μ/2), from 0 at a toggle to 1. For an iterated group it
-        is the smallest singular value divided by the largest.
-    toggle_distance
-        How far the input is from the next singular one, in [rad] or [m]; infinite where there is
-        none, and where there are several inputs.
-    group
-        Number of the group whose conditioning that is; −1 where there is no dyad and none that is
-        iterated.
-
-    """
-
-    transmission_angle: float
-    conditioning: float
-    toggle_distance: float
-    group: int = -1
-
-
-def singularity_margin(closure: Closure, position: Position) -> SingularityMargin:
+def singularity_margin(closure: LoopClosure, position: Position) -> SingularityMargin:
     """Return how near trouble a closed position is."""
     angle, conditioning, weakest = 0.5 * pi, 1.0, -1
     groups = closure.step_groups
@@ -113,7 +68,7 @@ def singularity_margin(closure: Closure, position: Position) -> SingularityMargi
     return SingularityMargin(angle, conditioning, distance, weakest)
 
 
-def away(closure: Closure, value: float, place: float) -> float:
+def away(closure: LoopClosure, value: float, place: float) -> float:
     """
     Return how far a value of the single input is from a place, in [rad] or [m].
 
@@ -128,7 +83,7 @@ def away(closure: Closure, value: float, place: float) -> float:
     return remainder(value - place, tau)
 
 
-def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
+def singular_inputs(closure: LoopClosure) -> tuple[SingularInput, ...]:
     """
     Return where a single input meets toggles and change points, in ascending order.
 
@@ -160,7 +115,7 @@ def singular_inputs(closure: Closure) -> tuple[SingularInput, ...]:
     return tuple(sorted(found, key=attrgetter('value')))
 
 
-def _within(closure: Closure, value: float) -> float:
+def _within(closure: LoopClosure, value: float) -> float:
     """Return the input of the same pose within the ranges: of a cylinder its other length."""
     zero = closure.zero_length
     ranges = closure.closing_ranges
@@ -169,7 +124,7 @@ def _within(closure: Closure, value: float) -> float:
     return 2.0 * zero - value
 
 
-def _turned_by_input(closure: Closure, step: Any) -> list[float] | None:
+def _turned_by_input(closure: LoopClosure, step: Any) -> list[float] | None:
     """Return the singular angles of a dyad as inputs, if the input turns its outer pins' links."""
     part = getattr(step, 'diagonal', None) or getattr(step, 'rail', step)
     if not hasattr(part, 'singular_angles'):
@@ -182,7 +137,7 @@ def _turned_by_input(closure: Closure, step: Any) -> list[float] | None:
     return [remainder(angle / factor, tau) for angle in part.singular_angles] if factor else []
 
 
-def _met(closure: Closure, number: int, place: float) -> Status | None:
+def _met(closure: LoopClosure, number: int, place: float) -> Status | None:
     """Return what a dyad meets where it is singular; nothing where no loops close next to it."""
     status = closure.posed(place).status
     beside = [closure.posed(place + step) for step in (-_BESIDE, _BESIDE)]

@@ -23,13 +23,11 @@ from math import cos, inf, isfinite, nan, pi, remainder, tau
 from typing import NamedTuple
 
 from linkage_ros.errors import DefinitionError, listed, quoted
-from linkage_ros.kinematics.closure import Closure, Position
 from linkage_ros.kinematics.limits import Bound, without_mirrored
 from linkage_ros.kinematics.linkage import GROUND
 from linkage_ros.kinematics.ranges import (
     describe,
     golden,
-    InputRange,
     reach,
     repeats,
     search,
@@ -37,6 +35,7 @@ from linkage_ros.kinematics.ranges import (
     within_own,
     within_published,
 )
+from linkage_ros.kinematics.results import InputRange, LoopClosure, Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import PLACED, Pose, State
 from linkage_ros.kinematics.topology import Driven, Dyad, links_of
@@ -44,7 +43,7 @@ from linkage_ros.kinematics.topology import Driven, Dyad, links_of
 # The pose of one step of a solution, from the steps that it starts from and no others.
 
 
-def pose_alone(closure: Closure, number: int, *inputs: float) -> Callable[..., Pose]:
+def pose_alone(closure: LoopClosure, number: int, *inputs: float) -> Callable[..., Pose]:
     """
     Return what gives the pose of a step, by the inputs, in [rad] and [m].
 
@@ -84,7 +83,7 @@ def pose_alone(closure: Closure, number: int, *inputs: float) -> Callable[..., P
     return pose
 
 
-def _needed(closure: Closure, number: int) -> set[int]:
+def _needed(closure: LoopClosure, number: int) -> set[int]:
     """Return the groups that one starts from, and it."""
     groups = closure.structure.groups
     owner = {link: i for i, group in enumerate(groups) for link in links_of(group)}
@@ -172,7 +171,9 @@ class InputSweep:
 
     """
 
-    def __init__(self, closure: Closure, held: Sequence[float] = (0.0,), index: int = 0) -> None:
+    def __init__(
+        self, closure: LoopClosure, held: Sequence[float] = (0.0,), index: int = 0
+    ) -> None:
         self.closure = closure
         self._held = tuple(held)
         self._index = index
@@ -291,7 +292,7 @@ class InputSweep:
         return InputRange(low, high, self.turning, by=(by[0], by[1]))
 
 
-def usual_inputs(closure: Closure) -> tuple[float, ...]:
+def usual_inputs(closure: LoopClosure) -> tuple[float, ...]:
     """
     Return inputs at which a linkage shows what it is, or from which it starts.
 
@@ -320,13 +321,13 @@ def usual_inputs(closure: Closure) -> tuple[float, ...]:
     return (interval.lowest + (interval.highest - interval.lowest) * 2.0 / 3.0,)
 
 
-def _ease(closure: Closure, position: Position) -> float:
+def _ease(closure: LoopClosure, position: Position) -> float:
     if position.status is not Status.CLOSED:
         return -1.0
     return closure.singularity_margin(position).conditioning
 
 
-def grid(closure: Closure, count: int = _GRID) -> Iterator[tuple[tuple[float, ...], Position]]:
+def grid(closure: LoopClosure, count: int = _GRID) -> Iterator[tuple[tuple[float, ...], Position]]:
     """Yield positions on a grid over all inputs: a turn each, or as far as a slide may reach."""
     ways = []
     for given in closure.linkage.inputs:
@@ -502,7 +503,7 @@ def _of_pose(
     return told
 
 
-def worst_residual(closure: Closure) -> tuple[float, tuple[float, ...], int] | None:
+def worst_residual(closure: LoopClosure) -> tuple[float, tuple[float, ...], int] | None:
     """
     Return the worst residual over the range, or over a grid of several inputs.
 
@@ -533,7 +534,7 @@ def worst_residual(closure: Closure) -> tuple[float, tuple[float, ...], int] | N
 # Limits that no state of a linkage meets, refused.
 
 
-def check_limits(closure: Closure) -> None:
+def check_limits(closure: LoopClosure) -> None:
     """
     Refuse limits between which a linkage cannot be.
 
@@ -568,7 +569,7 @@ def check_limits(closure: Closure) -> None:
         )
 
 
-def _check_single(closure: Closure) -> None:
+def _check_single(closure: LoopClosure) -> None:
     ranges, bounds = closure.closing_ranges, closure.bounds
     if bounds.inputs:
         (bound,) = bounds.inputs
@@ -598,7 +599,9 @@ def _check_single(closure: Closure) -> None:
         )
 
 
-def _extent(closure: Closure, ranges: Iterable[InputRange], bound: Bound) -> tuple[float, float]:
+def _extent(
+    closure: LoopClosure, ranges: Iterable[InputRange], bound: Bound
+) -> tuple[float, float]:
     """Return between which values a published joint goes, as near to its limits as turns let."""
     values = [value for one in ranges for value in samples(one)]
     found = [closure.position(value).joints for value in values]
@@ -606,13 +609,13 @@ def _extent(closure: Closure, ranges: Iterable[InputRange], bound: Bound) -> tup
     return min(turned), max(turned)
 
 
-def _met_on_grid(closure: Closure) -> bool:
+def _met_on_grid(closure: LoopClosure) -> bool:
     return any(
         position.joints and closure.bounds.exceeded(inputs, position.joints) is None
         for inputs, position in grid(closure)
     )
 
 
-def _limits(closure: Closure, bound: Bound) -> str:
+def _limits(closure: LoopClosure, bound: Bound) -> str:
     limits = closure.linkage.limits[bound.name]
     return str(limits)

@@ -24,9 +24,9 @@ from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from linkage_ros.kinematics.closure import Position
 from linkage_ros.kinematics.linkage import Input
 from linkage_ros.kinematics.ranges import describe
+from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.layout import NANOSECONDS
 from linkage_ros.node.run_snapshots import RunSnapshots

@@ -30,7 +30,7 @@ from time import monotonic_ns
 from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.bag.recorder import Recorder
-from linkage_ros.kinematics.closure import Position
+from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import Rejection
 from linkage_ros.messages.single_values import time_message

@@ -31,14 +31,10 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.drives.drive import Context, CrankState, Drive, DRIVES
 from linkage_ros.effects.angle_unwrap import all_wrapped, beginnings, Continuous
+from linkage_ros.effects.dispatch import Effect, effect_of, in_order, module_of, needs
 from linkage_ros.effects.stage import (
-    Effect,
-    effect_of,
     FORCE_EFFECTS,
-    in_order,
     MechanismState,
-    module_of,
-    needs,
     PUBLISHED_WITH,
     SensorReading,
     SensorStage,
@@ -46,7 +42,8 @@ from linkage_ros.effects.stage import (
 )
 from linkage_ros.errors import DefinitionError, listed, quoted
 from linkage_ros.kinematics.arithmetic import all_finite
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.messages.joint_state import JointStateWriter, Rejection
 from linkage_ros.pipeline.sample_router import SampleRouter

@@ -23,8 +23,8 @@ from typing import NamedTuple
 
 from linkage_ros.bag.reader import Bag
 from linkage_ros.errors import BagError
-from linkage_ros.kinematics.closure import Closure, Position
-from linkage_ros.kinematics.singularity_margin import SingularityMargin
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.results import Position, SingularityMargin
 from linkage_ros.kinematics.status import Status
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import replay

@@ -31,7 +31,8 @@ from typing import NamedTuple, TYPE_CHECKING
 
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage, RevoluteJoint, SlideJoint
-from linkage_ros.kinematics.ranges import InputRange, reach
+from linkage_ros.kinematics.ranges import reach
+from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.sweep_analysis import InputSweep, samples, usual_inputs
 
 if TYPE_CHECKING:

@@ -28,7 +28,8 @@ from zlib import crc32
 
 from linkage_ros.drives.drive import DRIVES
 from linkage_ros.dynamics.loads import Loads, Spring
-from linkage_ros.effects.stage import EFFECTS, in_order, module_of
+from linkage_ros.effects.dispatch import in_order, module_of
+from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.errors import DefinitionError, did_you_mean, listed, quoted
 from linkage_ros.faults.fault import Fault, FAULTS
 from linkage_ros.files.linkage_file import looks_like_linkage, read_closure

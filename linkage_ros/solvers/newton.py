@@ -46,9 +46,10 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.files.parameters import number
 from linkage_ros.kinematics.arithmetic import cross
-from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
 from linkage_ros.kinematics.point_steps import FixedPoint, PointOnLink, PointOnRail, RelativeAngle
+from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import PLACED, State, Step

@@ -26,15 +26,16 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, NamedTuple, TYPE_CHECKING
 
-from linkage_ros.kinematics.closure import (
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.results import (
     Acceleration,
-    Closure,
+    InputRange,
     PointMotion,
     Position,
+    SingularInput,
+    SingularityMargin,
     Velocity,
 )
-from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.kinematics.singularity_margin import SingularInput, SingularityMargin
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:

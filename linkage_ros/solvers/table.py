@@ -42,8 +42,9 @@ from typing import Any, cast, Literal, NamedTuple, TYPE_CHECKING
 
 from linkage_ros.errors import DefinitionError
 from linkage_ros.files.parameters import number, point
-from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.results import Acceleration, Position, Velocity
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.step import State
 from linkage_ros.kinematics.sweep_analysis import InputSweep

@@ -36,7 +36,8 @@ from dataclasses import replace
 from math import inf, remainder, tau
 from typing import NamedTuple
 
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
+from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.rounding import UNIT_ROUNDOFF
 from linkage_ros.kinematics.status import Status
 from linkage_ros.synthesis.design import Assembly, COUPLER, Design, Wanted

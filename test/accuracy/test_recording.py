@@ -21,8 +21,7 @@ from collections import Counter
 
 from linkage_ros.accuracy import recording
 from linkage_ros.accuracy.recorded_run import Flush, record_run, Recorded
-from linkage_ros.accuracy.recording import Cost, cost_of, measure_costs, measure_recording
-from linkage_ros.accuracy.solving_results import part_of
+from linkage_ros.accuracy.recording import Cost, cost_of, measure_costs, measure_recording, part_of
 from linkage_ros.bag.storage import Storage
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.measuring import Spread

@@ -39,8 +39,7 @@ from campaigns.topologies.run import (
 )
 from campaigns.topologies.topology import start_of, Topology
 from linkage_ros.kinematics.closure import Closure
-from linkage_ros.kinematics.ranges import InputRange
-from linkage_ros.kinematics.singularity_margin import SingularInput
+from linkage_ros.kinematics.results import InputRange, SingularInput
 from linkage_ros.kinematics.status import Status
 import numpy as np
 import pytest
@@ -170,7 +169,7 @@ def test_gaps_and_statuses_are_compared() -> None:
 
     def position(*inputs: float) -> Any:
         found = closure.position(*inputs)
-        return found._replace(gap=found.gap * 1.001)
+        return replace(found, gap=found.gap * 1.001)
 
     assert judged(topology, closure=Wrong(closure, position=position)).counts['gap']
     moved = Wrong(closure, position=lambda x: closure.position(x + 0.5))

@@ -26,7 +26,7 @@ from linkage_ros.cli import scene as command
 from linkage_ros.cli.scene import REGISTRIES, table_of
 from linkage_ros.cli.terminal import text
 from linkage_ros.errors import FileError, LinkageError
-from linkage_ros.files.schema import as_text
+from linkage_ros.scene.schema import as_text
 import pytest
 
 from .conftest import Run

@@ -83,7 +83,7 @@ sys.exit(main())
 FINALIZER = """
 import os, sys, time
 from linkage_ros.cli.main import main
-from linkage_ros.scene import yaml_file
+from linkage_ros.files import yaml_file
 class Lost:
     def __del__(self):
         os.write(1, b'stuck')

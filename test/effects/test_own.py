@@ -31,13 +31,13 @@ from linkage_ros.bag.writer import BagWriter
 from linkage_ros.effects.stage import EFFECTS
 from linkage_ros.effects.user_effects import FUNCTIONS
 from linkage_ros.errors import FileError
-from linkage_ros.files.schema import scene_schema
 from linkage_ros.files.yaml_file import read_yaml
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.messages.single_values import time_message
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import own_effects_here
 from linkage_ros.scene.load import load_scene
+from linkage_ros.scene.schema import scene_schema
 from linkage_ros.scene.violations import violations
 import pytest
 

@@ -24,8 +24,9 @@ from pathlib import Path
 import random
 
 from linkage_ros.kinematics import closure as closure_module
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.linkage import GROUND, Input, Linkage, Pose, RevoluteJoint, Side
+from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import InputSweep
 from linkage_ros.kinematics.topology import assur_groups, Driven, Iterated, Structure

@@ -27,7 +27,8 @@ from hypothesis import strategies as st
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.grashof import four_bar_type, four_bars
 from linkage_ros.kinematics.linkage import Input, Linkage, Pose, RevoluteJoint
-from linkage_ros.kinematics.ranges import describe, InputRange
+from linkage_ros.kinematics.ranges import describe
+from linkage_ros.kinematics.results import InputRange
 from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import (
     extremes,

@@ -34,10 +34,11 @@ from hypothesis import strategies as st
 from linkage_ros.errors import DefinitionError
 from linkage_ros.kinematics import diagonals, dyads, newton_group, point_steps, rail
 from linkage_ros.kinematics.batch import Batch, CODES
-from linkage_ros.kinematics.closure import Closure, Position
+from linkage_ros.kinematics.closure import Closure
 from linkage_ros.kinematics.compiling.linkage import Answer, Compiled
 from linkage_ros.kinematics.compiling.solve import BLOCK
 from linkage_ros.kinematics.linkage import Input, Linkage, RevoluteJoint, SlideJoint, Slider
+from linkage_ros.kinematics.results import Position
 from linkage_ros.kinematics.status import Status
 import numpy as np
 from numpy.typing import NDArray

@@ -24,7 +24,7 @@ import pytest
 
 PACKAGE = 'linkage_ros'
 
-# Rooms by height: a room may import from below its own height, and from its neighbours as long
+# Packages by height: each may import from below its own height, and from its neighbours as long
 # as no two import each other.
 HEIGHTS = (
     ('errors', 'signals', 'generated_code', 'measuring', 'processes'),
@@ -41,7 +41,7 @@ HEIGHTS = (
     ('report',),
     ('node', 'cli'),
 )
-HEIGHT = {room: height for height, rooms in enumerate(HEIGHTS) for room in rooms}
+HEIGHT = {name: height for height, names in enumerate(HEIGHTS) for name in names}
 WITH_ROS = ('node', 'cli')
 ROS = (
     'ament_index_python',
@@ -73,7 +73,7 @@ def _imported(module, node):
     if node.level:
         parents = module.split('.')[: -node.level]
         base = '.'.join([*parents, base] if base else parents)
-    # `from linkage_ros import errors` imports the room errors, not the package.
+    # `from linkage_ros import errors` imports the module errors, not the package.
     yield from (f'{base}.{alias.name}' if base == PACKAGE else base for alias in node.names)
 
 
@@ -98,10 +98,10 @@ def _imports(root):
                     yield module, name, line, id(node) in within
 
 
-def _room(name):
-    """Return the room that a dotted name of ours lies in; '' is the package itself."""
-    room = name.split('.')[1:2]
-    return room[0] if room and room[0] in HEIGHT else ''
+def _package(name):
+    """Return the package or module at the top that a name of ours lies in; '' for none."""
+    top = name.split('.')[1:2]
+    return top[0] if top and top[0] in HEIGHT else ''
 
 
 @pytest.fixture(scope='module')
@@ -114,29 +114,40 @@ def our_imports(imports):
     return [found for found in imports if found[1].split('.')[0] == PACKAGE]
 
 
-def test_every_room_has_its_height(root):
-    rooms = {
+def test_every_package_has_its_height(root):
+    packages = {
         path.stem
         for path in (root / PACKAGE).iterdir()
         if path.suffix == '.py' or (path / '__init__.py').exists()
     }
-    assert rooms - {'__init__'} <= set(HEIGHT)
+    assert packages - {'__init__'} <= set(HEIGHT)
 
 
 def test_imports_point_down(our_imports):
     up = [
         f'{module} imports {name}'
         for module, name, _, _ in our_imports
-        if HEIGHT.get(_room(name), -1) > HEIGHT.get(_room(module), -1)
+        if HEIGHT.get(_package(name), -1) > HEIGHT.get(_package(module), -1)
     ]
     assert not up
 
 
-def test_neighbours_do_not_import_each_other(our_imports):
+def test_no_imports_run_in_a_circle(our_imports):
     graph = defaultdict(set)
     for module, name, _, _ in our_imports:
-        if _room(name) and _room(name) != _room(module):
-            graph[_room(module)].add(_room(name))
+        if name not in (module, PACKAGE):  # the public API imports what is asked for
+            graph[module].add(name)
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(' imports '.join(reversed(error.args[1])), pytrace=False)
+
+
+def test_packages_do_not_import_each_other(our_imports):
+    graph = defaultdict(set)
+    for module, name, _, _ in our_imports:
+        if _package(name) and _package(name) != _package(module):
+            graph[_package(module)].add(_package(name))
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -148,7 +159,7 @@ def test_bag_needs_only_errors_and_files(our_imports):
     strangers = [
         f'{module} imports {name}'
         for module, name, _, _ in our_imports
-        if _room(module) == 'bag' and _room(name) not in known
+        if _package(module) == 'bag' and _package(name) not in known
     ]
     assert not strangers
 
@@ -157,7 +168,7 @@ def test_kinematics_needs_only_numpy(imports):
     strangers = [
         f'{module} imports {name}'
         for module, name, _, _ in imports
-        if _room(module) == 'kinematics'
+        if _package(module) == 'kinematics'
         and name.split('.')[0] not in {*sys.stdlib_module_names, 'numpy', PACKAGE}
     ]
     assert not strangers
@@ -167,7 +178,7 @@ def test_the_core_names_no_ros(imports):
     strangers = [
         f'{module} imports {name}'
         for module, name, _, _ in imports
-        if _room(module) not in WITH_ROS and name.split('.')[0] in ROS
+        if _package(module) not in WITH_ROS and name.split('.')[0] in ROS
     ]
     assert not strangers
 
@@ -176,7 +187,7 @@ def test_local_imports_say_why(our_imports):
     unmarked = [
         f'{module}: {line.strip()}'
         for module, _, line, within in our_imports
-        if within and _room(module) not in LOCAL_IMPORTS and not line.partition(MARK)[2].strip()
+        if within and _package(module) not in LOCAL_IMPORTS and not line.partition(MARK)[2].strip()
     ]
     assert not unmarked
 

@@ -62,10 +62,10 @@ from linkage_ros.files.parameters import (
     text,
     whole,
 )
-from linkage_ros.files.schema import as_text, linkage_schema, parameter_types, scene_schema
 from linkage_ros.files.section import Section
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.scene.load import load_scene, parse_scene
+from linkage_ros.scene.schema import as_text, linkage_schema, parameter_types, scene_schema
 import pytest
 import yaml
 

@@ -21,13 +21,13 @@ from pathlib import Path
 from linkage_ros.bag.reader import read_bag
 from linkage_ros.bag.run_events import CHOSEN, run_account
 from linkage_ros.errors import FileError
-from linkage_ros.files.schema import scene_schema
 from linkage_ros.files.yaml_file import parse_yaml
 from linkage_ros.kinematics.closure import Closure
 from linkage_ros.messages.joint_state import JointStateWriter
 from linkage_ros.pipeline.pipeline import Pipeline
 from linkage_ros.replay.replay import replay
 from linkage_ros.scene.load import load_scene, parse_scene
+from linkage_ros.scene.schema import scene_schema
 from linkage_ros.scene.violations import violations
 from linkage_ros.solvers import choose as choosing
 from linkage_ros.solvers.choose import choose, only_closed_form

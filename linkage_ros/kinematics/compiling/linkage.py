@@ -28,7 +28,7 @@ from linkage_ros.kinematics.status import Status
 from linkage_ros.kinematics.sweep_analysis import usual_inputs
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Closure
+    from linkage_ros.kinematics.results import LoopClosure
 
 _MOST_PATHS = 8
 """So many a linkage has at most; where none holds, the plain steps answer."""
@@ -94,7 +94,7 @@ class Compiled:
 
     def __init__(
         self,
-        closure: Closure,
+        closure: LoopClosure,
         derivatives: int = 0,
         wanted: Wanted = joints,
         within_limits: bool = True,
@@ -191,7 +191,7 @@ def _first_of(
     return first
 
 
-def _states(closure: Closure) -> Iterator[tuple[float, ...]]:
+def _states(closure: LoopClosure) -> Iterator[tuple[float, ...]]:
     """Yield inputs at which a linkage may be closed: its pose's, and others over its ranges."""
     linkage = closure.linkage
     if linkage.pose is not None:

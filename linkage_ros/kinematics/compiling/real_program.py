@@ -41,7 +41,7 @@ from linkage_ros.kinematics.ranges import iterated
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Closure
+    from linkage_ros.kinematics.results import LoopClosure
 
 
 class _Parts(NamedTuple):
@@ -287,7 +287,7 @@ class Program(NamedTuple):
     tree: Tree
 
 
-def program(closure: Closure, derivatives: int, wanted: Wanted) -> Program:
+def program(closure: LoopClosure, derivatives: int, wanted: Wanted) -> Program:
     """
     Return the tree of a linkage, whatever its limits.
 
@@ -347,7 +347,7 @@ class _Growth:
 
     def __init__(
         self,
-        closure: Closure,
+        closure: LoopClosure,
         tape: Tape,
         given: Sequence[Sequence[Any]],
         wanted: Wanted,

@@ -40,7 +40,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Closure
+    from linkage_ros.kinematics.results import LoopClosure
 
 BLOCK = 8192
 """States of a block: as many as stay in the cache."""
@@ -94,7 +94,7 @@ class Solver:
 
     """
 
-    def __init__(self, closure: Closure, width: int, wanted: Wanted = joints) -> None:
+    def __init__(self, closure: LoopClosure, width: int, wanted: Wanted = joints) -> None:
         self._closure = closure
         self._limited = wanted is joints
         self._driven = len(closure.linkage.inputs)

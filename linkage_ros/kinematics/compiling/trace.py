@@ -23,7 +23,7 @@ from linkage_ros.kinematics.compiling.tape import Decision, Operation, Symbol, T
 from linkage_ros.kinematics.status import Status
 
 if TYPE_CHECKING:
-    from linkage_ros.kinematics.closure import Acceleration, Closure, Position, Velocity
+    from linkage_ros.kinematics.results import Acceleration, LoopClosure, Position, Velocity
 
 
 Number = Operation | float
@@ -71,7 +71,7 @@ def joints(motion: Motion) -> Sequence[Sequence[float]]:
 
 
 def traced(
-    closure: Closure,
+    closure: LoopClosure,
     at: Sequence[float],
     derivatives: int,
     wanted: Wanted = joints,
@@ -114,7 +114,9 @@ def traced(
     return Path(inputs, tuple(tape.decisions), outputs, tape)
 
 
-def moved(closure: Closure, given: Sequence[Sequence[Any]], within_limits: bool = True) -> Motion:
+def moved(
+    closure: LoopClosure, given: Sequence[Sequence[Any]], within_limits: bool = True
+) -> Motion:
     """Return the motion of a closure at inputs, rates and accelerations, as far as given."""
     inputs, *more = given
     position = closure.position(*inputs) if within_limits else closure.posed(*inputs)
@@ -146,7 +148,7 @@ Fate: TypeAlias = Status | Fork | None
 """A status; or nothing, where the steps go on in another way and only they can tell."""
 
 
-def fates(closure: Closure, path: Path) -> tuple[Fate, ...]:
+def fates(closure: LoopClosure, path: Path) -> tuple[Fate, ...]:
     """
     Return for each decision of a path what becomes of the linkage where it falls otherwise.
 
@@ -172,7 +174,7 @@ def fates(closure: Closure, path: Path) -> tuple[Fate, ...]:
     return tuple(found)
 
 
-def _fate(closure: Closure, path: Path, decided: Sequence[bool]) -> Fate:
+def _fate(closure: LoopClosure, path: Path, decided: Sequence[bool]) -> Fate:
     """Return the fate of a linkage whose first decisions fall as is said."""
     tape = path.tape
     tape.begin()

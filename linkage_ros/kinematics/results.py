@@ -1,0 +1,350 @@
+# Copyright 2026 The linkage_ros authors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Results of a closure: position, velocity, acceleration; ranges, singular inputs, margins.
+
+They stand below the modules that work them out, and below `Closure`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import tau
+from typing import Any, NamedTuple, Protocol
+
+from linkage_ros.errors import listed, quoted
+from linkage_ros.kinematics.linkage import Linkage
+from linkage_ros.kinematics.status import Status
+from linkage_ros.kinematics.step import Pose, State, Step
+from linkage_ros.kinematics.topology import Structure
+
+
+class InputRange(NamedTuple):
+    """
+    An interval of an input in which every loop closes, in [rad] or [m]; turns not wrapped.
+
+    Attributes
+    ----------
+    lowest, highest
+        The ends.
+    turning
+        Whether the input is an angle.
+    limited
+        Of each end whether the linkage ends there; a slide may go on, beyond what was searched,
+        and so may an angle that is limited on one side.
+    turns
+        How many whole turns of the input change nothing: one where dyads alone are solved, several
+        where links that are iterated come back after so many, and 0 where they never do, so that
+        each turn has poses of its own.
+    by
+        Of each end the joint whose limits it is at; '' where there is another reason: a toggle.
+
+    """
+
+    lowest: float
+    highest: float
+    turning: bool = True
+    limited: tuple[bool, bool] = (True, True)
+    turns: int = 1
+    by: tuple[str, str] = ('', '')
+
+    @property
+    def whole(self) -> bool:
+        """Whether the input turns fully, on and on."""
+        width = self.highest - self.lowest
+        comes_round = self.turning and self.turns > 0 and self.by == ('', '')
+        return comes_round and width >= self.turns * tau
+
+    @property
+    def toggles(self) -> tuple[float, ...]:
+        """Return the ends at which a toggle lies: those that the linkage's lengths set."""
+        if self.whole:
+            return ()
+        ends = zip((self.lowest, self.highest), self.limited, self.by, strict=True)
+        return tuple(end for end, limited, by in ends if limited and not by)
+
+    def shift(self, value: float) -> float:
+        """Return the whole turns, in [rad], that bring a value nearest the middle of the range."""
+        if not (self.turning and self.turns):
+            return 0.0
+        period = self.turns * tau
+        return period * round((0.5 * (self.lowest + self.highest) - value) / period)
+
+    def __str__(self) -> str:
+        if self.whole:
+            return 'every crank angle'
+        if self.limited == (False, False) and not self.turning:
+            return 'every slide'
+        low, high, unit = f'{self.lowest:.6g}', f'{self.highest:.6g}', self.unit
+        if self.by != ('', '') and self.limited != (True, True):
+            return f'{low} {unit} and more' if self.limited[0] else f'{high} {unit} and less'
+        return f'{low} to {high} {unit}'
+
+    def shifted(self, shift: float) -> InputRange:
+        """Return the range as far away as this."""
+        return self._replace(lowest=self.lowest + shift, highest=self.highest + shift)
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the input."""
+        return 'rad' if self.turning else 'm'
+
+
+class SingularInput(NamedTuple):
+    """
+    An input at which the linkage is singular.
+
+    Attributes
+    ----------
+    value
+        In [rad] or [m].
+    status
+        ``TOGGLE`` where the linkage ends or turns back, ``CHANGE_POINT`` where it goes on, and
+        ``INDETERMINATE`` where it has no pose that could be told: two pins meet, or two lines are
+        parallel.
+
+    """
+
+    value: float
+    status: Status
+
+
+class SingularityMargin(NamedTuple):
+    """
+    How near trouble a position is; the smaller, the nearer.
+
+    Attributes
+    ----------
+    transmission_angle
+        The smallest of all dyads, folded into [0, π/2], in [rad]; π/2 where there is none.
+    conditioning
+        The smallest singular value of a loop's Jacobian, of rows of length 1: for a dyad of
+        transmission angle μ it is √2·sin(μ/2), from 0 at a toggle to 1. For an iterated group it
+        is the smallest singular value divided by the largest.
+    toggle_distance
+        How far the input is from the next singular one, in [rad] or [m]; infinite where there is
+        none, and where there are several inputs.
+    group
+        Number of the group whose conditioning that is; −1 where there is no dyad and none that is
+        iterated.
+
+    """
+
+    transmission_angle: float
+    conditioning: float
+    toggle_distance: float
+    group: int = -1
+
+
+class LoopClosure(Protocol):
+    """
+    The part of a `Closure` that ranges, margins, limits and the compiler use.
+
+    They stand below `Closure`, which calls them. Its docstrings say what each member is.
+    """
+
+    linkage: Linkage
+    structure: Structure
+    input_names: tuple[str, ...]
+    joint_names: tuple[str, ...]
+    scale: float
+    steps: tuple[Step, ...]
+    step_groups: tuple[int, ...]
+    turning: tuple[bool, ...]
+    turns_with: Any
+    bounds: Any
+
+    def known(self, *inputs: float) -> State: ...
+    def position(self, *inputs: float) -> Position: ...
+    def posed(self, *inputs: float) -> Position: ...
+    def velocity(self, position: Position, *rates: float) -> Velocity: ...
+    def acceleration(
+        self, position: Position, velocity: Velocity, *accelerations: float
+    ) -> Acceleration: ...
+
+    def inputs_of(self, state: State) -> tuple[float, ...]: ...
+    def points(self, position: Position) -> dict[tuple[str, str], complex]: ...
+    def slide_values(self, position: Position) -> dict[str, float]: ...
+    def link_angles(self, position: Position) -> dict[str, float]: ...
+    def residual(self, position: Position) -> float: ...
+    def singularity_margin(self, position: Position) -> SingularityMargin: ...
+
+    @property
+    def input_ranges(self) -> tuple[InputRange, ...]: ...
+
+    @property
+    def closing_ranges(self) -> tuple[InputRange, ...]: ...
+
+    @property
+    def singular_inputs(self) -> tuple[SingularInput, ...]: ...
+
+    @property
+    def zero_length(self) -> float | None: ...
+
+
+class _JointValues(Mapping[str, float]):
+    """A value for each published joint, by its name: ``found['rocker_joint']``."""
+
+    __slots__ = ()
+
+    joints: tuple[float, ...]
+    closure: LoopClosure
+
+    def __getitem__(self, joint: str) -> float:
+        """
+        Return the value of a joint.
+
+        Raises
+        ------
+        KeyError
+            If the linkage publishes no joint of this name.
+        ValueError
+            If the linkage has no pose.
+
+        """
+        names = self.closure.joint_names
+        if joint not in names:
+            raise KeyError(f'{quoted(joint)} is not a published joint; use {listed(names)}')
+        if not self.joints:
+            raise ValueError(f'{joint}: {self!r} has no joint values; check its status first')
+        return self.joints[names.index(joint)]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.closure.joint_names)
+
+    def __len__(self) -> int:
+        return len(self.closure.joint_names)
+
+    def __repr__(self) -> str:
+        values = zip(self.closure.joint_names, self.joints, strict=False)
+        shown = listed(f'{name} {value:.6g}' for name, value in values)
+        return f'<{self._title}: {shown}>' if shown else f'<{self._title}>'
+
+    @property
+    def _title(self) -> str:
+        return type(self).__name__
+
+
+# Not frozen: that takes five times as long, and the tick of a scene with forces makes three.
+@dataclass(slots=True, repr=False)
+class Position(_JointValues):
+    """
+    The linkage at one state of its inputs; ``position['rocker_joint']`` is a joint's value.
+
+    Attributes
+    ----------
+    status
+        Whether every loop closes, and whether the position has rates.
+    gap
+        Distance by which links miss each other where a loop is open, in [m]; else 0.
+    joints
+        Values of the published joints, in the order of the linkage, in [rad] or [m]; empty where a
+        loop is open or indeterminate.
+    state
+        Coordinates and pins that the steps found.
+    poses
+        One pose for each step; where a step failed, the last one is its pose.
+    closure
+        The closure that found the position.
+
+    """
+
+    status: Status
+    gap: float
+    joints: tuple[float, ...]
+    state: State
+    poses: list[Pose]
+    closure: LoopClosure = field(compare=False)
+
+    @property
+    def inputs(self) -> tuple[float, ...]:
+        """Values of the driven joints, in [rad] or [m]."""
+        return self.closure.inputs_of(self.state)
+
+    @property
+    def points(self) -> dict[str, complex]:
+        """
+        Every named point in the frame of the ground, as x + iy, in [m].
+
+        Raises
+        ------
+        ValueError
+            If the linkage has no pose.
+
+        """
+        return {point: place for (_, point), place in self.closure.points(self).items()}
+
+    @property
+    def _title(self) -> str:
+        by = f' by {self.gap:.3g} m' if self.gap else ''
+        return f'Position {self.status.value}{by}'
+
+    def _repr_svg_(self) -> str | None:
+        from linkage_ros import svg  # local import: only a notebook asks for pictures
+
+        return svg(self) if self.joints else None
+
+
+@dataclass(slots=True, repr=False)
+class Velocity(_JointValues):
+    """
+    The rates of a linkage; ``velocity['rocker_joint']`` is that of a joint.
+
+    Attributes
+    ----------
+    joints
+        Rates of the published joints, in [rad/s] or [m/s].
+    state, rates
+        Rates of coordinates and pins, and what each step needs for its accelerations.
+    closure
+        The closure that found them.
+
+    """
+
+    joints: tuple[float, ...]
+    state: State
+    rates: list[Any]
+    closure: LoopClosure = field(compare=False)
+
+
+@dataclass(slots=True, repr=False)
+class Acceleration(_JointValues):
+    """
+    The accelerations of a linkage; ``acceleration['rocker_joint']`` is that of a joint.
+
+    Attributes
+    ----------
+    joints
+        Accelerations of the published joints, in [rad/s²] or [m/s²].
+    state
+        Accelerations of coordinates and pins.
+    closure
+        The closure that found them.
+
+    """
+
+    joints: tuple[float, ...]
+    state: State
+    closure: LoopClosure = field(compare=False)
+
+
+class PointMotion(NamedTuple):
+    """Place, velocity and acceleration of a point in the frame of the ground, in [m]."""
+
+    place: complex
+    velocity: complex
+    acceleration: complex
