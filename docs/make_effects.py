@@ -52,10 +52,10 @@ _STANDS = {
     'alter': 'the linkage, once, when the scene is built',
     'drive_stage': 'the crank, before the loops are closed',
     'stage': 'the mechanism, once its loops are closed',
-    'sensor': 'what is read',
-    'writer': 'nothing: it draws what the mechanism does',
-    'friction': 'whatever works with forces; no part of the tick of its own',
-    'clock': 'the time by which a tick goes',
+    'sensor': 'the reading of the sensors',
+    'writer': 'nothing: it draws the mechanism',
+    'friction': 'all effects and drives that compute forces; it is no stage of the tick',
+    'clock': 'the time of a tick',
     'message': 'the messages of the crank',
     'mechanism': 'the loop, once it is closed',
 }
@@ -175,9 +175,9 @@ def place(kind: str, name: str) -> str:
     else:
         said.append(f'{_neighbours(name)}. Works on {works_on}.')
         if name in NEEDS:
-            said.append(f'Starts from {_listed(NEEDS[name])}, computed but not published for it.')
+            said.append(f'Needs {_listed(NEEDS[name])}, computed but not published for it.')
         if name in PUBLISHED_WITH:
-            said[-1] = f'Starts from {_listed(PUBLISHED_WITH[name])}, published with it.'
+            said[-1] = f'Needs {_listed(PUBLISHED_WITH[name])}, published with it.'
         if hasattr(module, 'TOPIC'):
             said.append(f'Publishes `{module.TOPIC}`, {module.MESSAGE}.')
     source = Path(str(module.__file__)).relative_to(DOCS.parent).as_posix()
@@ -211,10 +211,10 @@ def parameters(kind: str, name: str) -> str:
 
 
 def refused() -> str:
-    """Return what is refused, each with what is then said."""
+    """Return the scenes that are refused, each with its error."""
     scenes = yaml.safe_load(REFUSED.read_text('utf-8'))
     rows = [(each['what'], f'`{_said(**each)}`') for each in scenes]
-    return '\n'.join(markdown.table_lines(('what', 'said'), rows))
+    return '\n'.join(markdown.table_lines(('scene', 'error'), rows))
 
 
 def _said(what: str, linkage: str, scene: str) -> str:

@@ -18,14 +18,14 @@
 # %% [markdown]
 # # Tutorial: a four-bar in Python
 #
-# Everything that the node does can be done from Python, without ROS: solve a linkage, run a scene
-# tick by tick, look at what an effect makes of it. This page is a Python file, `docs/tutorial.py`;
-# what you see below each cell came of running it while the page was built. Open it as a notebook
+# You can solve a linkage, run a scene tick by tick and look at the result of an effect from
+# Python, without ROS. This page is a Python file, `docs/tutorial.py`; the output below each cell
+# is from a run while the page was built. Open it as a notebook
 # with jupytext, or run it with Python. It needs `pip install 'linkage_ros[report]'`.
 #
 # ## A linkage
 #
-# A linkage is links with named points. A point on two links is a pin. Here the crank O2–A turns,
+# A linkage has links with named points. A point on two links is a pin. Here the crank O2–A turns,
 # the coupler A–B follows, and the rocker B–O4 swings.
 
 # %%
@@ -53,8 +53,8 @@ closure
 # %% [markdown]
 # ## One position
 #
-# A position has a status, the gap that is left where the loop does not close, and the published
-# joints by their names. Angles are in radians.
+# A position has a status, the [closure error](glossary.md) of a loop that does not close, and the
+# published joints by their names. Angles are in radians.
 
 # %%
 from math import degrees
@@ -73,7 +73,7 @@ acceleration = closure.acceleration(position, velocity, 0.0)
 velocity['rocker_joint'], acceleration['rocker_joint']
 
 # %% [markdown]
-# Is that true? The rate is the slope of the angle, so two positions close by have to say the same:
+# Check it: the rate is the slope of the angle, so two nearby positions must give the same value:
 
 # %%
 step = 1e-6
@@ -97,7 +97,7 @@ position
 # %% [markdown]
 # ## A loop that does not close
 #
-# is an answer, not an exception. A longer ground leaves the rocker out of reach for some cranks:
+# An open loop is an answer, not an exception. With a longer ground, some angles have no pose:
 
 # %%
 from dataclasses import replace
@@ -143,8 +143,8 @@ figure.tight_layout()
 # %% [markdown]
 # ## A scene, tick by tick
 #
-# A scene says what drives the linkage and what is called for beside positions. The node builds a
-# `Pipeline` from it and asks it at every tick; so can we. Times are whole nanoseconds.
+# A scene names the drive of the linkage and the effects beyond positions. The node builds a
+# `Pipeline` from it and calls it at every tick; you can do the same. Times are whole nanoseconds.
 
 # %%
 Path('scene.yaml').write_text("""
@@ -166,8 +166,8 @@ ticks = [pipeline.tick(number * 10_000_000) for number in range(101)]
 ticks[0].message[:12].hex(' ')  # the bytes that the node would publish, header first
 
 # %% [markdown]
-# A tick holds what every linkage of the scene came to: the crank, the exact position, and the
-# reading, which is what the sensors make of it.
+# A tick has, for every linkage of the scene, the crank, the exact position, and the reading of the
+# sensors.
 
 # %%
 looks = [tick.looks[0] for tick in ticks]
@@ -182,8 +182,8 @@ axes.set(xlabel='time [s]', ylabel='read − true [°]', title='noise, then whol
 figure.tight_layout()
 
 # %% [markdown]
-# One count is 1.41°. The same scene gives the same bytes again, noise and all: that is what makes
-# a bag replay to the last bit.
+# One count is 1.41°. The same scene gives the same bytes again, including the noise. So a bag
+# replays to the last bit.
 
 # %%
 again = lr.Pipeline(lr.load_scene('scene.yaml'))
@@ -194,8 +194,8 @@ assert [again.tick(number * 10_000_000).message for number in range(101)] == [
 # %% [markdown]
 # ## Design one
 #
-# Three pairs of crank and rocker angles fix a four-bar. The design is proven by the closure that
-# the node uses.
+# Three pairs of crank and rocker angles determine a four-bar. The closure that the node uses
+# checks the design.
 
 # %%
 from linkage_ros.synthesis.pairs.freudenstein import exact
