@@ -41,7 +41,7 @@ from cmath import rect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import copysign, tau
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple
 
 from linkage_ros.files.parameters import number
 from linkage_ros.kinematics.arithmetic import cross
@@ -56,8 +56,6 @@ from linkage_ros.kinematics.sweep_analysis import usual_inputs
 from linkage_ros.kinematics.topology import Dyad, Iterated
 from linkage_ros.solvers.loops import LoopFinder, Loops, Vector
 from linkage_ros.solvers.solver import Solver
-
-
 
 _PER_TURN = 256
 _MOST = 2**16
