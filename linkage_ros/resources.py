@@ -98,7 +98,7 @@ def named_file(named: str | PathLike[str], folder: str) -> Path:
     names = _names(folder)
     if named in names and (path.is_dir() or not path.exists()):
         return shipped(f'{folder}/{named}.yaml')
-    if named != path.stem or path.exists():
+    if named and (named != path.stem or path.exists()):
         return path
     raise FileError(
         named or "''",
