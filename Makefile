@@ -112,7 +112,7 @@ test: $(STAMP)
 	$(BIN)/python test/node_packages.py || status=$$?; \
 	$(MAKE) --no-print-directory lint || status=$$?; \
 	$(PYTEST) -m 'not ros' --numprocesses auto $(BY_FILE) || status=$$?; \
-	$(PYTEST) -m 'ros and not alone' --numprocesses 2 $(BY_FILE) test/node $(call marked,ros) || status=$$?; \
+	$(PYTEST) -m 'ros and not alone' --numprocesses 3 $(BY_FILE) test/node $(call marked,ros) || status=$$?; \
 	$(PYTEST) -m alone $(call marked,alone) || status=$$?; \
 	exit $$status
 

@@ -56,8 +56,8 @@ def test_the_demo_runs_records_proves_and_draws(linkage: Run, tmp_path: Path) ->
     assert answer.returncode == 0, answer.stderr
     bag = only_bag(tmp_path / 'runs')
     counts = messages(bag)
-    assert counts['/joint_states'] > 1000
-    assert counts['/crank_states'] > 500
+    assert counts['/joint_states'] > 100  # as soon as the crank is heard
+    assert counts['/crank_states'] > 50
     assert counts['/diagnostics'] >= 3
 
     told = answer.stdout
