@@ -22,7 +22,6 @@ a service for each fault.
 
 from pathlib import Path
 import re
-import time
 from xml.etree import ElementTree as ET
 
 from linkage_ros.node.node import LinkageNode
@@ -59,15 +58,6 @@ def granted():
     }
 
 
-def settled(ask):
-    """Return an answer of the graph once it stays the same: entities are discovered one by one."""
-    last, answer = None, ask()
-    while answer != last:
-        time.sleep(0.3)
-        last, answer = answer, ask()
-    return answer
-
-
 @pytest.fixture(scope='module')
 def graph_of():
     """Return a function that returns what a configured node has, in full names, by kind."""
@@ -80,12 +70,10 @@ def graph_of():
             node = LinkageNode(context=context, parameter_overrides=overrides)
             try:
                 assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
-                return settled(
-                    lambda: {
-                        kind: {name for name, _ in getattr(node, ask)(NODE, '/')}
-                        for kind, (_, ask) in KINDS.items()
-                    }
-                )
+                return {
+                    kind: {name for name, _ in getattr(node, ask)(NODE, '/')}
+                    for kind, (_, ask) in KINDS.items()
+                }
             finally:
                 node.destroy_node()
                 rclpy.try_shutdown(context=context)
