@@ -20,6 +20,7 @@ What it leaves to the user stands in its comment: crank_commands in the place of
 a service for each fault.
 """
 
+from contextlib import ExitStack
 from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
@@ -61,9 +62,11 @@ def granted():
 @pytest.fixture(scope='module')
 def graph_of():
     """Return a function that returns what a configured node has, in full names, by kind."""
-    with own_domain() as domain:
+    with ExitStack() as domains:
 
         def graph_of(scene):
+            # One domain for each: a namesake that has just ended stays in the graph for a while.
+            domain = domains.enter_context(own_domain())
             context = rclpy.Context()
             rclpy.init(context=context, domain_id=domain)
             overrides = [Parameter('scene', value=str(scene))]
